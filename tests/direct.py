@@ -89,8 +89,8 @@ def all_expected(
     """Every output of the interpreted PROGRAM, rows of states; NaN where what must be positive is not."""
     function = kernel.function
     values = interpret(kernel.single, given, function.sizes(Sizes.of_chain(n, l, frames)))
-    if function.positive is not None:
-        failed = ~(values.pop(function.positive.quantity.name) > 0).all(axis=-1)
+    if function.pivots:
+        failed = ~(values.pop(function.pivots.name) > 0).all(axis=-1)
         for rows in values.values():
             rows[failed] = np.nan
     return values

@@ -133,9 +133,9 @@ def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
     return rows  # type: ignore[return-value]
 
 
-def as_vector(values: Sequence[float]) -> Vector:
-    """Three numbers as a vector of Python floats, which symbols take as constants."""
-    x, y, z = (float(v) for v in values)
+def as_vector(values: Sequence[Scalar]) -> Vector:
+    """Three Python floats, which symbols take as constants, or symbols as a vector."""
+    x, y, z = values
     return (x, y, z)
 
 

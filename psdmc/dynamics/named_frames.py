@@ -119,19 +119,15 @@ def _running(parts: Sequence[Vector]) -> list[Vector]:
 
 
 def link_wrenches(
-    named: Sequence[NamedFrame], wrenches: Sequence[Sequence[Scalar]], unit: float = 1.0
+    named: Sequence[NamedFrame], wrenches: Sequence[Sequence[Scalar]]
 ) -> dict[int, tuple[Vector, Vector]]:
     """Move wrenches from named frames to joint frames: force and moment about each joint frame's origin, along its
-    axes. The given force and moment of a named frame are along that frame's axes, about its origin.
-
-    unit   m, unit of length of the algorithm that uses them: a force of one there is `unit` times as many N
-    """
+    axes. The given force and moment of a named frame are along that frame's axes, about its origin."""
     found: dict[int, tuple[Vector, Vector]] = {}
     for each, (fx, fy, fz, mx, my, mz) in zip(named, wrenches, strict=True):
         force = transform(_rotation(each), (fx, fy, fz))
         arm = as_vector(each.placement.translation.tolist())
         moment = add(transform(_rotation(each), (mx, my, mz)), cross(arm, force))
-        force = force if unit == 1.0 else scale(force, unit)
         own = found.get(each.joint, (ZERO, ZERO))
         found[each.joint] = (add(own[0], force), add(own[1], moment))
     return found

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psdmc.dynamics.energy import first_moment
-from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import add, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     """Total mass times centre of the links' own bodies, over their mass."""
-    bodies = bodies_about(g.link_frames, g.standard)
+    bodies = g.link_bodies()
     mass, moment = sum(body.mass for body in bodies), first_moment(g.frames, bodies, g.inputs["q"])
     axes, origin = g.root
     return {"c": add(origin, scale(transform(axes, moment), 1.0 / mass))}
@@ -47,7 +46,7 @@ RECIPE = Recipe(
         165,
         "all links' common centre of mass (m) in the base frame",
         (Q,),
-        (Quantity("c", ("3",), means="centre of mass, m"),),
+        (Quantity("c", ("3",), means="centre of mass, m", unit="m"),),
         theta=False,
         summary="Compute the position of the centre of mass of all links in the base frame.",
     ),

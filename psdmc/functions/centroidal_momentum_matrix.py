@@ -11,7 +11,6 @@ from psdmc.dynamics.body import Body
 from psdmc.dynamics.energy import first_moment
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.momentum import momentum_matrix
-from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import Matrix, Scalar, cross, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     return {
-        "A": _rows(g.frames, bodies_about(g.link_frames, g.standard), g.inputs["q"], g.base_axes),
+        "A": _rows(g.frames, g.link_bodies(), g.inputs["q"], g.base_axes),
     }
 
 
@@ -71,6 +70,8 @@ RECIPE = Recipe(
                 ("6", "nv"),
                 means="three rows for the linear momentum (kg m/s), three for the angular momentum "
                 "(kg m^2/s), along the axes of the base frame",
+                unit="J s^2",
+                powers=(-1, -1),
             ),
         ),
         theta=False,

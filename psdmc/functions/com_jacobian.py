@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psdmc.dynamics.momentum import momentum_matrix
-from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     """The whole robot's momentum per unit rate of each joint, over its mass."""
-    bodies = bodies_about(g.link_frames, g.standard)
+    bodies = g.link_bodies()
     mass = sum(body.mass for body in bodies)
     per_rate = zip(*momentum_matrix(g.frames, bodies, g.inputs["q"])[:3], strict=True)
     columns = [scale(transform(g.base_axes, linear), 1.0 / mass) for linear in per_rate]
@@ -53,6 +52,8 @@ RECIPE = Recipe(
                 "J",
                 ("3", "nv"),
                 means="column j is the velocity of the centre of mass (m/s) if qd[j] is 1 and all other rates are 0",
+                unit="m",
+                powers=(0, -1),
             ),
         ),
         theta=False,

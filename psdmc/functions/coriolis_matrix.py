@@ -52,7 +52,15 @@ RECIPE = Recipe(
         50,
         "Coriolis matrix C(q, qd), for which dM/dt - 2 C is skew-symmetric",
         (Q, QD),
-        (Quantity("C", ("nv", "nv"), means="the matrix C; C qd is in N m, or N for sliding joints"),),
+        (
+            Quantity(
+                "C",
+                ("nv", "nv"),
+                means="the matrix C; C qd is in N m, or N for sliding joints",
+                unit="J s",
+                powers=(-1, -1),
+            ),
+        ),
         theta=True,
         summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques, and "
         "dM/dt - 2 C is skew-symmetric.",

@@ -17,14 +17,30 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 FROM, TO = (
-    Quantity("q0", ("nq",), np.pi, means="joint positions at the start: rad, m or unit quaternions"),
-    Quantity("q1", ("nq",), np.pi, means="joint positions at the end: rad, m or unit quaternions"),
+    Quantity(
+        "q0",
+        ("nq",),
+        np.pi,
+        means="joint positions at the start: rad, m or unit quaternions",
+        unit="1",
+        powers=(1,),
+    ),
+    Quantity(
+        "q1",
+        ("nq",),
+        np.pi,
+        means="joint positions at the end: rad, m or unit quaternions",
+        unit="1",
+        powers=(1,),
+    ),
 )
 WAY = Quantity(
     "v",
     ("nv",),
     means="displacement: q1 - q0 for joints with one coordinate; for quaternions the rotation vector (rad) "
     "of the shorter rotation, in the body frame at q0",
+    unit="1",
+    powers=(1,),
 )
 
 

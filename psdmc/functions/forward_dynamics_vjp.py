@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.solve import solve
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import (
     COTANGENT,
+    COTANGENT_OF_QDD,
     GRADIENT_Q,
     GRADIENT_QD,
     GRADIENT_TAU,
@@ -62,12 +63,12 @@ RECIPE = Recipe(
         "forward_dynamics_vjp",
         184,
         "qdd, and the gradient of cotangent . qdd by q, qd and tau",
-        (Q, QD, TAU, COTANGENT),
+        (Q, QD, TAU, COTANGENT_OF_QDD),
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
         summary="Compute the accelerations qdd, and the gradients of "
         "the sum of cotangent[i] * qdd[i] with respect to q, qd and tau.",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
     ),
     "gradient of forward dynamics",
     trace,

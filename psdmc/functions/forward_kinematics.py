@@ -47,11 +47,12 @@ RECIPE = Recipe(
         "origin (m) and rotation matrix of every named frame in the base frame",
         (Q,),
         (
-            Quantity("position", ("frames", "3"), means="origins of the frames, m"),
+            Quantity("position", ("frames", "3"), means="origins of the frames, m", unit="m"),
             Quantity(
                 "rotation",
                 ("frames", "3", "3"),
                 means="rotation matrices; column j is the axis j of the named frame",
+                unit="1",
             ),
         ),
         theta=False,

@@ -49,6 +49,8 @@ RECIPE = Recipe(
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
                 "column j for qd[j]",
+                unit="1",
+                powers=(0, 1, -1),
             ),
         ),
         theta=False,

@@ -58,6 +58,8 @@ RECIPE = Recipe(
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
                 "column j for a change of q along joint rate j",
+                unit="1/s",
+                powers=(0, 1, -1),
             ),
         ),
         theta=False,

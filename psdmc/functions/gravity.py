@@ -37,7 +37,15 @@ RECIPE = Recipe(
         60,
         "gravity torques g(q), which hold the robot still",
         (Q,),
-        (Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),),
+        (
+            Quantity(
+                "g",
+                ("nv",),
+                means="gravity torques (N m), or forces (N) of sliding joints",
+                unit="J",
+                powers=(-1,),
+            ),
+        ),
         theta=True,
         summary="Compute the gravity torques g(q): the torques that keep the robot at rest.",
     ),

@@ -51,7 +51,13 @@ RECIPE = Recipe(
         "gravity torques g(q), and d g / d q; row i: derivatives of g[i]",
         (Q,),
         (
-            Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),
+            Quantity(
+                "g",
+                ("nv",),
+                means="gravity torques (N m), or forces (N) of sliding joints",
+                unit="J",
+                powers=(-1,),
+            ),
             jacobian_of("g", "q"),
         ),
         theta=True,

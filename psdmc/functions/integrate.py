@@ -20,6 +20,8 @@ WAY = Quantity(
     ("nv",),
     3.0,
     means="displacement, a rate times a time: rad or m; for quaternions a rotation vector in the body frame at q",
+    unit="1",
+    powers=(1,),
 )
 """Rates times seconds: rad or m."""
 

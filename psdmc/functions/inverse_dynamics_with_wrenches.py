@@ -23,12 +23,14 @@ WRENCHES = Quantity(
     largest=20.0,
     means="what the world exerts on each named frame: force (N), then moment (N m) about the frame's origin, "
     "along the axes of the frame",
+    unit="J",
+    powers=(0, -1),
 )
 
 
 def trace(g: Ingredients) -> Outputs:
     rows = [g.inputs["wrenches"][6 * k : 6 * k + 6] for k in range(len(g.named))]
-    external = link_wrenches(g.named, rows, g.unit)
+    external = link_wrenches(g.named, rows)
     return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base_acceleration, external=external)}
 
 

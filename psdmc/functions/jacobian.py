@@ -47,6 +47,8 @@ RECIPE = Recipe(
                 ("6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
                 "column j for qd[j]",
+                unit="1",
+                powers=(1, -1),
             ),
         ),
         theta=False,

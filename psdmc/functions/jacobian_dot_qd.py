@@ -50,6 +50,8 @@ RECIPE = Recipe(
                 "drift",
                 ("frames", "6"),
                 means="linear acceleration (m/s^2), then angular acceleration (rad/s^2)",
+                unit="1/s^2",
+                powers=(0, 1),
             ),
         ),
         theta=False,

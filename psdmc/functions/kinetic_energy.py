@@ -49,7 +49,7 @@ RECIPE = Recipe(
         130,
         "kinetic energy T = qd^T M(q) qd / 2 (J), drive inertias included",
         (Q, QD),
-        (Quantity("T", means="kinetic energy, J"),),
+        (Quantity("T", means="kinetic energy, J", unit="J"),),
         theta=True,
         summary="Compute the kinetic energy T = qd^T M(q) qd / 2 of the links and the drives.",
     ),

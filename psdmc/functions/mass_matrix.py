@@ -38,6 +38,8 @@ RECIPE = Recipe(
                 "M",
                 ("nv", "nv"),
                 means="symmetric matrix, both triangles filled; kg m^2, kg m or kg",
+                unit="J s^2",
+                powers=(-1, -1),
             ),
         ),
         theta=True,

@@ -11,7 +11,7 @@ from psdmc import reproducible
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.solve import factorize, inverse
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.accelerations import PIVOTS
+from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -42,10 +42,18 @@ RECIPE = Recipe(
         192,
         "inverse of the mass matrix M(q), both triangles",
         (Q,),
-        (Quantity("Minv", ("nv", "nv"), means="symmetric matrix, both triangles filled; SI units"),),
+        (
+            Quantity(
+                "Minv",
+                ("nv", "nv"),
+                means="symmetric matrix, both triangles filled; SI units",
+                unit="1/(J s^2)",
+                powers=(1, 1),
+            ),
+        ),
         theta=True,
         summary="Compute the inverse of the joint-space mass matrix M(q).",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
     ),
     "inverse of the mass matrix",
     trace,

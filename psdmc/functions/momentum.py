@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psdmc.dynamics.momentum import total_momentum
-from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import add, cross, transform
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 def trace(g: Ingredients) -> Outputs:
     """The momentum of the links' own bodies. Bodies that stand for theta_b have the same torques, but not the same
     momentum."""
-    bodies = bodies_about(g.link_frames, g.standard)
+    bodies = g.link_bodies()
     linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
     axes, origin = g.root
     turned = transform(axes, linear)
@@ -60,6 +59,8 @@ RECIPE = Recipe(
                 ("6",),
                 means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame, "
                 "without drive inertias",
+                unit="J s",
+                powers=(-1,),
             ),
         ),
         theta=False,

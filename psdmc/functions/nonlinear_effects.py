@@ -35,7 +35,15 @@ RECIPE = Recipe(
         40,
         "Coriolis, centrifugal and gravity torques, h(q, qd) = C(q, qd) qd + g(q)",
         (Q, QD),
-        (Quantity("h", ("nv",), means="the sum of these torques (N m), or forces (N) of sliding joints"),),
+        (
+            Quantity(
+                "h",
+                ("nv",),
+                means="the sum of these torques (N m), or forces (N) of sliding joints",
+                unit="J",
+                powers=(-1,),
+            ),
+        ),
         theta=True,
         summary="Compute the sum h(q, qd) = C(q, qd) qd + g(q) of the Coriolis, centrifugal and gravity torques.",
     ),

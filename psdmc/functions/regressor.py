@@ -33,7 +33,15 @@ RECIPE = Recipe(
         70,
         "regressor Y(q, qd, qdd): tau = Y theta_b",
         (Q, QD, QDD),
-        (Quantity("Y", ("nv", "l"), means="regressor: row i is for tau[i], column j for theta_b[j]"),),
+        (
+            Quantity(
+                "Y",
+                ("nv", "l"),
+                means="regressor: row i is for tau[i], column j for theta_b[j]",
+                unit="J",
+                powers=(-1, -1),
+            ),
+        ),
         theta=False,
         summary="Compute the regressor Y(q, qd, qdd), with which the torques of inverse dynamics are tau = Y theta_b.",
     ),

@@ -40,14 +40,30 @@ RECIPE = Recipe(
         (
             Q,
             QD,
-            Quantity("qd_r", ("nv",), 3.0, means="reference rates of the controller, rad/s or m/s"),
             Quantity(
-                "qdd_r", ("nv",), 5.0, means="reference accelerations of the controller, rad/s^2 or m/s^2"
+                "qd_r",
+                ("nv",),
+                3.0,
+                means="reference rates of the controller, rad/s or m/s",
+                unit="1/s",
+                powers=(1,),
+            ),
+            Quantity(
+                "qdd_r",
+                ("nv",),
+                5.0,
+                means="reference accelerations of the controller, rad/s^2 or m/s^2",
+                unit="1/s^2",
+                powers=(1,),
             ),
         ),
         (
             Quantity(
-                "Y", ("nv", "l"), means="regressor: row i is for joint torque i, column j for theta_b[j]"
+                "Y",
+                ("nv", "l"),
+                means="regressor: row i is for joint torque i, column j for theta_b[j]",
+                unit="J",
+                powers=(-1, -1),
             ),
         ),
         theta=False,

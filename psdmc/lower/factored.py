@@ -6,7 +6,7 @@ One PROGRAM per generated function. What can be chosen freely is in an Arrangeme
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -16,17 +16,21 @@ import numpy as np
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
+from psdmc.dynamics.frames import as_vector
+from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.errors import InternalError
 from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
+from psdmc.lower.units import are_scaled, dimensions_of_traced, multiple, own_axes, scaled_parameters
 from psdmc.program.cost import Cost
+from psdmc.program.dimensions import NUMBER, dimension_of
 from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Signature, Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.program.trace import Outputs as Recorded
 from psdmc.recipes.recipe import ByTheta, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array, Mechanism
+from psdmc.robot.mechanism import Array, Mechanism, Placement
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +52,7 @@ class Arrangement:
     """One way to lower a model.
 
     reframed  geometry
-    unit      m, unit of length inside the code; a length equal to it costs no multiplication
+    unit      m, unit of length inside the code (units.py); a length equal to it costs no multiplication
     carriers  which link parameters carry the model (indices, 11 per link)
     transfer  (len(carriers), l)  theta_b to their values
     choices   how the recursions are arranged
@@ -111,7 +115,7 @@ def traced(
     recipe: Recipe,
     robot: RobotConstants,
     reframed: Reframed,
-    inputs: dict[str, list[Symbol]],
+    inputs: Mapping[str, list[Any]],
     bodies: tuple[Body, ...],
     drives: tuple[Scalar, ...],
     choices: Choices,
@@ -119,32 +123,48 @@ def traced(
     by_theta: Callable[[], ByTheta],
 ) -> Recorded:
     """Record a recipe on these frames, bodies and symbols: every entry of its outputs with its slot."""
+    is_scaled = unit != 1.0 and are_scaled((*recipe.signature.inputs, *recipe.signature.stored))
+    axes = own_axes(reframed.frames, len(reframed.named), [NUMBER] * robot.sizes.l) if is_scaled else {}
+    for quantity in recipe.signature.inputs if is_scaled else ():
+        own = zip(inputs[quantity.name], quantity.dimensions(axes), strict=True)
+        inputs = {**inputs, quantity.name: [symbol * multiple(unit, each) for symbol, each in own]}
     ingredients = Ingredients(
         frames=reframed.frames,
         base_acceleration=reframed.base_acceleration,
         bodies=bodies,
         drives=drives,
         choices=choices,
-        unit=unit,
         base_axes=reframed.base_axes,
         base_origin=reframed.base_origin,
         link_frames=reframed.link_frames,
         named=reframed.named,
         tip=reframed.tip,
         tip_body=reframed.tip_body,
-        lift=robot.representative,
-        standard=robot.chain.parameters,
+        lift=_lift(robot, unit),
+        link_bodies=lambda: bodies_about(
+            reframed.link_frames, scaled_parameters(robot.chain.parameters, unit)
+        ),
+        si=lambda value, word: value * multiple(unit, dimension_of(word)),
         inputs=inputs,
         by_theta=by_theta,
     )
-    return _stored(recipe.signature, recipe.trace(ingredients))
+    found = stored_entries(recipe.signature, recipe.trace(ingredients))
+    if not is_scaled:
+        return found
+    dimensions = dimensions_of_traced(recipe.signature, axes)
+    return [(slot, value / multiple(unit, dimensions[slot.vector][slot.index])) for slot, value in found]
+
+
+@lru_cache(maxsize=4)
+def _lift(robot: RobotConstants, unit: float) -> Array:
+    return scaled_parameters(robot.representative, unit)
 
 
 def _inputs(recipe: Recipe, robot: RobotConstants, tracer: Tracer) -> dict[str, list[Symbol]]:
     return {q.name: tracer.symbols(q.name, robot.sizes.size(q)) for q in recipe.signature.inputs}
 
 
-def _stored(signature: Signature, outputs: Outputs) -> Recorded:
+def stored_entries(signature: Signature, outputs: Outputs) -> Recorded:
     """Every entry of a trace's outputs with its slot, in order of storing; InternalError where they do not fit the
     signature."""
     if outputs.keys() != signature.traced:
@@ -177,7 +197,7 @@ def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Trac
 
 @lru_cache(maxsize=64)
 def in_unit(reframed: Reframed, unit: float) -> Reframed:
-    """Lengths and accelerations in another unit of length; a length equal to it becomes exactly one."""
+    """The geometry in another unit of length; a length equal to it becomes exactly one."""
     if unit == 1.0:
         return reframed
 
@@ -185,8 +205,18 @@ def in_unit(reframed: Reframed, unit: float) -> Reframed:
         x, y, z = (_ratio(value, unit) for value in v)
         return (x, y, z)
 
-    frames = tuple(replace(f, translation=scaled(f.translation)) for f in reframed.frames)
-    return replace(reframed, frames=frames, base_acceleration=scaled(reframed.base_acceleration))
+    def placed(place: Placement) -> Placement:
+        return Placement(place.rotation, np.array(scaled(as_vector(place.translation.tolist()))))
+
+    return replace(
+        reframed,
+        frames=tuple(replace(f, translation=scaled(f.translation)) for f in reframed.frames),
+        base_acceleration=scaled(reframed.base_acceleration),
+        link_frames=tuple(map(placed, reframed.link_frames)),
+        tip=placed(reframed.tip),
+        base_origin=scaled(reframed.base_origin),
+        named=tuple(replace(frame, placement=placed(frame.placement)) for frame in reframed.named),
+    )
 
 
 def _ratio(value: float, unit: float) -> float:

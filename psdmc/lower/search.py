@@ -18,7 +18,7 @@ import numpy as np
 
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.following import any_follows
-from psdmc.dynamics.solve import SingularMassMatrix
+from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
 from psdmc.lower.branches import Branches
@@ -150,7 +150,7 @@ class Search:
                 return -math.inf
             try:
                 costs = [self._branch_cost(recipe, each, kept) for each in (found, candidate)]
-            except SingularMassMatrix:  # what the branches hang on has its inertia from others
+            except SingularMatrix:  # what the branches hang on has its inertia from others
                 return -math.inf
             before, behind = map(scoring.weight, costs)
             return scoring.weight(self.cost(recipe, found)) - before + behind

@@ -23,6 +23,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from psdmc.program.dimensions import Known, alike, angle, chosen, number, product, quotient, raised, root
 from psdmc.reproducible import angle_of, cosine, exponential, hyperbolic_tangent, logarithm, power, sine
 
 Scalar = Any
@@ -55,6 +56,7 @@ class Operation:
     unit         of which it costs one
     numbers      its meaning on floats and arrays; on symbols, too, where `written` says so
     partials     derivative by each argument, from its value and its arguments
+    dimension    dimension of its value, from those of its arguments; raises Unlike where they do not go together
     ulp          largest error of a double, in units in the last place, of `numbers` and of the emitted C; 0.5: rounded once
     written      whether symbols have it as an operator, and simplify as they record it
     commutative  whether its arguments may be swapped
@@ -65,6 +67,7 @@ class Operation:
     unit: Unit
     numbers: Callable[..., Any]
     partials: Callable[..., tuple[Scalar, ...]]
+    dimension: Callable[..., Known] = number
     ulp: float = 0.5
     written: bool = False
     commutative: bool = False
@@ -98,6 +101,9 @@ def _angle_partials(value: Scalar, y: Scalar, x: Scalar) -> tuple[Scalar, ...]:
 
 
 def _power_partials(value: Scalar, base: Scalar, exponent: Scalar) -> tuple[Scalar, ...]:
+    known = exponent.constant_value() if hasattr(exponent, "constant_value") else None
+    if known is not None:  # a base with a unit has no logarithm
+        return known * Op.POW(base, known - 1.0), 0.0
     return exponent * Op.POW(base, exponent - 1.0), value * Op.LOG(base)
 
 
@@ -111,22 +117,30 @@ class Op(StrEnum):
     CONST = "const", Operation(0, Unit.NONE, _none, _none)
     ADD = (
         "add",
-        Operation(2, Unit.ADD, operator.add, lambda _, a, b: (1.0, 1.0), written=True, commutative=True),
+        Operation(
+            2, Unit.ADD, operator.add, lambda _, a, b: (1.0, 1.0), alike, written=True, commutative=True
+        ),
     )
-    SUB = "sub", Operation(2, Unit.ADD, operator.sub, lambda _, a, b: (1.0, -1.0), written=True)
+    SUB = "sub", Operation(2, Unit.ADD, operator.sub, lambda _, a, b: (1.0, -1.0), alike, written=True)
     MUL = (
         "mul",
-        Operation(2, Unit.MUL, operator.mul, lambda _, a, b: (b, a), written=True, commutative=True),
+        Operation(2, Unit.MUL, operator.mul, lambda _, a, b: (b, a), product, written=True, commutative=True),
     )
-    DIV = "div", Operation(2, Unit.DIV, operator.truediv, _quotient_partials, written=True)
-    NEG = "neg", Operation(1, Unit.NEG, operator.neg, lambda _, a: (-1.0,), written=True)
+    DIV = "div", Operation(2, Unit.DIV, operator.truediv, _quotient_partials, quotient, written=True)
+    NEG = "neg", Operation(1, Unit.NEG, operator.neg, lambda _, a: (-1.0,), alike, written=True)
     SIN = "sin", Operation(1, Unit.SINCOS, sine, lambda _, a: (Op.COS(a),), ulp=1.0, parity="odd")
     COS = "cos", Operation(1, Unit.SINCOS, cosine, lambda _, a: (-Op.SIN(a),), ulp=1.0, parity="even")
-    SQRT = "sqrt", Operation(1, Unit.DIV, np.sqrt, lambda value, a: (0.5 / value,))
+    SQRT = "sqrt", Operation(1, Unit.DIV, np.sqrt, lambda value, a: (0.5 / value,), root)
     ABS = (
         "abs",
         Operation(
-            1, Unit.CHOICE, np.abs, lambda _, a: (Op.SELECT(a, 0.0, -1.0, 1.0),), ulp=0.0, parity="even"
+            1,
+            Unit.CHOICE,
+            np.abs,
+            lambda _, a: (Op.SELECT(a, 0.0, -1.0, 1.0),),
+            alike,
+            ulp=0.0,
+            parity="even",
         ),
     )
     MIN = (
@@ -136,6 +150,7 @@ class Op(StrEnum):
             Unit.CHOICE,
             _smaller,
             lambda _, a, b: (Op.SELECT(a, b, 1.0, 0.0), Op.SELECT(a, b, 0.0, 1.0)),
+            alike,
             ulp=0.0,
             commutative=True,
         ),
@@ -147,6 +162,7 @@ class Op(StrEnum):
             Unit.CHOICE,
             _larger,
             lambda _, a, b: (Op.SELECT(b, a, 1.0, 0.0), Op.SELECT(b, a, 0.0, 1.0)),
+            alike,
             ulp=0.0,
             commutative=True,
         ),
@@ -158,6 +174,7 @@ class Op(StrEnum):
             Unit.CHOICE,
             _selected,
             lambda _, a, b, x, y: (0.0, 0.0, Op.SELECT(a, b, 1.0, 0.0), Op.SELECT(a, b, 0.0, 1.0)),
+            chosen,
             ulp=0.0,
         ),
     )
@@ -165,17 +182,12 @@ class Op(StrEnum):
     TANH = (
         "tanh",
         Operation(
-            1,
-            Unit.CALL,
-            hyperbolic_tangent,
-            lambda value, a: (1.0 - value * value,),
-            ulp=2.5,
-            parity="odd",
+            1, Unit.CALL, hyperbolic_tangent, lambda value, a: (1.0 - value * value,), ulp=2.5, parity="odd"
         ),
     )
     LOG = "log", Operation(1, Unit.CALL, logarithm, lambda _, a: (1.0 / a,), ulp=1.0)
-    POW = "pow", Operation(2, Unit.CALL, power, _power_partials, ulp=1.0)
-    ATAN2 = "atan2", Operation(2, Unit.CALL, angle_of, _angle_partials, ulp=1.0, parity="odd")
+    POW = "pow", Operation(2, Unit.CALL, power, _power_partials, raised, ulp=1.0)
+    ATAN2 = "atan2", Operation(2, Unit.CALL, angle_of, _angle_partials, angle, ulp=1.0, parity="odd")
 
     arity: int
     unit: Unit

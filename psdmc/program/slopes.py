@@ -1,9 +1,9 @@
 """Derivatives of recorded values, recorded beside them: along tangents (forward mode) and as gradients (reverse mode).
 
-Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are taken by inputs (`Tracer.symbols`),
-not by computed values: constants along a product are merged into one, so that a recorded product may no longer contain
-the value that it was written with. To differentiate at computed values, trace with inputs and put the values in their
-place afterwards (replay.py).
+Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are taken by inputs (`Tracer.symbols`) and by
+inputs times a constant, not by other computed values: constants along a product are merged into one, so that a recorded
+product may no longer contain the value that it was written with. To differentiate at computed values, trace with inputs and
+put the values in their place afterwards (replay.py).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from psdmc.errors import InternalError
 from psdmc.program.limb_sums import CORE
+from psdmc.program.operations import Op
 from psdmc.program.trace import Constant, Symbol, Tracer
 from psdmc.program.turned_pairs import TurnedPairs
 
@@ -20,10 +21,14 @@ Value = Symbol | Constant
 
 def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) -> list[Value]:
     """The derivative of each value along a tangent: sum over j of (d of[i] / d by[j]) along[j]."""
-    sources = _Sources.of(of, by)
+    inputs, factors = _inputs(by)
+    sources = _Sources.of(of, inputs)
     if sources is None:
         return [0.0] * len(of)
-    moved = {symbol.index: tangent for symbol, tangent in zip(by, along, strict=True)}
+    moved = {
+        symbol.index: _divided(tangent, factor)
+        for symbol, tangent, factor in zip(inputs, along, factors, strict=True)
+    }
     for index in range(len(sources.needed)):
         if sources.needed[index] and index not in sources.held:
             moved[index] = sources.slope(index, moved)
@@ -34,7 +39,8 @@ def gradients(
     of: Sequence[Value], weights: Sequence[Value], by: Sequence[Sequence[Symbol]]
 ) -> list[list[Value]]:
     """The derivative of sum(weights[i] of[i]) by every value, vector by vector."""
-    sources = _Sources.of(of, [symbol for vector in by for symbol in vector])
+    known = [_inputs(vector) for vector in by]
+    sources = _Sources.of(of, [symbol for inputs, _ in known for symbol in inputs])
     if sources is None:
         return [[0.0] * len(vector) for vector in by]
     bars = _Bars(sources)
@@ -47,7 +53,32 @@ def gradients(
         if index not in sources.held and not _is_zero(bar):
             for argument, partial in sources.partials(index):
                 bars.add(argument, partial * bar, sources.group_of(index))
-    return [[bars.of(symbol.index) for symbol in vector] for vector in by]
+    return [
+        [_divided(bars.of(symbol.index), factor) for symbol, factor in zip(*each, strict=True)]
+        for each in known
+    ]
+
+
+def _inputs(by: Sequence[Symbol]) -> tuple[list[Symbol], list[float]]:
+    """The inputs that values are, or are products of with constants, and these; InternalError where one is neither."""
+    found, factors = [], []
+    for symbol in by:
+        tracer, factor = symbol.tracer, 1.0
+        op, a, b = tracer.steps[symbol.index]
+        if op is Op.MUL:
+            a, b = (a, b) if b in tracer.constants else (b, a)
+            constant = tracer.constants.get(b)
+            if isinstance(constant, float):
+                symbol, factor = Symbol(tracer, a), -constant if symbol.negative else constant
+        if symbol.slot is None:
+            raise InternalError("derivatives are by inputs")
+        found.append(symbol)
+        factors.append(factor)
+    return found, factors
+
+
+def _divided(value: Value, factor: float) -> Value:
+    return value if factor == 1.0 else value / factor
 
 
 class _Bars:
@@ -97,9 +128,7 @@ class _Sources:
 
     @staticmethod
     def of(values: Sequence[Value], by: Sequence[Symbol]) -> _Sources | None:
-        """None where all values are numbers; InternalError where `by` are not all inputs."""
-        if any(symbol.slot is None for symbol in by):
-            raise InternalError("derivatives are by inputs")
+        """None where all values are numbers."""
         symbols = [value for value in values if isinstance(value, Symbol)]
         if not symbols:
             return None

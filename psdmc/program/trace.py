@@ -83,6 +83,10 @@ class Tracer:
         """Inputs vector[0] ... vector[count - 1]."""
         return [self.symbol(Slot(vector, i)) for i in range(count)]
 
+    def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
+        """Inputs that stand for values until these are put in their place (replay.py)."""
+        return self.symbols(vector, len(values))
+
     def symbol(self, slot: Slot) -> Symbol:
         """One input."""
         return Symbol(self, self.record((_LOAD, slot, None)))

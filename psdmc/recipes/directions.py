@@ -11,8 +11,9 @@ import numpy as np
 from psdmc import reproducible
 from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.scalar import Scalar
+from psdmc.program import dimensions
 from psdmc.program.replay import substituted
-from psdmc.program.signature import Quantity, Signature
+from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -23,24 +24,37 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum")
+COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum", unit="1", powers=(1,))
+"""Of torques; their weighted sum, and that of accelerations, has the unit of energy here."""
+
+COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
 
 _ENTRY = {
-    name: f"{name}; entry j is for {'a change of q along joint rate j' if name == 'q' else f'{name}[j]'}"
-    for name in ("q", "qd", "qdd", "tau")
+    each: f"{each.name}; entry j is for "
+    f"{'a change of q along joint rate j' if each is Q else f'{each.name}[j]'}"
+    for each in (Q, QD, QDD, TAU)
 }
 """What an entry per joint rate belongs to."""
 
 DQ, DQD, DQDD, DTAU = (
-    Quantity(f"d{name}", ("nv",), means=f"change of {entry}") for name, entry in _ENTRY.items()
+    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"change of {entry}")
+    for each, entry in _ENTRY.items()
 )
 """Directions of inputs, and derivatives of outputs along them."""
 
 GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
-    Quantity(f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {entry}")
-    for name, entry in _ENTRY.items()
+    Quantity(
+        f"grad_{each.name}",
+        ("nv",),
+        means=f"gradient of the weighted sum by {entry}",
+        unit=str(dimensions.times(dimensions.dimension_of("J"), each.dimension, -1)),
+        powers=(-each.powers[0],),
+    )
+    for each, entry in _ENTRY.items()
 )
-GRADIENT_THETA = Quantity("grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b")
+GRADIENT_THETA = Quantity(
+    "grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b", unit="J", powers=(-1,)
+)
 """Derivatives of the weighted sum of outputs by each input."""
 
 _FREE = "free_qdd"
@@ -51,7 +65,7 @@ def torque_gradients(
     g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Gradients of the weighted torques by q (nv, along the tangent) and by qd, at fixed computed accelerations."""
-    q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
+    q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
     found = substituted([*by_q, *by_qd], free, qdd)
     return pulled_back(g.frames, q, found[: len(q)]), found[len(q) :]
@@ -60,21 +74,21 @@ def torque_gradients(
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
     """l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, Y their regressor."""
     theta_b, bodies, drives = g.by_theta()
-    loose, free = replace(g, bodies=bodies, drives=drives), _free(g)
+    loose, free = replace(g, bodies=bodies, drives=drives), _free(g, qdd)
     (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base_acceleration), weights, (theta_b,))
     return substituted(found, free, qdd)
 
 
 def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
     """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
-    q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
+    q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     along = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name]]
     return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
 
 
-def _free(g: Ingredients) -> list[Scalar]:
+def _free(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
     """Accelerations as inputs, so that a derivative at fixed accelerations does not follow what they are computed from."""
-    found: list[Scalar] = g.inputs["q"][0].tracer.symbols(_FREE, len(g.still))
+    found: list[Scalar] = g.inputs["q"][0].tracer.stand_ins(_FREE, qdd)
     return found
 
 
@@ -112,7 +126,8 @@ def with_parameter_gradient(
             known.inputs,
             (*known.outputs, GRADIENT_THETA),
             theta=True,
-            positive=known.positive,
+            factorises=known.factorises,
+            spoilt=known.spoilt,
             summary=summary,
         ),
         f"{state.title}, by parameters too",

@@ -40,21 +40,25 @@ class ByTheta(NamedTuple):
 class Ingredients:
     """What a trace runs on: symbols, and one robot's constants.
 
+    They are quantities: each has a dimension and a value in units that lowering chooses (lower/units.py). A sum of unlike
+    ones is an error.
+
     frames             n joint frames
     base_acceleration  minus gravity, along the axes that the first frame turns from
     bodies             n bodies about the joint frames, and
     drives             n drive inertias, from theta_b: they have the torques of the real ones and nothing else of them.
                        Empty for functions without theta_b
     choices            how the recursions are arranged
-    unit               m, unit of all lengths above: forces come out in 1/unit N; 1 for functions without theta_b
     base_axes          axes that the first frame turns from as columns in the base frame, and
-    base_origin        m, their origin there
+    base_origin        their origin there
     link_frames        n, the file's link frames in the joint frames
     named              the named frames, placed in the joint frames
     tip                the tip frame, in the joint frame of
     tip_body           the body that it is fixed to
     lift               (11 n, l) theta_b to standard parameters about the link frames
-    standard           (n, 11) the robot's own standard parameters about the link frames, NaN where unknown
+    link_bodies        gives the links' own n bodies about the joint frames, of NaN where unknown
+    si                 gives a constant, from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'); a number without unit is
+                       itself
     inputs             the function's inputs by name
     by_theta           theta_b as symbols, also where it is compiled in, for derivatives by it: the derivatives of
                        quantities that are linear in theta_b, such as torques, do not depend on its values
@@ -65,7 +69,6 @@ class Ingredients:
     bodies: tuple[Body, ...]
     drives: tuple[Scalar, ...]
     choices: Choices
-    unit: float
     base_axes: Matrix
     base_origin: Vector
     link_frames: tuple[Placement, ...]
@@ -73,13 +76,14 @@ class Ingredients:
     tip: Placement
     tip_body: int
     lift: Array
-    standard: Array
+    link_bodies: Callable[[], tuple[Body, ...]]
+    si: Callable[[float, str], Scalar]
     inputs: Mapping[str, list[Any]]
     by_theta: Callable[[], ByTheta]
 
     @property
     def root(self) -> tuple[Matrix, Vector]:
-        """Axes that the first frame turns from and their origin, in the base frame, lengths in m."""
+        """Axes that the first frame turns from and their origin, in the base frame."""
         return self.base_axes, self.base_origin
 
     @property
@@ -139,7 +143,7 @@ class Recipe:
     gradient     name of its output that is the gradient by theta_b of a number linear in theta_b. It is compared as that
                  number, times theta_b, which `pinocchio` gives
     beside       name of the function whose values this one's are differences of: errors are measured relative to those
-    needs        what the model must have; left out: a positive definite mass matrix where the signature has `positive`
+    needs        what the model must have; left out: a positive definite mass matrix where the signature factorises one
     in_limbs     whether its algorithms say what they sum over limbs (Frame.limbs), so that these can run in lanes
     accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
     default      whether it is generated where no functions are named, and
@@ -174,7 +178,7 @@ class Recipe:
     regions: Callable[[Sequence[Frame]], Regions] | None = None
 
     def __post_init__(self) -> None:
-        if self.needs is None and self.signature.positive is not None:
+        if self.needs is None and self.signature.factorises:
             object.__setattr__(self, "needs", Needs.POSITIVE_MASS)
 
     @property

@@ -21,7 +21,7 @@ def traced_rows(
     needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
     q, qd = g.inputs["q"], g.inputs["qd"]
     found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base_acceleration, qd_r)
-    weights = [[(j, float(column[j])) for j in np.flatnonzero(column).tolist()] for column in g.lift.T]
+    weights = [[(j, x) for j, x in enumerate(column) if x] for column in g.lift.T.tolist()]
     return [[_entry(column, row) for column in weights] for row in found]
 
 

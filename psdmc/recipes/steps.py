@@ -18,16 +18,32 @@ from psdmc.recipes.on_arrays import columns, matrix
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
-DT = Quantity("dt", (), 0.01, "length of the step, s: one number for all states, or one per state")
+DT = Quantity("dt", (), 0.01, "length of the step, s: one number for all states, or one per state", unit="s")
 
 Q_NEXT = Quantity(
-    "q_next", ("nq",), means="joint positions after the step, rad or m, with quaternions of unit length"
+    "q_next",
+    ("nq",),
+    means="joint positions after the step, rad or m, with quaternions of unit length",
+    unit="1",
+    powers=(1,),
 )
-QD_NEXT = Quantity("qd_next", ("nv",), means="joint rates after the step, rad/s or m/s")
+QD_NEXT = Quantity(
+    "qd_next", ("nv",), means="joint rates after the step, rad/s or m/s", unit="1/s", powers=(1,)
+)
 A = Quantity(
-    "A", ("nx", "nx"), means="derivatives of the new state (q_next, qd_next) by the old state (q, qd)"
+    "A",
+    ("nx", "nx"),
+    means="derivatives of the new state (q_next, qd_next) by the old state (q, qd)",
+    unit="1",
+    powers=(1, -1),
 )
-B = Quantity("B", ("nx", "nv"), means="derivatives of the new state (q_next, qd_next) by tau")
+B = Quantity(
+    "B",
+    ("nx", "nv"),
+    means="derivatives of the new state (q_next, qd_next) by tau",
+    unit="1/J",
+    powers=(1, 1),
+)
 
 Rows = Sequence[Sequence[Scalar]]
 

@@ -16,17 +16,29 @@ from psdmc.program.trace import Symbol, Tracer
 
 
 def test_derivatives_by_a_computed_value_are_refused() -> None:
-    """A half of tau, doubled, is recorded as tau: of the half nothing is left to differentiate by."""
+    """In tau z / 2, whose factor one half is merged into other factors, nothing is left of tau / 2 to differentiate by."""
     tracer = Tracer()
-    (tau,) = tracer.symbols("tau", 1)
-    half = 0.5 * tau
-    assert (2.0 * half).index == tau.index
-    for derivative in (
-        lambda: gradients([2.0 * half], [1.0], [[half]]),
-        lambda: slopes([tau], [half], [1.0]),
-    ):
-        with pytest.raises(InternalError, match="derivatives are by inputs"):
-            derivative()
+    tau, z = tracer.symbols("tau", 2)
+    for computed in (tau * z, tau + 1.0, 0.5 * (tau * z)):
+        for derivative in (
+            lambda: gradients([2.0 * computed], [1.0], [[computed]]),  # noqa: B023
+            lambda: slopes([tau], [computed], [1.0]),  # noqa: B023
+        ):
+            with pytest.raises(InternalError, match="derivatives are by inputs"):
+                derivative()
+
+
+def test_derivatives_by_a_multiple_of_an_input_are_those_by_the_input_over_the_factor() -> None:
+    """A half of tau, doubled, is recorded as tau. Negative factors are signs of symbols."""
+    tracer = Tracer()
+    tau, z = tracer.symbols("tau", 2)
+    half, minus = 0.5 * tau, -4.0 * z
+    product = (2.0 * half) * z
+    ((by_half, by_minus),) = gradients([product], [1.0], [[half, minus]])
+    (along,) = slopes([product], [half, minus], [3.0, 1.0])
+    program = tracer.finish([(Slot("out", k), value) for k, value in enumerate((by_half, by_minus, along))])
+    out = interpret(program, {"tau": [5.0, 7.0]}, {"out": 3})["out"]
+    assert out.tolist() == [2.0 * 7.0, -5.0 / 4.0, 3.0 * 2.0 * 7.0 - 5.0 / 4.0]
 
 
 def test_at_a_computed_value_an_input_stands_for_it() -> None:

@@ -165,6 +165,17 @@ class JointType:
         return k * (k + 1) // 2
 
     @property
+    def q_orders(self) -> tuple[int, ...]:
+        """Exponent of the metre in each coordinate."""
+        part = range(self.unit.start, self.unit.stop)
+        return tuple(0 if k in part else self.length_order for k in range(self.nq))
+
+    @property
+    def v_orders(self) -> tuple[int, ...]:
+        """Exponent of the metre in each rate."""
+        return tuple(0 if any(angular) else 1 for _, angular in self.twists)
+
+    @property
     def comes_round(self) -> bool:
         """Whether q and q plus a whole turn are the same position."""
         return self.basis.has_sincos and not any(power for power, _, _ in self.basis.exponents)

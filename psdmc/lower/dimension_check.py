@@ -1,0 +1,188 @@
+"""A check of one function's trace for sums of unlike quantities.
+
+A function is traced once more, on a tracer that knows dimensions (program/dimensioned.py). There each length, mass and so on
+of the robot is an input with its dimension, so that no two of them are merged into a number. The search's own traces, of
+which there are hundreds, cost what they did before.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.choices import PLAIN, Choices
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.errors import InputError
+from psdmc.lower.factored import RobotConstants, stored_entries
+from psdmc.lower.reframe import Reframed
+from psdmc.lower.units import STANDARD, dimensions_of_traced, own_axes
+from psdmc.program.dimensioned import DimensionedTracer, UnlikeArguments
+from psdmc.program.dimensions import (
+    ACCELERATION,
+    INERTIA,
+    LENGTH,
+    MASS,
+    MOMENT,
+    Dimension,
+    dimension_of,
+    in_words,
+    times,
+)
+from psdmc.program.program import Slot
+from psdmc.recipes.recipe import ByTheta, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Placement
+
+HINT = (
+    "g's lengths, masses and inputs have units: write a constant that has one as g.si(0.3, 'm'), and give each input and "
+    "output of the signature its unit"
+)
+
+
+def check_dimensions(
+    recipe: Recipe, reframed: Reframed, robot: RobotConstants, choices: Choices = PLAIN
+) -> None:
+    """InputError where the function adds, compares or chooses between unlike quantities, takes such a function as exp of one
+    that is no number, or puts out one that has not its signature's unit."""
+    signature = recipe.signature
+    for quantity in (*signature.inputs, *signature.stored):
+        if not quantity.unit:
+            raise InputError(
+                f"{recipe.name}: {quantity.name} has no unit",
+                f"give it one in the signature: Quantity({quantity.name!r}, ..., unit='m')",
+            )
+    measured = _Measured(reframed, robot)
+    try:
+        outputs = recipe.trace(measured.ingredients(recipe, choices))
+    except UnlikeArguments as unlike:
+        raise InputError(f"{recipe.name}: {unlike}{_line(recipe, unlike)}", HINT) from unlike
+    measured.compare(recipe, outputs)
+
+
+def _line(recipe: Recipe, error: Exception) -> str:
+    """Where in the function's file an error is from."""
+    path = recipe.trace.__code__.co_filename
+    lines = [each for each in traceback.extract_tb(error.__traceback__) if each.filename == path]
+    return f" ({Path(path).name}, line {lines[-1].lineno}: {lines[-1].line})" if lines else ""
+
+
+class _Placed(Placement):
+    """A placement whose lengths are symbols."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "translation", np.array(self.translation, dtype=object))
+
+
+class _Measured:
+    """One robot's ingredients as inputs with dimensions."""
+
+    def __init__(self, reframed: Reframed, robot: RobotConstants) -> None:
+        self.reframed, self.robot = reframed, robot
+        self.tracer = DimensionedTracer()
+        self._numbers = count()
+        self.theta_b, self.standard = _theta_dimensions(robot.representative, reframed.frames)
+        self.axes = own_axes(reframed.frames, len(reframed.named), self.theta_b)
+
+    def value(self, dimension: Dimension) -> Scalar:
+        return self.tracer.measured(Slot("ingredient", next(self._numbers)), dimension)
+
+    def vector(self, v: Sequence[float], dimension: Dimension) -> Vector:
+        x, y, z = (self.value(dimension) if each else 0.0 for each in v)
+        return (x, y, z)
+
+    def placed(self, place: Placement) -> Placement:
+        return _Placed(place.rotation, self.vector(place.translation.tolist(), LENGTH))  # type: ignore[arg-type]
+
+    def frame(self, frame: Frame) -> Frame:
+        follows = frame.follows
+        if follows is not None:
+            leader, ratio, offset = follows
+            own, other = (Dimension(0, f.joint.length_order) for f in (frame, self.reframed.frames[leader]))
+            if own != other:
+                ratio = self.value(times(own, other, -1))
+            follows = (leader, ratio, offset and self.value(own))
+        return replace(frame, translation=self.vector(frame.translation, LENGTH), follows=follows)
+
+    def bodies(self, of: Callable[[Dimension], Scalar]) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:
+        """All bodies and drives, of which each entry is made from its dimension."""
+        bodies = []
+        for _ in self.reframed.frames:
+            mass, *entries = (of(each) for each in (MASS, *(MOMENT,) * 3, *(INERTIA,) * 6))
+            bodies.append(Body(mass, tuple(entries[:3]), tuple(entries[3:])))
+        return tuple(bodies), tuple(of(each) for each in self.standard[DRIVE::PARAMETERS_PER_LINK])
+
+    def by_theta(self) -> ByTheta:
+        """Each entry has a part in one of the base parameters, which take turns."""
+        theta_b = [
+            self.tracer.measured(Slot("theta_b", k), dimension) for k, dimension in enumerate(self.theta_b)
+        ]
+        turns = count()
+
+        def of(dimension: Dimension) -> Scalar:
+            k = next(turns) % len(theta_b)
+            return theta_b[k] * self.value(times(dimension, self.theta_b[k], -1))
+
+        return ByTheta(theta_b, *self.bodies(of))
+
+    def lift(self) -> Array:
+        found = self.robot.representative.astype(object)
+        for row, column in np.argwhere(self.robot.representative).tolist():
+            found[row, column] = self.value(times(self.standard[row], self.theta_b[column], -1))
+        return found
+
+    def ingredients(self, recipe: Recipe, choices: Choices) -> Ingredients:
+        own, signature = self.reframed, recipe.signature
+        bodies, drives = self.bodies(self.value) if signature.theta else ((), ())
+        has_parameters = any("l" in quantity.axes for quantity in signature.stored)
+        return Ingredients(
+            frames=tuple(map(self.frame, own.frames)),
+            base_acceleration=self.vector(own.base_acceleration, ACCELERATION),
+            bodies=bodies,
+            drives=drives,
+            choices=choices,
+            base_axes=own.base_axes,
+            base_origin=self.vector(own.base_origin, LENGTH),
+            link_frames=tuple(map(self.placed, own.link_frames)),
+            named=tuple(replace(each, placement=self.placed(each.placement)) for each in own.named),
+            tip=self.placed(own.tip),
+            tip_body=own.tip_body,
+            lift=self.lift() if has_parameters else self.robot.representative,
+            link_bodies=lambda: self.bodies(self.value)[0],
+            si=lambda value, unit: self.value(dimension_of(unit)) if value else 0.0,
+            inputs={
+                quantity.name: [
+                    self.tracer.measured(Slot(quantity.name, i), dimension)
+                    for i, dimension in enumerate(quantity.dimensions(self.axes))
+                ]
+                for quantity in signature.inputs
+            },
+            by_theta=self.by_theta,
+        )
+
+    def compare(self, recipe: Recipe, outputs: Outputs) -> None:
+        wanted = dimensions_of_traced(recipe.signature, self.axes)
+        for slot, value in stored_entries(recipe.signature, outputs):
+            found, unit = self.tracer.dimension(value), wanted[slot.vector][slot.index]
+            if found is not None and found != unit:
+                raise InputError(
+                    f"{recipe.name}: {slot} is {in_words(found)}, its unit in the signature {in_words(unit)}",
+                    HINT,
+                )
+
+
+def _theta_dimensions(lift: Array, frames: Sequence[Frame]) -> tuple[list[Dimension], list[Dimension]]:
+    """Those of base parameters, each that of the first standard parameter that it is a part of, and of standard ones."""
+    standard = [
+        Dimension(1, frame.joint.drive_order) if name == DRIVE else each
+        for frame in frames
+        for name, each in enumerate(STANDARD)
+    ]
+    return [standard[row] for row in (lift != 0).argmax(axis=0).tolist()], standard

@@ -1,0 +1,78 @@
+"""The units inside a trace. Who writes a function does not see them.
+
+Lowering chooses a unit of length, u metres, so that one length of the robot is exactly one. Energies stay in J, times in s.
+Masses are then in kg/u^2, and a quantity of dimension kg^a m^b s^c is its value in SI times u^(2a - b). The ingredients of a
+trace are in these units. Inputs and outputs of a signature are SI, and this file converts them. If a coordinate of the robot
+is a length, u is 1. Base parameters stay in SI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from math import isqrt
+
+import numpy as np
+
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.slices import leading
+from psdmc.program.dimensions import INERTIA, LENGTH, MASS, MOMENT, NUMBER, Dimension, dimension_of, times
+from psdmc.program.signature import Quantity, Signature
+from psdmc.robot.mechanism import Array
+
+Axes = Mapping[str, Sequence[Dimension]]
+"""The dimensions that entries have along an axis, by its word."""
+
+RATE = dimension_of("1/s")
+
+STANDARD = (MASS, *(MOMENT,) * 3, *(INERTIA,) * 7)
+"""Of a link's standard parameters; the drive inertia of a sliding joint has another."""
+
+
+def own_axes(frames: Sequence[Frame], named: int, theta_b: Sequence[Dimension]) -> Axes:
+    """The axes of a robot with these frames."""
+    joints = [frame.joint for frame in leading(frames)]
+    nq, nv = (
+        [Dimension(0, order) for joint in joints for order in getattr(joint, orders)]
+        for orders in ("q_orders", "v_orders")
+    )
+    return {
+        "n": [NUMBER] * len(frames),
+        "nq": nq,
+        "nv": nv,
+        "nx": [*nv, *(times(each, RATE) for each in nv)],
+        "l": theta_b,
+        "frames": [NUMBER] * named,
+        "6": [LENGTH] * 3 + [NUMBER] * 3,
+    }
+
+
+def dimensions_of_traced(signature: Signature, axes: Axes) -> dict[str, list[Dimension]]:
+    """The dimensions of all entries that a trace gives. The right factor of a product has a row per column of the output."""
+    found = {quantity.name: quantity.dimensions(axes) for quantity in signature.stored}
+    for product in signature.products:
+        n = isqrt(len(found[product.output]))
+        output, left = found[product.output][:n], found[product.left][:n]
+        found[product.right] = [times(column, row, -1) for column in output for row in left]
+    return found
+
+
+def multiple(unit: float, dimension: Dimension) -> float:
+    """What a quantity in SI is multiplied with inside of a trace whose unit of length is `unit` m."""
+    order = int(dimension.order)
+    size = math.prod([unit] * abs(order))
+    return size if order >= 0 else 1.0 / size
+
+
+def are_scaled(quantities: Iterable[Quantity]) -> bool:
+    """Whether values of some of these differ inside of a trace, for robots without sliding joints."""
+    return any(quantity.dimension.order or "6" in quantity.axes for quantity in quantities)
+
+
+def scaled_parameters(x: Array, unit: float) -> Array:
+    """Standard parameters, 11 per link along the first axis or the last, in a trace's units."""
+    if unit == 1.0:
+        return x
+    row = np.array([multiple(unit, each) for each in STANDARD])
+    found: Array = x * row if x.shape[-1] == len(row) else x * np.tile(row, len(x) // len(row))[:, None]
+    return found
