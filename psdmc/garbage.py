@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
 
-RARELY = 50_000
-"""Objects made, beyond those that are gone again, before Python looks for cycles: some MB."""
+RARELY = 500_000
+"""Objects made, beyond those that are gone again, before Python looks for cycles: some 50 MB."""
 
 _lock = Lock()
 _stages = 0

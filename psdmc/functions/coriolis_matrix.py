@@ -34,12 +34,13 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Column j is what the velocities qd do where qd_r is joint j's unit rate."""
-    q, qd = given["q"], given["qd"]
-    rest = np.zeros_like(qd)
-    units = [np.broadcast_to(unit, qd.shape) for unit in np.eye(robot.nv)]
-    columns = [robot.torques(q, qd, rest, ZERO, qd_r=unit) for unit in units]
-    return {"C": np.stack(columns, axis=-1)}
+    """Column j is what the velocities qd do where qd_r is joint j's unit rate. All columns are computed together: as so many
+    states."""
+    nv, count = robot.nv, len(given["q"])
+    q, qd = (np.tile(given[name], (nv, 1)) for name in ("q", "qd"))
+    units = np.repeat(np.eye(nv), count, axis=0)
+    columns = robot.torques(q, qd, np.zeros_like(qd), ZERO, qd_r=units)
+    return {"C": np.moveaxis(columns.reshape(nv, count, nv), 0, -1)}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

@@ -10,7 +10,7 @@ from psdmc.errors import InputError
 from psdmc.functions import RECIPES, default_of
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
 from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.limits import shown
@@ -68,6 +68,8 @@ def _without_positive_mass(model: DynamicsModel) -> str | None:
     idle = idle_joints(chain) if chain.massless else ()
     if idle:
         return f"joint {chain.joints[idle[0]].name!r} moves no inertia, because {massless_words(chain)}"
+    if is_surely_positive(model):
+        return None
     mass = check_mass_matrix(model)
     return None if mass is None or mass.passed else mass.reason
 

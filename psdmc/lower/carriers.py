@@ -81,6 +81,8 @@ class CarrierSpace:
         default_factory=dict, init=False, repr=False
     )
     """What is not zero of each, by its place: of a tree, one entry in fifty."""
+    _lightest: dict[tuple[float, ...], tuple[int, ...]] = field(default_factory=dict, init=False, repr=False)
+    """Bases by their weights, of which there are two: every function's search begins with the same ones."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lengths", np.linalg.norm(self.columns, axis=0))
@@ -92,6 +94,12 @@ class CarrierSpace:
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
         """The basis of least weight, ascending; of equal weights the earlier parameter is taken. Where rounding hides
         the last directions from that order: the basis that the tableau started with."""
+        key = tuple(weights)
+        if key not in self._lightest:
+            self._lightest[key] = self._chosen(key)
+        return self._lightest[key]
+
+    def _chosen(self, weights: tuple[float, ...]) -> tuple[int, ...]:
         if self.careful is not None:
             return self.careful.lightest(weights)
         chosen = lightest(self.columns, weights)

@@ -73,14 +73,32 @@ class Arrangement:
 
 def trace_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Program:
     """The PROGRAM of one function that needs bodies. Unknown base parameters become an input."""
-    tracer = Tracer()
-    return tracer.finish(_recorded(recipe, arrangement, robot, tracer))
+    return Recording.of(recipe, arrangement, robot).program()
 
 
 def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Cost:
     """The cost of the PROGRAM that trace_dynamics would return."""
-    tracer = Tracer()
-    return tracer.cost(_recorded(recipe, arrangement, robot, tracer))
+    return Recording.of(recipe, arrangement, robot).cost()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """What one function does in an arrangement, on a tracer's symbols: to be counted, and to become a PROGRAM."""
+
+    tracer: Tracer
+    outputs: Recorded
+
+    @staticmethod
+    def of(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Recording:
+        tracer = Tracer()
+        return Recording(tracer, _recorded(recipe, arrangement, robot, tracer))
+
+    def cost(self) -> Cost:
+        """The cost of the PROGRAM."""
+        return self.tracer.cost(self.outputs)
+
+    def program(self) -> Program:
+        return self.tracer.finish(self.outputs)
 
 
 def _recorded(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, tracer: Tracer) -> Recorded:

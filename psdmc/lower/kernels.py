@@ -205,7 +205,7 @@ class _Lowered:
         """Run the passes, once for a PROGRAM that is scored first and used then."""
         found = next((short for known, short in self._short if known is program), None)
         if found is None:
-            found = shortened(program)
+            found = shortened(program, self._search(False).has_many_joints)
             self._short = [*self._short[-1:], (program, found)]
         return found
 

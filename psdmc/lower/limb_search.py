@@ -179,7 +179,8 @@ class LimbSearch:
         return trace_limbs(self.recipe, arrangement, self.search.robot, groups)
 
     def _ordered(self, traced: TracedLimbs) -> LimbProgram:
-        stages = staged(shortened(traced.program), traced.groups)
+        short = shortened(traced.program, self.search.has_many_joints)
+        stages = staged(short, traced.groups)
         in_order = (free_registers(ordered(stage.program, self.costs)[0]) for stage in stages)
         return LimbProgram(
             traced.groups,

@@ -25,7 +25,7 @@ from psdmc.lower.branches import Branches
 from psdmc.lower.carrier_columns import every_parameter
 from psdmc.lower.carriers import CarrierSpace
 from psdmc.lower.descent import Descent
-from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
+from psdmc.lower.factored import Arrangement, Recording, RobotConstants, cost_of_dynamics
 from psdmc.lower.geometry import LARGE, Geometry
 from psdmc.lower.link_parameters import PSEUDO_NAMES, WEIGHTS
 from psdmc.lower.reframe import Foot, Reframed
@@ -92,6 +92,11 @@ class Search:
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
         self.accuracy = None if known is None else Accuracy(self.robot, known)
+
+    @property
+    def has_many_joints(self) -> bool:
+        """Whether less than all that a search knows is tried."""
+        return len(self.robot.chain) > MANY_JOINTS
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
@@ -204,10 +209,14 @@ class Search:
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
         """Compute the cost of a function's PROGRAM in an arrangement; it is traced once."""
-        key = recipe.name, a.reframed, a.unit, a.carriers, a.choices
+        key = self._key(recipe, a)
         if key not in self._costs:
             self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
         return self._costs[key]
+
+    @staticmethod
+    def _key(recipe: Recipe, a: Arrangement) -> tuple[str, Reframed, float, tuple[int, ...], Choices]:
+        return recipe.name, a.reframed, a.unit, a.carriers, a.choices
 
     def _anew(self, choices: Choices) -> Iterator[Arrangement]:
         """Start the search again from its first choices, in this arrangement. Of what was chosen for another function,
@@ -236,17 +245,24 @@ class Search:
         like the found one's first, and no more than have OPERATIONS together."""
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
-        is_usual = found.n <= MANY_JOINTS
+        recorded: dict[int, Recording] = {}
+        best: set[int] = set()
+        is_usual = not self.has_many_joints
         left = OPERATIONS if is_usual else OPERATIONS_OF_LARGE
         targets = (self.single, self.batch) if is_usual else (self.batch,)
         for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):
+            if self._key(recipe, choices[k]) not in self._costs:
+                recorded[k] = Recording.of(recipe, choices[k], self.robot)
+                self._costs[self._key(recipe, choices[k])] = recorded[k].cost()
             costs[k] = self.cost(recipe, choices[k])
+            best = {min(sorted(costs), key=lambda k: target.weight(costs[k])) for target in targets}
+            recorded = {k: recorded[k] for k in best if k in recorded}
             left -= costs[k].total
             if left < costs[k].total:
                 break
-        tried = sorted(costs)
-        for best in sorted({min(tried, key=lambda k: target.weight(costs[k])) for target in targets}):
-            yield trace_dynamics(recipe, choices[best], self.robot)
+        for k in sorted(best):
+            kept = recorded.pop(k, None) or Recording.of(recipe, choices[k], self.robot)
+            yield kept.program()
 
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
         reframed = self.geometry.reframed(feet)

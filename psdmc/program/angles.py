@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from psdmc.program.program import Op, Program
 
+TRIGONOMETRIC = frozenset((Op.SIN, Op.COS))
+
 
 def angle_groups(program: Program) -> list[list[int]]:
     """Angles by the number of nested sines they depend on: each group depends on earlier groups only."""
-    level: list[int] = []
+    first = next((i for i, (op, _, _, _) in enumerate(program.body) if op in TRIGONOMETRIC), None)
+    if first is None:  # as in most parts of a long PROGRAM
+        return []
+    level = [0] * first
     groups: dict[int, dict[int, None]] = {}
-    for instr in program:
-        below = max([level[a] for a in instr.args]) if instr.args else 0
-        is_trig = instr.op is Op.SIN or instr.op is Op.COS
+    for op, args, _, _ in program.body[first:]:
+        below = max([level[a] for a in args]) if args else 0
+        is_trig = op in TRIGONOMETRIC
         if is_trig:
-            groups.setdefault(below, {})[instr.args[0]] = None
+            groups.setdefault(below, {})[args[0]] = None
         level.append(below + 1 if is_trig else below)
     return [list(groups[key]) for key in sorted(groups)]
 
@@ -34,9 +39,9 @@ def angles_first(program: Program) -> list[list[int]]:
     """All values, each after its arguments and once, a list per group of angles and one for the rest: what a group's angles
     are computed from, then their sines and cosines."""
     taken: dict[int, list[int]] = {}
-    for i, instr in enumerate(program):
-        if instr.op is Op.SIN or instr.op is Op.COS:
-            taken.setdefault(instr.args[0], []).append(i)
+    for i, (op, args, _, _) in enumerate(program.body):
+        if op in TRIGONOMETRIC:
+            taken.setdefault(args[0], []).append(i)
     done = [False] * len(program)
     found = []
     for group in angle_groups(program):

@@ -138,7 +138,7 @@ def _program_to_plain(program: Program) -> list[Any]:
     """[[operation, its arguments ...] ...], with vector and index for loads and the value for constants; outputs."""
     body: list[list[Any]] = []
     for op, args, slot, value in program.body:
-        body.append([op.value, *args] if args else [op.value, *slot] if slot else [op.value, value])
+        body.append([op, *args] if args else [op, *slot] if slot else [op, value])
     return [body, [[*slot, index] for slot, index in program.outputs]]
 
 

@@ -110,10 +110,10 @@ class _Cut:
     def _crossing_at(self) -> list[int]:
         """Of each position how many values from before it are read from it on."""
         last = dict(self.position)
-        for i in self.order:
+        for position, i in enumerate(self.order):  # ascending: the last one stays
             for a in self.program.body[i].args:
                 if a in last:
-                    last[a] = max(last[a], self.position[i])
+                    last[a] = position
         for slot, i in self.program.outputs:
             if i in last:
                 last[i] = max(last[i], self.stored_at[slot])
@@ -140,9 +140,10 @@ class _Cut:
         """Of each value the parts that read it."""
         read: dict[int, set[int]] = {i: set() for i in self.order}
         for i in self.order:
+            part = self.part[i]
             for a in self.program.body[i].args:
                 if a in read:
-                    read[a].add(self.part[i])
+                    read[a].add(part)
         for p, outputs in enumerate(self.outputs):
             for _, i in outputs:
                 if i in read:
@@ -188,7 +189,9 @@ class _Cut:
         leaving: list[list[int]] = [[] for _ in self.outputs]
         for i in self.order:
             home = self._home(i)
-            if any(p > home and not self._is_free(i, p) for p in self.read_in[i]):
+            if max(self.read_in[i], default=home) > home and any(
+                p > home and not self._is_free(i, p) for p in self.read_in[i]
+            ):
                 leaving[home].append(i)
         return leaving
 
@@ -213,9 +216,11 @@ class _Cut:
 
         for i in self.computed[part]:
             instr = self.program.body[i]
-            moved = {a: local(a) for a in instr.args}
+            for a in instr.args:
+                if a not in here:
+                    local(a)
             here[i] = len(body)
-            body.append(instr.renumbered(moved))
+            body.append(instr.renumbered(here))
         outputs = [(slot, local(i)) for slot, i in self.outputs[part]]
         outputs += [(slots[i], local(i)) for i in self.leaving[part]]
         return check(Program(tuple(body), tuple(outputs)), after="cutting into parts")

@@ -52,7 +52,7 @@ def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
 LONGEST = 10
 """Largest number of rounds; two or three are usual."""
 
-LONG, LITTLE = 25_000, 0.01
+LONG, LONG_OF_LARGE, LITTLE = 25_000, 2_000, 0.01
 """Instructions from which on a round that saves less than this share of the operations is the last one: behind it, the next
 one saves less than a thousandth of a humanoid's Coriolis matrix."""
 
@@ -66,14 +66,15 @@ def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> 
     return ordered(shortened(program), costs)[1 if lanes else 0]
 
 
-def shortened(program: Program) -> Program:
-    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order."""
-    operations = _operations(program)
+def shortened(program: Program, of_large: bool = False) -> Program:
+    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order. The first round that
+    saves LITTLE is the last one of a long PROGRAM; `of_large`, of a robot of many joints, LONG_OF_LARGE is long."""
+    operations, long = _operations(program), LONG_OF_LARGE if of_large else LONG
     for _ in range(LONGEST):
         shorter = _applied(ROUND, program)
         if shorter is program or (left := _operations(shorter)) >= operations:
             break
-        is_last = len(program) >= LONG and left > (1.0 - LITTLE) * operations
+        is_last = len(program) >= long and left > (1.0 - LITTLE) * operations
         program, operations = shorter, left
         if is_last:
             break

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import chain
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from psdmc.program.operations import Op as Op
+
+_COMMUTATIVE = frozenset(op for op in Op if op.operation.commutative)
 
 
 class Slot(NamedTuple):
@@ -29,26 +35,26 @@ class Instr(NamedTuple):
 
     def renumbered(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
         """The same operation on the values that its arguments have become; itself where none has moved."""
-        args = self.args
-        if not args:
-            return self
+        op, args, _, _ = self
         if len(args) == 2:
             moved: tuple[int, ...] = (new_index[args[0]], new_index[args[1]])
+        elif not args:
+            return self
         else:
             moved = tuple([new_index[a] for a in args])
-        return self if moved == args else operation(self.op, moved)
+        return self if moved == args else tuple.__new__(Instr, (op, moved, None, None))
 
     def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
         """The same on the values that its arguments have become, commutative ones in ascending order; itself where it is
         that already."""
-        args = self.args
+        op, args, _, _ = self
         if len(args) != 2:
             return self.renumbered(new_index)
         first, second = new_index[args[0]], new_index[args[1]]
-        if first > second and self.op.operation.commutative:
+        if first > second and op in _COMMUTATIVE:
             first, second = second, first
         moved = (first, second)
-        return self if moved == args else operation(self.op, moved)
+        return self if moved == args else operation(op, moved)
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:
@@ -66,6 +72,18 @@ class Program:
 
     body: tuple[Instr, ...]
     outputs: tuple[tuple[Slot, int], ...]
+    _arguments: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+
+    def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """(k,) the arguments of all instructions in their order, and (k,) the instruction of each; found once."""
+        if not self._arguments:
+            given = [args for _, args, _, _ in self.body]
+            counts = np.fromiter(map(len, given), np.intp, len(given))
+            flat = np.fromiter(chain.from_iterable(given), np.intp, int(counts.sum()))
+            self._arguments.append((flat, np.repeat(np.arange(len(given)), counts)))
+        return self._arguments[0]
 
     def inputs(self) -> tuple[Slot, ...]:
         """Slots read, each once, in order of vector name and index."""
@@ -73,10 +91,7 @@ class Program:
 
     def uses(self) -> list[int]:
         """How often each value is an argument or an output."""
-        count = [0] * len(self.body)
-        for _, args, _, _ in self.body:
-            for a in args:
-                count[a] += 1
+        count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
         for _, index in self.outputs:
             count[index] += 1
         return count

@@ -13,16 +13,20 @@ from random_trees import RandomTree
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics import motion
 from psdmc.functions import RECIPES
-from psdmc.lower import limb_search, search
+from psdmc.lower import carriers, kernels, limb_search, search
 from psdmc.lower.branches import limbs_in
 from psdmc.lower.carrier_columns import STATES, _sampled_columns
-from psdmc.lower.factored import Arrangement, trace_dynamics
+from psdmc.lower.factored import Arrangement, Recording, RobotConstants, trace_dynamics
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import LimbSearch
 from psdmc.lower.search import Search
 from psdmc.lower.tableau import Tableau
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program import pipeline
 from psdmc.program.cost import cost
+from psdmc.program.program import Program
+from psdmc.program.text import parse
+from psdmc.recipes.recipe import Recipe
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 from psdmc.target.native import COSTS
@@ -41,6 +45,13 @@ def humanoid() -> tuple[int, ...]:
         for _ in range(FINGERS):
             parents += [wrist, *range(len(parents), len(parents) + FINGER - 1)]
     return tuple(parents)
+
+
+def drop_last(program: Program) -> Program:
+    """One operation fewer, if there are two."""
+    if len(program) < 4:
+        return program
+    return Program(program.body[:-1], tuple((slot, len(program) - 2) for slot, _ in program.outputs))
 
 
 PARENTS = humanoid()
@@ -96,17 +107,18 @@ def test_choices_are_compared_on_so_many_operations_and_the_found_ones_first(
     recipe = RECIPES["coriolis_matrix"]
     start = replace(start, choices=replace(start.choices, fold=True))
     traced: list[Arrangement] = []
-    cost_of = search.cost_of_dynamics
+    record = Recording.of
 
-    def counted(recipe: object, arrangement: Arrangement, robot: object) -> object:
+    def counted(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Recording:
         traced.append(arrangement)
-        return cost_of(recipe, arrangement, robot)  # type: ignore[arg-type]
+        return record(recipe, arrangement, robot)
 
-    monkeypatch.setattr(search, "cost_of_dynamics", counted)
+    monkeypatch.setattr(Recording, "of", staticmethod(counted))
     found._costs.clear()
     (*programs,) = found.rearrangements(recipe, start)
     assert many == COUNT or len(programs) == 1
     every = len(traced)
+    assert every == len({each.choices for each in traced})  # what is taken is not traced again
     longest = max(cost(program).total for program in programs)
     for limit, least in ((0, 1), (2.5 * longest, 2)):
         traced.clear()
@@ -116,6 +128,38 @@ def test_choices_are_compared_on_so_many_operations_and_the_found_ones_first(
         assert list(found.rearrangements(recipe, start))
         assert traced[0].choices == start.choices
         assert least <= len(traced) <= max(1, limit / (0.8 * longest)) < every
+
+
+@pytest.mark.parametrize(("many", "rounds"), [(COUNT, 2), (COUNT - 1, 1)], ids=["usual", "large"])
+def test_rounds_of_passes_end_from_so_many_joints_on_when_one_saves_little(
+    monkeypatch: pytest.MonkeyPatch, many: int, rounds: int
+) -> None:
+    """A second round would find that there is nothing left to do."""
+    monkeypatch.setattr(search, "MANY_JOINTS", many)
+    monkeypatch.setattr(pipeline, "LITTLE", 1.0)
+    monkeypatch.setattr(pipeline, "LONG_OF_LARGE", 4)
+    applied: list[object] = []
+    monkeypatch.setattr(pipeline, "ROUND", (lambda program: applied.append(program) or drop_last(program),))
+    lowered = kernels._Lowered(derived(), "factored", COSTS)
+
+    lowered._shortened(parse("a = load q[0]\nb = add a a\nc = add b b\nd = add c c\nout tau[0] = d"))
+
+    assert len(applied) == rounds
+
+
+def test_carriers_of_equal_weights_are_chosen_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All functions' searches start from the same ones."""
+    found, _ = searched()
+    space = replace(found.geometry.space(found.geometry.reframed(found.geometry.feet[0])))
+    calls: list[object] = []
+    choose = carriers.lightest
+    monkeypatch.setattr(carriers, "lightest", lambda *given: calls.append(given) or choose(*given))
+
+    chosen = [space.lightest([weight] * space.count) for weight in (1.0, 2.0, 1.0, 2.0)]
+
+    assert len(calls) == 2
+    assert chosen[0] == chosen[2]
+    assert chosen[1] == chosen[3]
 
 
 @pytest.mark.parametrize("many", [COUNT, COUNT - 1], ids=["usual", "large"])

@@ -11,7 +11,7 @@ from bundled import bundled_model, bundled_robot
 
 from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
 from psdmc.robot.load import load_robot_text
 from psdmc.robot.reference import reference
 
@@ -25,6 +25,7 @@ def test_every_bundled_robot_passes(name: str):
     assert found is not None
     assert found.passed
     assert found.poses == 2000
+    assert is_surely_positive(bundled_model(name))
 
 
 def test_the_smallest_eigenvalue_is_pinocchios():
@@ -44,6 +45,14 @@ def indefinite(name: str) -> DynamicsModel:
     theta = np.array(model.theta_b)
     theta[-1] = -0.5
     return replace(model, theta_b=theta)
+
+
+def test_cholesky_leaves_to_eigenvalues_what_it_does_not_prove():
+    """A negative inertia, unknown parameters, a point on its joint's axis."""
+    cases = (indefinite("kr6"), replace(bundled_model("scara"), theta_b=None))
+    point = derive_model(load_robot_text(FINGER.format(arm=1, length=0, small=0), "urdf").chain)
+
+    assert not any(map(is_surely_positive, (*cases, point)))
 
 
 def test_a_negative_inertia_is_found_and_named():

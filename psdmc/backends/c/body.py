@@ -24,7 +24,7 @@ from psdmc.backends.c.lines import (
 )
 from psdmc.backends.c.products import Entry, Multiplication, multiplication
 from psdmc.backends.c.store_groups import GROUP, StoreGroups
-from psdmc.program.angles import angle_groups, cone
+from psdmc.program.angles import TRIGONOMETRIC, angle_groups, cone
 from psdmc.program.operations import Unit
 from psdmc.program.products import Product
 from psdmc.program.program import Op, Program, Slot
@@ -118,7 +118,7 @@ class _Writer:
         for slot, index in program.outputs:
             self.stores.setdefault(index, []).append(slot)
         self.done = [False] * len(program)
-        self.taken = {(op, args) for op, args, _, _ in program.body if op in (Op.SIN, Op.COS)}
+        self.taken = {(op, args) for op, args, _, _ in program.body if op in TRIGONOMETRIC}
 
     def sections(self, sizes: Mapping[str, int]) -> tuple[Section, ...]:
         sections: list[Section] = []
@@ -215,23 +215,25 @@ class _Writer:
 
     def _value(self, i: int) -> Expr:
         """A value as an operand: its name, or its expression where nothing else uses it."""
-        instr = self.program.body[i]
-        if instr.slot is not None:
-            return Expr(_load_name(instr.slot))
-        if instr.value is not None:
-            return literal(instr.value, self.suffix)
-        if instr.op in (Op.SIN, Op.COS):
-            return Expr(f"{instr.op.value}_{instr.args[0]}")
+        op, args, slot, value = self.program.body[i]
+        if len(args) == 2:  # as nearly all
+            return Expr(f"t{i}") if self.names.named[i] else self._operation(i)
+        if slot is not None:
+            return Expr(_load_name(slot))
+        if value is not None:
+            return literal(value, self.suffix)
+        if op in TRIGONOMETRIC:
+            return Expr(f"{op}_{args[0]}")
         return Expr(f"t{i}") if self.names.named[i] else self._operation(i)
 
     def _operation(self, i: int) -> Expr:
-        instr = self.program.body[i]
-        operands = [self._value(a) for a in instr.args]
-        if is_call(instr.op):
-            uniform = (self.names.uniform[a] for a in instr.args)
+        op, args, _, _ = self.program.body[i]
+        operands = [self._value(a) for a in args]
+        if is_call(op):
+            uniform = (self.names.uniform[a] for a in args)
             texts = (spread(each.text, same) for each, same in zip(operands, uniform, strict=True))
-            return Expr(f"{instr.op.upper()}({', '.join(texts)})")
-        return combine(instr.op, operands)
+            return Expr(f"{op.upper()}({', '.join(texts)})")
+        return combine(op, operands)
 
 
 def _load_name(slot: Slot) -> str:

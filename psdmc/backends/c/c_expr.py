@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from psdmc.backends.c.reals import rounded_out
 from psdmc.program.operations import Unit
-from psdmc.program.program import Instr, Op, Program
+from psdmc.program.program import Op, Program
 
 DEEPEST = 4
 """Deepest nesting of operations in one expression: deeper nesting saves no instruction and is hard to read."""
@@ -20,6 +20,11 @@ DEEPEST = 4
 UNIFORM_VECTORS = frozenset({"theta_b"})
 
 _LOOSE, _TIGHT, _UNARY, _ATOM = range(4)
+_CALLS = frozenset(
+    op for op in Op if op.arity > 0 and not op.operation.written and op.unit is not Unit.SINCOS
+)
+_OPERATORS = frozenset(op for op in Op if op.unit is not Unit.SINCOS and op not in _CALLS)
+"""Operations whose results are uniform if their arguments are; constants are among them, loads apart."""
 _SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), Op.DIV: ("/", _TIGHT)}
 
 
@@ -51,40 +56,44 @@ class Names:
     @staticmethod
     def of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> Names:
         """`shared` are vectors that are the same in all lanes."""
-        uses = program.uses()
-        outputs = {index for _, index in program.outputs}
-        named = [uses[i] > 1 or i in outputs for i in range(len(program))]
-        uniform: list[bool] = []
-        for instr in program:
-            uniform.append(_is_uniform(instr, uniform, shared))
+        named = [count > 1 for count in program.uses()]
+        for _, index in program.outputs:
+            named[index] = True
         _cut_deep_trees(program, named)
-        return Names(program, tuple(named), tuple(uniform))
+        return Names(program, tuple(named), uniform_of(program, shared))
 
 
-def _is_uniform(instr: Instr, known: list[bool], shared: Collection[str]) -> bool:
-    op, args, slot, _ = instr
-    if slot is not None:
-        return slot.vector in shared
-    if op.unit is Unit.SINCOS or is_call(op):
-        return False
-    return all(known[a] for a in args)
+def uniform_of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> tuple[bool, ...]:
+    """Of each value whether it is the same for all states."""
+    uniform: list[bool] = []
+    for op, args, slot, _ in program.body:
+        if len(args) == 2 and op in _OPERATORS:
+            uniform.append(uniform[args[0]] and uniform[args[1]])
+        elif slot is not None:
+            uniform.append(slot.vector in shared)
+        else:
+            uniform.append(op in _OPERATORS and all(uniform[a] for a in args))
+    return tuple(uniform)
 
 
 def _cut_deep_trees(program: Program, named: list[bool]) -> None:
     """Also name the values at which an expression would nest deeper than DEEPEST."""
     depth = [0] * len(program)
-    for i, (op, args, _, _) in enumerate(program):
-        if not args or op.unit is Unit.SINCOS or is_call(op):
+    for i, (op, args, _, _) in enumerate(program.body):
+        if not args or op not in _OPERATORS:
             continue
+        deepest = 0
         for a in args:
             if depth[a] == DEEPEST:
                 named[a] = True
-        depth[i] = 1 + max([0 if named[a] else depth[a] for a in args])
+            elif depth[a] > deepest and not named[a]:
+                deepest = depth[a]
+        depth[i] = 1 + deepest
 
 
 def is_call(op: Op) -> bool:
     """Whether the operation is a macro of its name: what C has no operator for, sines aside."""
-    return op.arity > 0 and not op.operation.written and op.unit is not Unit.SINCOS
+    return op in _CALLS
 
 
 def literal(value: float, suffix: str) -> Expr:

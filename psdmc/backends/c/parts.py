@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from psdmc.backends.c.body import calls_of, sections_of, unread, without_products
-from psdmc.backends.c.c_expr import Names
+from psdmc.backends.c.c_expr import uniform_of
 from psdmc.backends.c.lines import KEPT, KEPT_REALS, Body, GroupStore, Part, Store, Zeros
 from psdmc.backends.c.products import Entry, Multiplication, multiplication
 from psdmc.backends.c.store_groups import GROUP
@@ -42,8 +42,7 @@ def body_in_parts(
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
     stored = without_products(sizes, multiplied)
     whole, zeros = _without_zeros(program, stored)
-    uniform = Names.of(whole).uniform
-    kept_in = [KEPT_REALS if same else KEPT for same in uniform]
+    kept_in = [KEPT_REALS if same else KEPT for same in uniform_of(whole)]
     groups = [group for vector in in_groups if vector in stored for group in _groups(vector, stored[vector])]
     cut = in_parts(whole, kept_in, groups, late=not stores_early, longest=PART)
     signature = dict.fromkeys((*inputs, *stored, *(slot.vector for slot, _ in whole.outputs)))

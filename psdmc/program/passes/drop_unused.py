@@ -12,6 +12,8 @@ def drop_unused(program: Program) -> Program:
     Keeps:  output values, bit for bit; the order of what stays.
     Gives:  every instruction is an output or an argument.
     """
+    if all(program.uses()):  # by what lies behind, and the last one by an output
+        return program
     needed = [False] * len(program.body)
     for _, index in program.outputs:
         needed[index] = True
@@ -19,8 +21,6 @@ def drop_unused(program: Program) -> Program:
         if needed[i]:
             for a in program.body[i].args:
                 needed[a] = True
-    if all(needed):
-        return program
     new_index = [0] * len(program.body)
     body: list[Instr] = []
     for i, instr in enumerate(program.body):

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Instr, Op, Program
 
-_SIGNED_SUM = {Op.ADD: (1, 1), Op.SUB: (1, -1)}
+_ADD, _MUL = Op.ADD, Op.MUL
+_SUMS = frozenset((_ADD, Op.SUB))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +60,8 @@ def _grouped_sums(program: Program) -> dict[int, tuple[_Term, ...]]:
     uses = program.uses()
     inside = _parts_of_larger_sums(program, uses)
     found: dict[int, tuple[_Term, ...]] = {}
-    for i, instr in enumerate(program.body):
-        if inside[i] or instr.op not in _SIGNED_SUM:
+    for i, (op, args, _, _) in enumerate(program.body):
+        if inside[i] or op not in _SUMS or _share_nothing(program.body, uses, args):
             continue
         signed = _signed_factors(program.body, uses, i)
         kept = _without_what_cancels(signed)
@@ -71,12 +72,24 @@ def _grouped_sums(program: Program) -> dict[int, tuple[_Term, ...]]:
     return found
 
 
+def _share_nothing(body: tuple[Instr, ...], uses: list[int], args: tuple[int, ...]) -> bool:
+    """Whether a sum has just these two terms, and they have no factor in common: true for most sums."""
+    first, second = args
+    ops = [body[a][0] if uses[a] == 1 else None for a in args]
+    if first == second or ops[0] in _SUMS or ops[1] in _SUMS:
+        return False
+    if ops[0] is not _MUL or ops[1] is not _MUL:
+        return True
+    return set(_factors(body, uses, first)).isdisjoint(_factors(body, uses, second))
+
+
 def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
     inside = [False] * len(program.body)
-    for instr in program.body:
-        if instr.op in _SIGNED_SUM:
-            for a in instr.args:
-                inside[a] = inside[a] or (uses[a] == 1 and program.body[a].op in _SIGNED_SUM)
+    for op, args, _, _ in program.body:
+        if op in _SUMS:
+            for a in args:
+                if uses[a] == 1 and program.body[a][0] in _SUMS:
+                    inside[a] = True
     return inside
 
 
@@ -88,11 +101,11 @@ def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> lis
     while stack:
         i, own = stack.pop()
         op, args, _, _ = body[i]
-        if op in _SIGNED_SUM and (i == index or uses[i] == 1):
-            stack.append((args[1], own if op is Op.ADD else -own))
+        if op in _SUMS and (i == index or uses[i] == 1):
+            stack.append((args[1], own if op is _ADD else -own))
             stack.append((args[0], own))
         else:
-            terms.append((own, [i] if op is not Op.MUL or uses[i] != 1 else _factors(body, uses, i)))
+            terms.append((own, [i] if op is not _MUL or uses[i] != 1 else _factors(body, uses, i)))
     return terms
 
 
@@ -130,8 +143,9 @@ def _factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[int]:
     stack = [index]
     while stack:
         i = stack.pop()
-        if body[i].op is Op.MUL and uses[i] == 1:
-            stack.extend(body[i].args[::-1])
+        op, args, _, _ = body[i]
+        if op is _MUL and uses[i] == 1:
+            stack.extend(args[::-1])
         else:
             factors.append(i)
     return factors

@@ -4,12 +4,16 @@ multiply-add."""
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import NamedTuple
 
 from psdmc.program.operations import Unit
-from psdmc.program.program import Instr, Op, Program
+from psdmc.program.program import Instr, Op, Program, operation
 from psdmc.target.costs import Latency
 from psdmc.target.native import COSTS
+
+SUMS = frozenset((Op.ADD, Op.SUB))
+_VALUE = attrgetter("value")
 
 Term = tuple[bool, int]
 """A term of a sum: whether it is subtracted, and the value."""
@@ -60,7 +64,7 @@ class _Fusion:
         for i, instr in enumerate(self.program.body):
             if i in self.inner:
                 continue
-            if instr.op in (Op.ADD, Op.SUB):
+            if instr[0] in SUMS:
                 self.new_index[i] = self._chain(self._terms(i))
             else:
                 self.new_index[i] = self._append(instr.renumbered(self.new_index))
@@ -72,10 +76,10 @@ class _Fusion:
         body = self.program.body
         return {
             a
-            for instr in body
-            if instr.op in (Op.ADD, Op.SUB)
-            for a in instr.args
-            if body[a].op in (Op.ADD, Op.SUB) and self.uses[a] == 1
+            for op, args, _, _ in body
+            if op in SUMS
+            for a in args
+            if self.uses[a] == 1 and body[a][0] in SUMS
         }
 
     def _terms(self, root: int) -> list[Term]:
@@ -84,10 +88,9 @@ class _Fusion:
         pending: list[Term] = [(False, root)]
         while pending:
             negative, index = pending.pop()
-            instr = self.program.body[index]
             if index == root or index in self.inner:
-                left, right = instr.args
-                pending.append((negative != (instr.op is Op.SUB), right))
+                op, (left, right), _, _ = self.program.body[index]
+                pending.append((negative != (op is Op.SUB), right))
                 pending.append((negative, left))
             else:
                 out.append((negative, index))
@@ -95,7 +98,7 @@ class _Fusion:
 
     def _chain(self, terms: list[Term]) -> int:
         """Add the two terms that are ready soonest until one is left; its index."""
-        parts = sorted([self._part(*term) for term in terms], key=lambda part: part.value)
+        parts = sorted([self._part(*term) for term in terms], key=_VALUE)
         while len(parts) > 2:
             begins = [part.begins for part in parts]
             first = begins.index(min(begins))
@@ -107,11 +110,12 @@ class _Fusion:
         return self._add(*parts).value
 
     def _part(self, negative: bool, index: int) -> _Part:
-        instr, value = self.program.body[index], self.new_index[index]
+        value = self.new_index[index]
+        op, args, _, _ = self.program.body[index]
         ready = self.ready[value]
-        if instr.op is not Op.MUL or self.uses[index] != 1:
+        if op is not Op.MUL or self.uses[index] != 1:
             return _Part(negative, False, value, ready, ready)
-        first, second = instr.args
+        first, second = args
         begins = max(self.ready[self.new_index[first]], self.ready[self.new_index[second]])
         return _Part(negative, True, value, begins, ready)
 
@@ -127,16 +131,18 @@ class _Fusion:
         """The sum of two parts; their difference where one is negative. Negative where both are."""
         ready = self._sum_ready(a, b)
         if a.negative == b.negative:
-            instr = Instr(Op.ADD, (min(a.value, b.value), max(a.value, b.value)))
+            first, second = a.value, b.value
+            instr = operation(Op.ADD, (first, second) if first < second else (second, first))
         else:
             plus, minus = (b, a) if a.negative else (a, b)
-            instr = Instr(Op.SUB, (plus.value, minus.value))
+            instr = operation(Op.SUB, (plus.value, minus.value))
         self.body.append(instr)
         self.ready.append(ready)
         return _Part(a.negative and b.negative, False, len(self.body) - 1, ready, ready)
 
     def _append(self, instr: Instr) -> int:
-        start = max((self.ready[a] for a in instr.args), default=0)
+        op, args, _, _ = instr
+        start = max([self.ready[a] for a in args]) if args else 0
         self.body.append(instr)
-        self.ready.append(start + self.cycles[instr.op])
+        self.ready.append(start + self.cycles[op])
         return len(self.body) - 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import is_
+
 from psdmc.program.program import Instr, Program
 
 
@@ -14,12 +16,10 @@ def merge_duplicates(program: Program) -> Program:
     """
     first_seen: dict[Instr, int] = {}
     new_index: list[int] = []
-    is_same = True
     for instr in program.body:
-        key = instr.canonical(new_index)
-        is_same = is_same and key is instr
-        new_index.append(first_seen.setdefault(key, len(first_seen)))
-    if is_same and len(first_seen) == len(program.body):
+        new_index.append(first_seen.setdefault(instr.canonical(new_index), len(first_seen)))
+    body = tuple(first_seen)
+    if len(body) == len(program.body) and all(map(is_, body, program.body)):
         return program
     outputs = tuple((slot, new_index[i]) for slot, i in program.outputs)
-    return Program(tuple(first_seen), outputs)
+    return Program(body, outputs)

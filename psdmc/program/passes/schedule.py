@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from psdmc.program.program import Program
 
 
@@ -23,11 +25,13 @@ def schedule(program: Program) -> Program:
 
 def live_values(program: Program) -> int:
     """Sum over all instructions of the values alive behind it; loads and constants do not count."""
-    last = list(range(len(program.body)))
-    for i, (_, args, _, _) in enumerate(program.body):
-        for a in args:
-            last[a] = i
-    return sum([last[i] - i for i, (_, args, _, _) in enumerate(program.body) if args])
+    arguments, users = program.arguments()
+    here = np.arange(len(program.body))
+    last = here.copy()
+    last[arguments] = users  # ascending: the last one stays
+    computed = np.zeros(len(here), bool)
+    computed[users] = True
+    return int((last - here)[computed].sum())
 
 
 def beyond_registers(program: Program, registers: int) -> int:
@@ -54,17 +58,20 @@ def _need(program: Program) -> list[int]:
     for _, args, _, _ in program.body:
         if len(args) == 2:
             first, second = need[args[0]], need[args[1]]
-            need.append(max(first, second, 1) if first != second else first + 1)
+            need.append(first + 1 if first == second else first if first > second else second)
+        elif not args:
+            need.append(0)
         else:
             most = sorted([need[a] for a in args], reverse=True)
-            need.append(max([1, *(own + held for held, own in enumerate(most))]) if args else 0)
+            need.append(max([1, *(own + held for held, own in enumerate(most))]))
     return need
 
 
 def _depth_first(program: Program) -> list[int]:
     """Values in the order in which they are computed. On the stack ~index stands for a value whose arguments are placed."""
     need = _need(program)
-    placed = [False] * len(program.body)
+    arguments = [args for _, args, _, _ in program.body]
+    placed = [False] * len(arguments)
     order: list[int] = []
     stack = [root for _, root in reversed(program.outputs)]
     while stack:
@@ -73,20 +80,29 @@ def _depth_first(program: Program) -> list[int]:
         index = ~index if is_ready else index
         if placed[index]:
             continue
-        args = program.body[index].args
+        args = arguments[index]
         if is_ready or not args:
             placed[index] = True
             order.append(index)
             continue
         stack.append(~index)
-        if len(args) == 2 and (need[args[0]], -args[0]) > (need[args[1]], -args[1]):
-            args = args[::-1]
-        stack.extend([a for a in args if not placed[a]])
+        if len(args) != 2:
+            stack.extend([a for a in args if not placed[a]])
+            continue
+        first, second = args
+        if need[first] > need[second] or (need[first] == need[second] and first < second):
+            first, second = second, first
+        if not placed[first]:
+            stack.append(first)
+        if not placed[second]:
+            stack.append(second)
     return order
 
 
 def reordered(program: Program, order: list[int]) -> Program:
     """The instructions in this order of their numbers, in which every argument precedes its use."""
-    new_index = {old: new for new, old in enumerate(order)}
+    new_index = [0] * len(program.body)
+    for new, old in enumerate(order):
+        new_index[old] = new
     body = tuple(program.body[old].renumbered(new_index) for old in order)
     return Program(body, tuple((slot, new_index[i]) for slot, i in program.outputs))
