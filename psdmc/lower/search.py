@@ -274,9 +274,10 @@ class Search:
             yield replace(plain, choices=choices)
 
     def _units(self, found: Arrangement) -> Iterator[Arrangement]:
-        """Each length of the robot as the unit; not with sliding joints, whose variables would need scaling."""
+        """Each length of the robot as the unit. Sliding joints exclude it, because their variables would need scaling, and so do
+        screws, whose pitch is in m."""
         frames = found.reframed.frames
-        if any(frame.joint.length_order for frame in frames):
+        if any(frame.joint.length_order or frame.joint.has_length for frame in frames):
             return
         lengths = {abs(x): None for frame in frames for x in frame.translation if x}
         for unit in lengths:
