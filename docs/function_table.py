@@ -24,6 +24,9 @@ IN_0_1 = frozenset(
     ]
 )
 
+UNRELEASED = frozenset(["operational_space_inertia"])
+"""Functions that the next release brings."""
+
 HEAD = "| function | what it does | inputs | outputs | `_theta` | default | since | Pinocchio's function |"
 
 
@@ -43,7 +46,7 @@ def _row(recipe: Recipe) -> str:
         ", ".join(map(_shape, function.outputs)),
         "yes" if function.theta else "",
         default,
-        "0.1" if recipe.name in IN_0_1 else "0.2",
+        "next" if recipe.name in UNRELEASED else "0.1" if recipe.name in IN_0_1 else "0.2",
         f"`{recipe.against}`",
     )
     return f"| {' | '.join(cells)} |"

@@ -20,7 +20,7 @@ from psdmc.model import evaluate
 from psdmc.model.answers import Provider
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Expansion
-from psdmc.program.signature import QD, QDD, TAU, Q, Signature, Sizes
+from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism
@@ -30,7 +30,10 @@ from psdmc.toolchain.call_arguments import (
     bound_arguments,
     checked_outputs,
     common_lead,
+    finite_states,
+    indefinite,
     parameters,
+    scalar_inputs,
     signature_of,
     states,
 )
@@ -92,6 +95,8 @@ def evaluated(
     if recipe.needs is not None and theta_b is None:
         _admit(model, recipe.name)
     found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
+    if signature.raises:
+        _refuse_indefinite(signature, axes, lead, found[PIVOTS], given)
     outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]
     if out is not None:
         kept = checked_outputs(signature, out, [lead + tail for tail in tails], np.dtype(np.float64))
@@ -99,6 +104,20 @@ def evaluated(
             array[...] = values
         outputs = list(kept)
     return _tuple(signature, outputs)
+
+
+def _refuse_indefinite(
+    signature: Signature, axes: RobotAxes, lead: tuple[int, ...], pivots: Array, given: Mapping[str, Array]
+) -> None:
+    """InputError for the first state, of finite inputs, in which a matrix is not positive definite that has an error."""
+    arrays = [given[quantity.name] for quantity in signature.inputs]
+    lost = ~(pivots > 0.0) & finite_states(signature, arrays)[:, None]
+    for row in np.flatnonzero(lost.any(axis=1)).tolist():
+        state = [int(k) for k in np.unravel_index(row, lead)] if lead else []
+        scalars = scalar_inputs(signature, arrays, (row,))
+        error = indefinite(signature, axes, int(np.argmax(lost[row])), scalars, state)
+        if error:
+            raise error
 
 
 def _tuple(signature: Signature, outputs: Sequence[Any]) -> Any:
@@ -153,7 +172,7 @@ def _values(
         (output,) = recipe.signature.outputs
         return {output.name: _FROM_MONOMIALS[recipe.name](model.expansion, model.mechanism, theta, motion)}
     robot = RobotOnArrays.of(model, theta)
-    if recipe.signature.positive is None:
+    if not recipe.signature.factorises:
         return recipe.reference(robot, whole)
     solvable = _solvable(robot, given[Q.name])
     chosen = {name: values[solvable] for name, values in given.items()}
@@ -161,9 +180,13 @@ def _values(
         chosen[QDD.name] = robot.accelerations(chosen["q"], chosen["qd"], chosen[TAU.name])
     found = recipe.reference(robot, chosen)
     filled = {}
-    for output in recipe.signature.outputs:
-        filled[output.name] = np.full((len(solvable), *sizes.shape(output.axes)), np.nan)
-        filled[output.name][solvable] = found[output.name]
+    for name, values in found.items():
+        filled[name] = np.full((len(solvable), *values.shape[1:]), np.nan)
+        filled[name][solvable] = values
+    if PIVOTS in filled:
+        failed = ~(filled[PIVOTS] > 0.0).all(axis=1)
+        for output in recipe.signature.outputs:
+            filled[output.name][failed] = np.nan
     return filled
 
 

@@ -23,11 +23,11 @@ def write_sources(package: PackageView, folder: Path) -> Path:
     return folder
 
 
-def shared_library(package: PackageView, folder: Path, flags: Sequence[str]) -> Path:
+def shared_library(package: PackageView, folder: Path, flags: Sequence[str], compiler: str = "gcc") -> Path:
     write_sources(package, folder)
     sources = [str(folder / source) for source in package.sources]
     library = folder / "library.so"
-    words = ["gcc", "-std=c99", *flags, "-fPIC", "-shared", f"-I{folder}/include", *sources, "-lm"]
+    words = [compiler, "-std=c99", *flags, "-fPIC", "-shared", f"-I{folder}/include", *sources, "-lm"]
     subprocess.run([*words, "-o", str(library)], check=True)
     return library
 
@@ -89,8 +89,8 @@ def all_expected(
     """Every output of the interpreted PROGRAM, rows of states; NaN where what must be positive is not."""
     function = kernel.function
     values = interpret(kernel.single, given, function.sizes(Sizes.of_chain(n, l, frames)))
-    if function.positive is not None:
-        failed = ~(values.pop(function.positive.quantity.name) > 0).all(axis=-1)
+    if function.pivots:
+        failed = ~(values.pop(function.pivots.name) > 0).all(axis=-1)
         for rows in values.values():
             rows[failed] = np.nan
     return values

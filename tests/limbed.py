@@ -25,6 +25,13 @@ from psdmc.program.pipeline import shortened
 from psdmc.robot.mechanism import BASE
 
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects", "mass_matrix", "forward_dynamics")
+DERIVATIVES = (
+    "gravity_derivatives",
+    "inverse_dynamics_derivatives",
+    "inverse_dynamics_vjp",
+    "inverse_dynamics_jvp",
+)
+"""Functions whose limbs run in lanes."""
 
 
 def limbed(seed: int, trunk: str, limbs: Sequence[tuple[int, str, int]], parallel: float = 0.5) -> RandomTree:

@@ -16,7 +16,7 @@ _ROWS = ("6", "nv")
 
 def tolerance(function: Signature, real: str) -> str:
     """Of all outputs of a function."""
-    return (FORWARD_TOLERANCES if function.positive else TOLERANCES)[real]
+    return (FORWARD_TOLERANCES if function.factorises else TOLERANCES)[real]
 
 
 def compared_by_row(output: Quantity) -> bool:

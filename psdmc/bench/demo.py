@@ -56,7 +56,7 @@ def errors_against_pinocchio(
     for quantity in (quantity for name in functions for quantity in RECIPES[name].signature.inputs):
         if quantity.name not in given:
             drawn = rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(quantity.axes)))
-            given[quantity.name] = quantity.largest * drawn
+            given[quantity.name] = quantity.drawn(drawn)
     errors: dict[str, float] = {}
     for name in functions:
         signature = RECIPES[name].signature

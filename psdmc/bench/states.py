@@ -166,7 +166,7 @@ class States:
         """(count, size) values within plus and minus its largest, the same for the same name."""
         size = self.sizes.size(quantity)
         rng = np.random.default_rng(crc32(quantity.name.encode()))
-        return rng.uniform(-quantity.largest, quantity.largest, (self.count, size))
+        return np.asarray(quantity.drawn(rng.uniform(-1.0, 1.0, (self.count, size))))
 
     def _laid_out(self, name: str, rows: Array, lanes: int, convention: Convention) -> Array:
         """The values in one layout, shared by all contestants, so that caches are equally warm for each."""

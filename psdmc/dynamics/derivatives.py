@@ -38,6 +38,7 @@ from psdmc.dynamics.moving_composite import (
     both,
     driven,
     driven_freely,
+    handed_composite,
     moved_to,
 )
 from psdmc.dynamics.own_axes import (
@@ -153,10 +154,10 @@ def _composites(
         whole = drive(frame.joint, whole, qd[i], qdd[i])
         found.append((i, whole))
         if frame.parent != BASE and step.joins:
-            joined_to[frame.parent].append(moved_to(whole, step.offset))
+            joined_to[frame.parent].append(handed_composite(frame, moved_to(whole, step.offset)))
         elif frame.parent != BASE:
-            before = before_turn(whole, step.own)
-            hung[frame.parent].append(moved_to(along_parent(frame, before), step.offset))
+            before = moved_to(along_parent(frame, before_turn(whole, step.own)), step.offset)
+            hung[frame.parent].append(handed_composite(frame, before))
     return found
 
 

@@ -30,7 +30,7 @@ from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transpose
 from psdmc.dynamics.slices import first_rates, flat, rates
-from psdmc.dynamics.solve import Factors, SingularMassMatrix, factorize, inner_product, solve
+from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, solve
 from psdmc.dynamics.twist import combined, efforts, own_rates
 
 Accelerations = tuple[list[Scalar], tuple[Scalar, ...]]
@@ -50,7 +50,7 @@ def forward_dynamics(
 ) -> Accelerations:
     """Accelerations from torques, and the mass matrix's pivots as `factorize` has them, all positive where it is positive
     definite; arguments as those of `inverse_dynamics`, joints that follow no other.
-    Raises SingularMassMatrix where a pivot is a constant not above 0."""
+    Raises SingularMatrix where a pivot is a constant not above 0."""
     if any_follows(frames):
         raise ValueError("a joint that follows another: its acceleration is not its own")
     still = [0.0] * first_rates(frames)[-1]
@@ -136,8 +136,8 @@ class _Inward:
             block[0][0] = block[0][0] + self.drives[i]
         try:
             return factorize(block)
-        except SingularMassMatrix as singular:
-            raise SingularMassMatrix(first_rates(self.frames)[i] + singular.rate) from None
+        except SingularMatrix as singular:
+            raise SingularMatrix(first_rates(self.frames)[i] + singular.row) from None
 
     def _hand_on(self, i: int, inertia: Articulated) -> None:
         frame, state = self.frames[i], self.forward.states[i]

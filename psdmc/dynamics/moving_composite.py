@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun, turned
-from psdmc.dynamics.frames import Frame, Rotation, Turn, to_previous
+from psdmc.dynamics.body import Body, handed_body, in_previous, joined, shifted, spun, turned
+from psdmc.dynamics.frames import Frame, Rotation, Turn, handed_vector, to_previous
 from psdmc.dynamics.motion import LinkMotion
 from psdmc.dynamics.newton_euler import wrench
 from psdmc.dynamics.scalar import (
@@ -84,6 +84,16 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
     force, moment = (to_previous(frame, v) for v in composite.wrench)
     body = in_previous(frame, composite.body)
     return Composite(body, Momenta(second, to_previous(frame, first)), (force, moment))
+
+
+def handed_composite(frame: Frame, composite: Composite) -> Composite:
+    """Return the composite that a frame passes to its parent, about the parent's frame: the sum over all limbs that it
+    represents."""
+    (x, y, z), first = composite.momenta
+    second = (handed_vector(frame, x), handed_vector(frame, y), handed_vector(frame, z))
+    force, moment = (handed_vector(frame, v) for v in composite.wrench)
+    body = handed_body(frame, composite.body)
+    return Composite(body, Momenta(second, handed_vector(frame, first)), (force, moment))
 
 
 def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite:

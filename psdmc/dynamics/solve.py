@@ -1,4 +1,5 @@
-"""Solution of M x = b for a symmetric positive definite M, written out entry by entry, from the last row up.
+"""Factors of a symmetric positive definite matrix, and what follows from them, written out entry by entry, from the last row
+up.
 
 Entries that are the number zero, those of joints on different branches, are left out. Where parents come before their
 children, elimination from the last row up changes entries of two joints only where both carry the one that is eliminated, so
@@ -15,12 +16,12 @@ from psdmc.dynamics.scalar import Scalar
 Rows = tuple[tuple[Scalar, ...], ...]
 
 
-class SingularMassMatrix(Exception):
-    """A pivot is zero for every q; `rate` is its row of the mass matrix, the first at the base being 0."""
+class SingularMatrix(Exception):
+    """A pivot is not positive at any state; `row` is its row of the matrix: of the mass matrix, the number of a rate."""
 
-    def __init__(self, rate: int) -> None:
-        super().__init__(f"pivot {rate} is zero for every q")
-        self.rate = rate
+    def __init__(self, row: int) -> None:
+        super().__init__(f"pivot {row} is not positive at any state")
+        self.row = row
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class Factors:
 
 def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
     """The factors of M by elimination from the tip, whose entries the composite-rigid-body sweep finishes first. Raises
-    SingularMassMatrix where a pivot is a constant not above 0."""
+    SingularMatrix where a pivot is a constant not above 0."""
     n = len(matrix)
     rows = [list(row) for row in matrix]
     inverses: list[Scalar] = [0.0] * n
@@ -49,7 +50,7 @@ def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
     for k in reversed(range(n)):
         pivot = rows[k][k]
         if isinstance(pivot, float) and pivot <= 0.0:
-            raise SingularMassMatrix(k)
+            raise SingularMatrix(k)
         inverses[k] = 1.0 / pivot
         lower[k] = [0.0] * k
         coupled = _nonzero(rows[k][:k])
@@ -69,7 +70,11 @@ def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
 
 def _nonzero(row: Sequence[Scalar]) -> list[int]:
     """Where the entries are not the number zero."""
-    return [i for i, entry in enumerate(row) if not (isinstance(entry, float) and entry == 0.0)]
+    return [i for i, entry in enumerate(row) if not _is_zero(entry)]
+
+
+def _is_zero(entry: Scalar) -> bool:
+    return isinstance(entry, float) and entry == 0.0
 
 
 def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
@@ -84,6 +89,28 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
         for i in _nonzero(row):
             solution[k] = solution[k] - row[i] * solution[i]
     return solution
+
+
+def projected(factors: Factors, rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
+    """J M^-1 J^T, both triangles, from the rows of J: with Y = J L^-1, it is Y D^-1 Y^T."""
+    halves = [_half_solved(factors, row) for row in rows]
+    found: list[list[Scalar]] = [[0.0] * len(rows) for _ in rows]
+    for i, half in enumerate(halves):
+        own = _nonzero(half)
+        scaled = [half[k] * factors.inverses[k] for k in own]
+        for j in range(i + 1):
+            found[i][j] = found[j][i] = inner_product(scaled, [halves[j][k] for k in own])
+    return found
+
+
+def _half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
+    """y of L^T y = right; zero where no joint beyond is in `right`."""
+    found = list(right)
+    for k in reversed(range(len(found))):
+        if not _is_zero(found[k]):
+            for i in _nonzero(factors.lower[k]):
+                found[i] = found[i] - factors.lower[k][i] * found[k]
+    return found
 
 
 def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

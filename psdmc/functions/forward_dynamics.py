@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations_and_pivots
+from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
 from psdmc.robot.mechanism import Array
@@ -40,7 +40,8 @@ RECIPE = Recipe(
         theta=True,
         summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)), h "
         "being the Coriolis, centrifugal and gravity torques.",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
+        spoilt="accelerations",
     ),
     "forward dynamics",
     trace,

@@ -10,7 +10,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature, jacobian_of
-from psdmc.recipes.accelerations import PIVOTS
+from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.reproducible import inverse as inverted
@@ -87,7 +87,7 @@ RECIPE = Recipe(
         (QDD, *(jacobian_of("qdd", by) for by in ("q", "qd", "tau"))),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
     ),
     "derivatives of forward dynamics",

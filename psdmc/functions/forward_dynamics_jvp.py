@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.solve import solve
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along, solved, torque_slopes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -47,7 +47,7 @@ RECIPE = Recipe(
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics, and their derivative dqdd along the direction "
         "(dq, dqd, dtau).",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
     ),
     "forward dynamics along a direction",
     trace,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.solve import solve
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import (
     COTANGENT,
     COTANGENT_OF_QDD,
@@ -68,7 +68,7 @@ RECIPE = Recipe(
         theta=True,
         summary="Compute the accelerations qdd, and the gradients of "
         "the sum of cotangent[i] * qdd[i] with respect to q, qd and tau.",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
     ),
     "gradient of forward dynamics",
     trace,

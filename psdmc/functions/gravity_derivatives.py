@@ -69,5 +69,6 @@ RECIPE = Recipe(
     "computeGeneralizedGravityDerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     beside="inverse_dynamics",
 )

@@ -55,5 +55,6 @@ RECIPE = Recipe(
     "computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     benched=True,
 )

@@ -65,4 +65,5 @@ RECIPE = Recipe(
     "rnea, computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
 )

@@ -62,5 +62,6 @@ RECIPE = Recipe(
     "rnea, computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     benched=True,
 )

@@ -11,7 +11,7 @@ from psdmc import reproducible
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.solve import factorize, inverse
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.accelerations import PIVOTS
+from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -53,7 +53,7 @@ RECIPE = Recipe(
         ),
         theta=True,
         summary="Compute the inverse of the joint-space mass matrix M(q).",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
     ),
     "inverse of the mass matrix",
     trace,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.manifold import coordinate_rates, restored
 from psdmc.dynamics.scalar import Scalar
-from psdmc.program.signature import QD, TAU, Positive, Q, Quantity, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations_and_pivots
+from psdmc.program.signature import QD, TAU, Q, Signature
+from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
@@ -18,10 +18,10 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-STAGE_PIVOTS = Positive(
-    Quantity("pivot", ("4", "nv"), unit="J s^2", powers=(0, -2)),
-    which=f"{PIVOTS.which}, + n times the stage of the step",
-    spoilt="states",
+MASS_MATRICES = MASS_MATRIX.in_blocks(
+    "4",
+    number=f"{MASS_MATRIX.number}, + n times the stage of the step",
+    failure=f"{MASS_MATRIX.failure} or in a stage of the step",
 )
 
 State = tuple[Sequence[Scalar], Sequence[Scalar]]
@@ -108,7 +108,8 @@ RECIPE = Recipe(
         (Q_NEXT, QD_NEXT),
         theta=True,
         summary="Compute the state after one step of the classical fourth-order Runge-Kutta method, with constant torques.",
-        positive=STAGE_PIVOTS,
+        factorises=(MASS_MATRICES,),
+        spoilt="states",
     ),
     "step of fourth-order Runge-Kutta",
     trace,

@@ -296,7 +296,8 @@ RECIPE = Recipe(
         theta=True,
         summary="Compute the state after one step of the classical fourth-order Runge-Kutta method, and "
         "that state's derivatives by q, qd and tau.",
-        positive=STEP.signature.positive,
+        factorises=STEP.signature.factorises,
+        spoilt=STEP.signature.spoilt,
         calls=ACCELERATIONS.name,
     ),
     "Jacobians of a step of fourth-order Runge-Kutta",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.manifold import integrated
 from psdmc.program.signature import QD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations_and_pivots
+from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped, turned
@@ -48,7 +48,8 @@ RECIPE = Recipe(
         (Q_NEXT, QD_NEXT),
         theta=True,
         summary="Compute the state after one step of semi-implicit Euler: qd_next = qd + dt qdd, q_next = q + dt qd_next.",
-        positive=PIVOTS,
+        factorises=(MASS_MATRIX,),
+        spoilt="states",
     ),
     "step of semi-implicit Euler",
     trace,

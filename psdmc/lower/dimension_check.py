@@ -49,7 +49,10 @@ def check_dimensions(
     recipe: Recipe, reframed: Reframed, robot: RobotConstants, choices: Choices = PLAIN
 ) -> None:
     """InputError where the function adds, compares or chooses between unlike quantities, takes such a function as exp of one
-    that is no number, or puts out one that has not its signature's unit."""
+    that is no number, or puts out one that has not its signature's unit. Robots with a joint type that contains a length, as
+    a screw does its pitch, are not checked: to the tracer this length is a number."""
+    if any(frame.joint.has_length for frame in reframed.frames):
+        return
     signature = recipe.signature
     for quantity in (*signature.inputs, *signature.stored):
         if not quantity.unit:

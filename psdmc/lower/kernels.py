@@ -7,7 +7,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Literal
 
-from psdmc.dynamics.solve import SingularMassMatrix
+from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES, default_of
 from psdmc.garbage import collecting_rarely
@@ -27,6 +27,7 @@ from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out
 from psdmc.program.program import Program
+from psdmc.program.signature import Signature
 from psdmc.progress import Step
 from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.robot.derivable import require_derivable
@@ -79,8 +80,8 @@ def lower(
             progress(Step(f"lowering {recipe.name}{'_theta' if theta else ''}", share))
             try:
                 kernel = lowered.kernel(recipe, theta)
-            except SingularMassMatrix as singular:
-                raise _refusal(model, recipe.name, singular) from singular
+            except SingularMatrix as singular:
+                raise _refusal(model, recipe.signature, singular) from singular
             kernels[kernel.name] = kernel
     return kernels
 
@@ -110,10 +111,12 @@ def _near(word: str, names: Sequence[str]) -> str:
     return f"do you mean {' or '.join(alike)}?" if alike else f"psdmc generates {', '.join(names)}"
 
 
-def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:
-    joint = model.joint_names[model.mechanism.rate_joints[singular.rate]]
+def _refusal(model: DynamicsModel, function: Signature, singular: SingularMatrix) -> InputError:
+    """The error of a function whose first matrix, that of the joints, is singular."""
+    matrix, name = function.factorises[0], function.name
+    joint = model.joint_names[model.mechanism.rate_joints[singular.row]]
     return InputError(
-        f"{model.mechanism.name}: {name}: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
+        f"{model.mechanism.name}: {name}: joint {joint!r} moves no inertia, {matrix.name} is singular for every q",
         f"give its link an inertia, add --drive-inertia, or leave {name} out of --functions",
     )
 

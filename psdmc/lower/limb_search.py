@@ -16,7 +16,7 @@ import numpy as np
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE
-from psdmc.dynamics.solve import SingularMassMatrix
+from psdmc.dynamics.solve import SingularMatrix
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.branches import limbs_in
 from psdmc.lower.descent import ROUNDING
@@ -161,7 +161,7 @@ class LimbSearch:
             return -math.inf
         try:
             before, behind = (self._weight_of_part(each, groups, kept) for each in (found, candidate))
-        except SingularMassMatrix:  # what the branches hang on has its inertia from others
+        except SingularMatrix:  # what the branches hang on has its inertia from others
             return -math.inf
         return best.weight - before + behind
 

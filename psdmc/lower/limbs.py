@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import accumulate, product
 
 from psdmc.dynamics.frames import Frame
@@ -13,12 +13,12 @@ from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
 from psdmc.lower.limb_frames import Place, one_limb, places
 from psdmc.lower.link_parameters import bodies_from_carriers
-from psdmc.program.lanes import Lanes
 from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
-from psdmc.program.program import Op, Program, Slot
+from psdmc.program.limb_sums import LimbSums
+from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Quantity
-from psdmc.program.trace import Symbol, Tracer, arguments_of, constants_of
+from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
 from psdmc.robot.limbs import Limbs
 
@@ -51,9 +51,7 @@ def cost_of_limbs(
 class _Group:
     """A group while it is traced.
 
-    stored    its slot for each value that it puts out
-    partials  index of a value to the number of its sum
-    summed    index of a sum to that of its value
+    stored  its slot for each value that it puts out
     """
 
     number: int
@@ -61,8 +59,6 @@ class _Group:
     inputs: list[Spread] = field(default_factory=list)
     outputs: list[Spread] = field(default_factory=list)
     stored: dict[Hashable, Slot] = field(default_factory=dict)
-    partials: dict[int, int] = field(default_factory=dict)
-    summed: dict[int, int] = field(default_factory=dict)
 
     @property
     def vectors(self) -> LimbGroup:
@@ -78,8 +74,7 @@ class _Trace:
         self.recipe, self.arrangement, self.robot = recipe, arrangement, robot
         self.tracer = Tracer()
         self.groups = [_Group(number, len(limbs)) for number, limbs in enumerate(groups)]
-        self.kinds: list[int] = []
-        self.vectors: dict[str, int] = {constants_of(group.number): group.number for group in self.groups}
+        self.sums = LimbSums(self.tracer, [len(limbs) for limbs in groups])
         whole = in_unit(arrangement.reframed, arrangement.unit)
         self.places = places(len(whole.frames), groups)
         frames = zip(one_limb(whole.frames, self.places), self.places, strict=True)
@@ -95,35 +90,7 @@ class _Trace:
     def _with_sums(self, frame: Frame, place: Place) -> Frame:
         if place.group is None or not place.is_first:
             return frame
-        return replace(frame, limbs=self._summing(self.groups[place.group]))
-
-    def _summing(self, group: _Group) -> Callable[[Scalar], Scalar]:
-        names = group.vectors
-
-        def total(value: Scalar) -> Scalar:
-            if isinstance(value, Lanes):
-                return math.fsum(value.values)
-            if not isinstance(value, Symbol) or self._kind(value.index) != group.number:
-                return value * group.count
-            number = group.partials.setdefault(value.index, len(group.partials))
-            summed = self.tracer.symbol(Slot(names.sum, number))
-            group.summed[summed.index] = value.index
-            return -summed if value.negative else summed
-
-        return total
-
-    def _kind(self, index: int) -> int:
-        """Number of the group that a value belongs to; -1: none."""
-        kinds, steps = self.kinds, self.tracer.steps
-        for k in range(len(kinds), index + 1):
-            op, a, b = steps[k]
-            if b is not None:
-                kinds.append(max(kinds[a], kinds[b]))
-            elif op is Op.LOAD:
-                kinds.append(self.vectors.get(a.vector, -1))
-            else:
-                kinds.append(max((kinds[each] for each in arguments_of(steps[k])), default=-1))
-        return kinds[index]
+        return replace(frame, limbs=partial(self.sums.total, place.group))
 
     def recorded(self) -> Mapping[Slot, Scalar]:
         """Return the recipe's outputs by slots whose indices count places."""
@@ -150,7 +117,7 @@ class _Trace:
                 group = self.groups[place.group]
                 slot = Slot(group.vectors.input_of(quantity.name), used.setdefault(place.group, 0))
                 used[place.group] += 1
-                self.vectors[slot.vector] = place.group
+                self.sums.add_input(slot.vector, place.group)
                 group.inputs.append((slot, slots))
                 yield self.tracer.symbol(slot)
 
@@ -203,14 +170,13 @@ class _Trace:
     def counted(self, outputs: list[tuple[Slot, Scalar]]) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
         """The groups, and the cost of each stage, sums that nothing needs left out."""
         groups = tuple(group.vectors for group in self.groups)
-        partial_of = {index: value for group in self.groups for index, value in group.summed.items()}
         stored = self.tracer.stored(outputs)
-        return groups, traced_stage_costs(self.tracer.steps, stored, partial_of, groups)
+        return groups, traced_stage_costs(self.tracer.steps, stored, self.sums.summed, groups)
 
     def needed(self, stored: list[tuple[Slot, Scalar]]) -> TracedLimbs:
         """The PROGRAM without sums that nothing needs."""
         sums = {
-            group.vectors.partial: [Symbol(self.tracer, index) for index in group.partials]
+            group.vectors.partial: [Symbol(self.tracer, index) for index in self.sums.partials[group.number]]
             for group in self.groups
         }
         partials = [

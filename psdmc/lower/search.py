@@ -18,7 +18,7 @@ import numpy as np
 
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.following import any_follows
-from psdmc.dynamics.solve import SingularMassMatrix
+from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
 from psdmc.lower.branches import Branches
@@ -155,7 +155,7 @@ class Search:
                 return -math.inf
             try:
                 costs = [self._branch_cost(recipe, each, kept) for each in (found, candidate)]
-            except SingularMassMatrix:  # what the branches hang on has its inertia from others
+            except SingularMatrix:  # what the branches hang on has its inertia from others
                 return -math.inf
             before, behind = map(scoring.weight, costs)
             return scoring.weight(self.cost(recipe, found)) - before + behind
@@ -274,9 +274,10 @@ class Search:
             yield replace(plain, choices=choices)
 
     def _units(self, found: Arrangement) -> Iterator[Arrangement]:
-        """Each length of the robot as the unit; not with sliding joints, whose variables would need scaling."""
+        """Each length of the robot as the unit, or none: with sliding joints, variables would need scaling, and the pitch of
+        a screw is in m."""
         frames = found.reframed.frames
-        if any(frame.joint.length_order for frame in frames):
+        if any(frame.joint.length_order or frame.joint.has_length for frame in frames):
             return
         lengths = {abs(x): None for frame in frames for x in frame.translation if x}
         for unit in lengths:

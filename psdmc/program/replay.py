@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from psdmc.errors import InternalError
 from psdmc.program.interpret import evaluated
 from psdmc.program.program import Program, Slot
-from psdmc.program.trace import Number, Symbol, Tracer
+from psdmc.program.trace import Constant, Symbol, Tracer
 
-Value = Symbol | Number
+Value = Symbol | Constant
 
 
 def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> list[Value]:

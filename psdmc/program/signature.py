@@ -7,9 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 from psdmc.errors import InternalError
 from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
+from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
 
 WORDS = ("n", "nq", "nv", "nx", "l", "frames", "nonzeros")
@@ -39,8 +41,15 @@ class Sizes:
         return Sizes(n, n, n, l, frames)
 
     def shape(self, axes: Sequence[str]) -> tuple[int, ...]:
-        """Lengths of axes that are each a word of WORDS or a number."""
-        return tuple(getattr(self, axis) if axis in WORDS else int(axis) for axis in axes)
+        """Lengths of axes as Quantity has them."""
+        return tuple(map(self._length, axes))
+
+    def _length(self, axis: str) -> int:
+        if axis in WORDS:
+            return int(getattr(self, axis))
+        if axis.isdecimal():
+            return int(axis)
+        return sum(math.prod(map(self._length, part.split("*"))) for part in axis.split("+"))
 
     def size(self, quantity: Quantity) -> int:
         """Reals per state."""
@@ -51,8 +60,9 @@ class Sizes:
 class Quantity:
     """A named scalar (no axes), vector or matrix (row-major).
 
-    axes     each a word of WORDS or a number
-    largest  SI; tests draw an input from plus or minus this
+    axes     each a word of WORDS, a number, or sums of products of these: nv+frames*6
+    largest  SI; tests draw an input from plus or minus this, or from
+    least    up to it
     means    what Python's documentation says of it, with the unit
     unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
     powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
@@ -66,9 +76,11 @@ class Quantity:
     means: str = ""
     unit: str = ""
     powers: tuple[int, ...] = ()
+    least: float | None = None
 
     def __post_init__(self) -> None:
-        wrong = [axis for axis in self.axes if axis not in WORDS and not axis.isdecimal()]
+        words = [word for axis in self.axes for part in axis.split("+") for word in part.split("*")]
+        wrong = [word for word in words if word not in WORDS and not word.isdecimal()]
         if wrong or not self.name.isidentifier():
             raise ValueError(f"{self.name!r} with axes {self.axes}: an axis is a number or one of {WORDS}")
         if len(self.powers) not in (0, len(self.axes)):
@@ -87,6 +99,12 @@ class Quantity:
             found = [times(each, along, power) for each in found for along in own]
         return found
 
+    def drawn(self, shares: Any) -> Any:
+        """Values for tests, from shares between -1 and 1."""
+        if self.least is None:
+            return self.largest * shares
+        return self.least + (self.largest - self.least) * (0.5 + 0.5 * shares)
+
     @property
     def is_matrix(self) -> bool:
         """Whether it is a matrix, packed or not: many entries, which are stored as they are computed."""
@@ -94,16 +112,13 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
-class Positive:
-    """Intermediate results that must be positive, entry by entry, for the function to have a result.
+class Joined(Quantity):
+    """Several quantities, one after the other."""
 
-    which   says in words which entry is not positive, and what that means
-    spoilt  says which outputs become NaN then
-    """
+    parts: tuple[Quantity, ...] = ()
 
-    quantity: Quantity
-    which: str
-    spoilt: str
+    def dimensions(self, axes: Mapping[str, Sequence[Dimension]]) -> list[Dimension]:
+        return [each for part in self.parts for each in part.dimensions(axes)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +131,13 @@ class Signature:
     inputs    read, in this order
     outputs   written, in this order
     theta     whether a variant exists that takes theta_b (length l) at run time
-    positive  computed beside the outputs and not put out: where an entry is not above zero the function fails, its outputs
-              are NaN and it returns which; None: it cannot fail
+    factorises  symmetric matrices, in the order of their pivots' numbers. The pivots are computed beside the outputs: if one
+              is not positive the function fails, its outputs are NaN and it returns which; none: it cannot fail
     products  how outputs that a trace does not give follow from what it gives
     normalizes  whether quaternions that it reads may have any length but zero
     summary   a sentence on what it computes, for Python and the table of docs/functions.md
     calls     name of a function of states that its C calls stage by stage, instead of a body of its own
+    spoilt    what its outputs are called where they become NaN
     """
 
     name: str
@@ -130,11 +146,12 @@ class Signature:
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
     theta: bool
-    positive: Positive | None = None
+    factorises: tuple[SymmetricMatrix, ...] = ()
     products: tuple[Product, ...] = ()
     calls: str | None = None
     normalizes: bool = False
     summary: str = ""
+    spoilt: str = "results"
 
     def __post_init__(self) -> None:
         names = [q.name for q in (*self.inputs, *self.stored)] + [product.right for product in self.products]
@@ -145,8 +162,28 @@ class Signature:
 
     @property
     def stored(self) -> tuple[Quantity, ...]:
-        """All quantities that its PROGRAMs put out: outputs, then those that must be positive."""
-        return (*self.outputs, *((self.positive.quantity,) if self.positive else ()))
+        """All quantities that its PROGRAMs put out: outputs, then pivots."""
+        return (*self.outputs, *((self.pivots,) if self.pivots else ()))
+
+    @property
+    def pivots(self) -> Quantity | None:
+        """The pivots of all matrices that it factorises, which must be positive; None: it cannot fail."""
+        parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in self.factorises]
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        whole = "+".join("*".join(part.axes) for part in parts)
+        return Joined(PIVOTS, (whole,), unit=parts[0].unit, parts=tuple(parts))
+
+    @property
+    def raises(self) -> bool:
+        """Whether Python raises an error if one of its matrices is not positive definite."""
+        return any(matrix.error for matrix in self.factorises)
+
+    @property
+    def pivot_numbers(self) -> tuple[str, ...]:
+        """Which number a pivot has that is not positive, from 0: words for each matrix."""
+        lengths = [f"{' '.join(matrix.axes)} + " for matrix in self.factorises]
+        return tuple("".join(lengths[:k]) + matrix.number for k, matrix in enumerate(self.factorises))
 
     @property
     def traced(self) -> frozenset[str]:
@@ -172,6 +209,9 @@ def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
             raise InternalError(f"{one.name} and {other.name} both have the order {one.order}")
     return found
 
+
+PIVOTS = "pivot"
+"""What the pivots and signs of a function's matrices are called in its traces."""
 
 Q = Quantity(
     "q",

@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from psdmc.errors import InternalError
+from psdmc.program.limb_sums import CORE
 from psdmc.program.operations import Op
-from psdmc.program.trace import Number, Symbol, Tracer
+from psdmc.program.trace import Constant, Symbol, Tracer
 from psdmc.program.turned_pairs import TurnedPairs
 
-Value = Symbol | Number
+Value = Symbol | Constant
 
 
 def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) -> list[Value]:
@@ -30,12 +31,7 @@ def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) ->
     }
     for index in range(len(sources.needed)):
         if sources.needed[index] and index not in sources.held:
-            total: Value = 0.0
-            for argument, partial in sources.partials(index):
-                tangent = moved.get(argument, 0.0)
-                if not _is_zero(tangent):
-                    total = total + partial * tangent
-            moved[index] = total
+            moved[index] = sources.slope(index, moved)
     return [_signed(value, moved[value.index]) if isinstance(value, Symbol) else 0.0 for value in of]
 
 
@@ -47,16 +43,18 @@ def gradients(
     sources = _Sources.of(of, [symbol for inputs, _ in known for symbol in inputs])
     if sources is None:
         return [[0.0] * len(vector) for vector in by]
-    bars: list[Value] = [0.0] * len(sources.needed)
+    bars = _Bars(sources)
     for value, weight in zip(of, weights, strict=True):
         if isinstance(value, Symbol):
-            bars[value.index] = bars[value.index] + _signed(value, weight)
-    for index in reversed(range(len(bars))):
-        if index not in sources.held and not _is_zero(bars[index]):
+            group = max(sources.group_of(each.index) for each in (value, weight) if isinstance(each, Symbol))
+            bars.add(value.index, _signed(value, weight), group)
+    for index in reversed(range(len(sources.needed))):
+        bar = bars.of(index)
+        if index not in sources.held and not _is_zero(bar):
             for argument, partial in sources.partials(index):
-                bars[argument] = bars[argument] + partial * bars[index]
+                bars.add(argument, partial * bar, sources.group_of(index))
     return [
-        [_divided(_at(bars, symbol.index), factor) for symbol, factor in zip(*each, strict=True)]
+        [_divided(bars.of(symbol.index), factor) for symbol, factor in zip(*each, strict=True)]
         for each in known
     ]
 
@@ -81,6 +79,34 @@ def _inputs(by: Sequence[Symbol]) -> tuple[list[Symbol], list[float]]:
 
 def _divided(value: Value, factor: float) -> Value:
     return value if factor == 1.0 else value / factor
+
+
+class _Bars:
+    """The derivative of the weighted sum by each value, while it is gathered.
+
+    Limbs of a group are recorded as one: what they give to a value of the core is summed over all of them, once it is whole.
+    """
+
+    def __init__(self, sources: _Sources) -> None:
+        self.sources = sources
+        self.own: list[Value] = [0.0] * len(sources.needed)
+        self.from_limbs: dict[int, dict[int, Value]] = {}
+
+    def add(self, index: int, value: Value, group: int) -> None:
+        """What a value of this group's gives to that at `index`."""
+        if group in (CORE, self.sources.group_of(index)):
+            self.own[index] = self.own[index] + value
+        else:
+            given = self.from_limbs.setdefault(index, {})
+            given[group] = given.get(group, 0.0) + value
+
+    def of(self, index: int) -> Value:
+        """The derivative by one value, when all that are computed from it have been passed; 0 if nothing is."""
+        if index >= len(self.own):
+            return 0.0
+        for group, value in self.from_limbs.pop(index, {}).items():
+            self.own[index] = self.own[index] + self.sources.total(group, value)
+        return self.own[index]
 
 
 class _Sources:
@@ -109,6 +135,30 @@ class _Sources:
         held = dict.fromkeys(symbol.index for symbol in by)
         return _Sources(symbols[0].tracer, [symbol.index for symbol in symbols], held)
 
+    def group_of(self, index: int) -> int:
+        """The group of limbs that a value belongs to; CORE: none."""
+        sums = self.tracer.limb_sums
+        return CORE if sums is None else sums.group_of(index)
+
+    def total(self, group: int, value: Value) -> Value:
+        """The sum over a group's limbs of what one of them gives."""
+        sums = self.tracer.limb_sums
+        return value if sums is None else sums.total(group, value)
+
+    def slope(self, index: int, moved: Mapping[int, Value]) -> Value:
+        """The derivative of a value along a tangent, from those of its arguments."""
+        total: Value = 0.0
+        for argument, partial in self.partials(index):
+            tangent = moved.get(argument, 0.0)
+            if not _is_zero(tangent):
+                if self._is_sum(index):
+                    tangent = self.total(self.group_of(argument), tangent)
+                total = total + partial * tangent
+        return total
+
+    def _is_sum(self, index: int) -> bool:
+        return self.tracer.limb_sums is not None and index in self.tracer.limb_sums.summed
+
     def partials(self, index: int) -> Iterator[tuple[int, Value]]:
         """(argument, derivative of value `index` by it) for each argument; the same argument may come twice."""
         turned = self._pairs.of(index)
@@ -117,7 +167,9 @@ class _Sources:
             yield from turned.parts
             return
         arguments = self.tracer.arguments(index)
-        if arguments:
+        if self._is_sum(index):
+            yield arguments[0], 1.0
+        elif arguments:
             op, symbols = self.tracer.steps[index][0], map(self._value, arguments)
             yield from zip(arguments, op.operation.partials(self._value(index), *symbols), strict=True)
 
@@ -127,10 +179,6 @@ class _Sources:
 
 def _signed(symbol: Symbol, value: Value) -> Value:
     return -value if symbol.negative else value
-
-
-def _at(values: Sequence[Value], index: int) -> Value:
-    return values[index] if index < len(values) else 0.0
 
 
 def _is_zero(value: Value) -> bool:

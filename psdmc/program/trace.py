@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import compress
-from typing import Any
+from typing import Any, Protocol
 
 from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
@@ -54,16 +54,29 @@ def constants_of(group: int) -> str:
     return f"{group_name(group)}_constants"
 
 
+class SumsOverLimbs(Protocol):
+    """What a tracer knows of its sums over limbs (limb_sums.py)."""
+
+    summed: dict[int, int]
+
+    def group_of(self, index: int) -> int:
+        """The number of the group whose limbs a value differs between; -1: of none."""
+
+    def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
+        """The sum over a group's limbs of a scalar that is one for each of them."""
+
+
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
 
-    __slots__ = ("_places", "constants", "known", "lane_constants", "steps")
+    __slots__ = ("_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.known: dict[Step, int] = {}
         self.constants: dict[int, Any] = {}
         self.lane_constants: dict[int, list[tuple[float, ...]]] = {}
+        self.limb_sums: SumsOverLimbs | None = None
         self._places: dict[float | Lanes, int] = {}
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
@@ -117,7 +130,9 @@ class Tracer:
         return index
 
     def arguments(self, index: int) -> tuple[int, ...]:
-        """The indices of the values that a step is computed from."""
+        """The indices of the values that a value is computed from; of a sum over limbs the one that is summed."""
+        if self.limb_sums is not None and index in self.limb_sums.summed:
+            return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
 
     def finish(self, outputs: Outputs) -> Program:

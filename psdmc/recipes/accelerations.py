@@ -8,16 +8,20 @@ from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, solve
-from psdmc.program.signature import Positive, Quantity
+from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.recipes.recipe import Ingredients
 from psdmc.recipes.torques import torques
 
-PIVOTS = Positive(
-    Quantity("pivot", ("nv",), unit="J s^2", powers=(-2,)),
-    which="the number of the joint, from 0, at which the mass matrix is not positive definite",
-    spoilt="accelerations",
+MASS_MATRIX = SymmetricMatrix(
+    "the mass matrix",
+    Structure.LIMBS,
+    ("nv",),
+    number="the number of the joint, from 0, at which the mass matrix is not positive definite",
+    failure="the mass matrix is not positive definite in a state",
+    unit="J s^2",
+    powers=(-2,),
 )
-"""The pivots of M(q), which must be positive for it to be inverted."""
+"""M(q), which functions solve or invert."""
 
 
 def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Factors]:

@@ -143,7 +143,7 @@ class Recipe:
     gradient     name of its output that is the gradient by theta_b of a number linear in theta_b. It is compared as that
                  number, times theta_b, which `pinocchio` gives
     beside       name of the function whose values this one's are differences of: errors are measured relative to those
-    needs        what the model must have; left out: a positive definite mass matrix where the signature has `positive`
+    needs        what the model must have; left out: a positive definite mass matrix where the signature factorises one
     in_limbs     whether its algorithms say what they sum over limbs (Frame.limbs), so that these can run in lanes
     accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
     default      whether it is generated where no functions are named, and
@@ -178,7 +178,7 @@ class Recipe:
     regions: Callable[[Sequence[Frame]], Regions] | None = None
 
     def __post_init__(self) -> None:
-        if self.needs is None and self.signature.positive is not None:
+        if self.needs is None and self.signature.factorises:
             object.__setattr__(self, "needs", Needs.POSITIVE_MASS)
 
     @property

@@ -55,7 +55,7 @@ class CompiledRobot(CompiledFunctions):
         return (
             MethodType(getattr(type(self), function.name), self),
             compiled._address_of(function.name) if function.name in compiled._kernels else 0,
-            function.positive is not None,
+            bool(function.factorises) + function.raises,
             self.dtype == np.float32,
             tuple(self._sizes.shape(quantity.axes) for quantity in function.inputs),
             compiled._tails_of(function.name),

@@ -6,6 +6,7 @@ Compiled robots and models take the same, with the same refusals.
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -123,6 +124,42 @@ def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike
             "give one value per base parameter",
         )
     return array
+
+
+def indefinite(
+    function: Signature, axes: RobotAxes, pivot: int, scalars: Mapping[str, float], state: Sequence[int]
+) -> InputError | None:
+    """The error of a state at which a function's pivot with this number is not positive; None if NaN says it.
+
+    scalars  the function's scalar inputs at this state
+    state    its place among many
+    """
+    for matrix in function.factorises:
+        shape = axes.sizes.shape(matrix.axes)
+        if pivot < math.prod(shape):
+            break
+        pivot -= math.prod(shape)
+    if not matrix.error:
+        return None
+    places = zip(matrix.axes, map(int, np.unravel_index(pivot, shape)), strict=True)
+    names = {axis: axes.names[axis][k] for axis, k in places if axis in axes.names}
+    where = f" in state {', '.join(map(str, state))}" if state else ""
+    return InputError(f"{function.name}: {matrix.error.format(**names, **scalars)}{where}", matrix.hint)
+
+
+def scalar_inputs(function: Signature, arrays: Sequence[Array], state: tuple[int, ...]) -> dict[str, float]:
+    """The scalar inputs at one state, from arrays of the common leading axes."""
+    pairs = zip(function.inputs, arrays, strict=True)
+    return {quantity.name: float(array[state]) for quantity, array in pairs if not quantity.axes}
+
+
+def finite_states(function: Signature, arrays: Sequence[Array]) -> NDArray[np.bool_]:
+    """At which states all inputs are finite, from arrays of the common leading axes."""
+    each = [
+        np.isfinite(array).all(axis=tuple(range(-len(quantity.axes), 0)))
+        for quantity, array in zip(function.inputs, arrays, strict=True)
+    ]
+    return np.asarray(np.logical_and.reduce(each))
 
 
 Shapes = Sequence[tuple[int, ...]]

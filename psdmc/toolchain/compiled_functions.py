@@ -21,11 +21,14 @@ from psdmc.toolchain.call_arguments import (
     RobotAxes,
     checked_outputs,
     common_lead,
+    finite_states,
+    indefinite,
     parameters,
+    scalar_inputs,
     states,
     takes_results,
 )
-from psdmc.toolchain.interface import Interface, Origin, batch_symbol
+from psdmc.toolchain.interface import Interface, Origin, batch_symbol, single_symbol
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
 from psdmc.toolchain.stubs import result_name
 
@@ -198,7 +201,9 @@ class CompiledFunctions(RobotFacts):
         self._pointer = self._ffi.typeof(f"{interface.real} *")
         self._kernels = {
             name: _Kernel(
-                interface.kernels[name], getattr(self._library, batch_symbol(interface.robot, name))
+                interface.kernels[name],
+                getattr(self._library, batch_symbol(interface.robot, name)),
+                getattr(self._library, single_symbol(interface.robot, name), None),
             )
             for name in interface.kernels
         }
@@ -255,7 +260,9 @@ class CompiledFunctions(RobotFacts):
         kept = () if out is None else checked_outputs(function, out, shapes, self._dtype)
         is_direct = bool(kept) and all(takes_results(array, rows) for array in kept)
         outs = kept if is_direct else tuple(np.empty(shape, self._dtype) for shape in shapes)
-        kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
+        failed = kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
+        if failed and function.raises:
+            self._refuse_indefinite(function, kernel, lead, rows, outs)
         if kept and not is_direct:
             for array, values in zip(kept, outs, strict=True):
                 array[...] = values
@@ -280,6 +287,27 @@ class CompiledFunctions(RobotFacts):
             )
         rows, columns = np.array(self._patterns[name], dtype=np.intp).reshape(-1, 2).T
         return rows, columns
+
+    def _refuse_indefinite(
+        self,
+        function: Signature,
+        kernel: _Kernel,
+        lead: tuple[int, ...],
+        rows: Sequence[Array],
+        outs: Sequence[Array],
+    ) -> None:
+        """InputError for the first state, of finite inputs, in which a matrix is not positive definite that has an error."""
+        tails = [self._sizes.shape(quantity.axes) for quantity in function.inputs]
+        assert kernel.single is not None
+        given = [row.reshape(lead + tail) for row, tail in zip(rows, tails, strict=False)]
+        failed = finite_states(function, given) & np.isnan(outs[0]).reshape(*lead, -1).any(axis=-1)
+        for state in map(tuple, np.argwhere(failed).tolist()):
+            one = [np.ascontiguousarray(row[state]) for row in given] + list(rows[len(given) :])
+            unused = [np.empty(tail, self._dtype) for tail in kernel.tails]
+            number = kernel.single(*map(self._address, one), *map(self._address, unused))
+            error = indefinite(function, self._axes, number - 1, scalar_inputs(function, given, state), state)
+            if error:
+                raise error
 
     def _foreign(
         self, function: Signature, inputs: Sequence[Any], theta_b: ArrayLike | None, out: Any
@@ -363,10 +391,12 @@ def _opened(ffi: cffi.FFI, library: Path, robot: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class _Kernel:
-    """One compiled kernel: its batch function in C, and the trailing axes of its results."""
+    """One compiled kernel: its batch function in C, that for one state of a function that raises errors, and the trailing
+    axes of its results."""
 
     tails: tuple[tuple[int, ...], ...]
     batch: Callable[..., int | None]
+    single: Callable[..., int] | None
 
 
 @cache

@@ -15,7 +15,8 @@ enum {
     MOST_ARRAYS = 16,    /* inputs and outputs of one function */
     MOST_AXES = 3,       /* trailing axes of one of them */
     MOST_UNITS = 64,     /* quaternions, and cosines with their sines, in the inputs of one function */
-    RELEASE_FROM = 64    /* states from which the GIL is released: below, giving it up takes longer than the call */
+    RELEASE_FROM = 64,   /* states from which the GIL is released: below, giving it up takes longer than the call */
+    RAISES = 2           /* of `failures`: `slow` raises an error if a state fails; 1: NaN says so; 0: none can fail */
 };
 
 typedef struct {
@@ -38,7 +39,7 @@ typedef struct {
     void (*batch)(void);          /* or NULL, where the robot has no parameters of its own */
     void (*batch_theta)(void);    /* the same with theta_b behind the inputs, or NULL */
     Tail parameters;              /* of theta_b */
-    int inputs, outputs, type, can_fail, units;
+    int inputs, outputs, type, failures, units;
     Unit unit[MOST_UNITS];
     Tail tails[MOST_ARRAYS];
 } DirectCall;
@@ -77,20 +78,18 @@ typedef struct {
 #define GIVEN_12 GIVEN_11, a[11]
 #define CASE(k) \
     case k: \
-        if (can_fail) { \
-            (void)((size_t (*)(size_t, ARRAYS_##k))batch)(count, GIVEN_##k); \
-        } else { \
-            ((void (*)(size_t, ARRAYS_##k))batch)(count, GIVEN_##k); \
-        } \
-        break;
+        if (failures) return ((size_t (*)(size_t, ARRAYS_##k))batch)(count, GIVEN_##k); \
+        ((void (*)(size_t, ARRAYS_##k))batch)(count, GIVEN_##k); \
+        return 0;
 
 enum { LEAST_CALLED = 2, MOST_CALLED = 12 };    /* arrays of the cases below */
 
-static void run(void (*batch)(void), int can_fail, size_t count, int arrays, void **a)
+/* Of a function that can fail, 1 + the first state that does; else 0. */
+static size_t run(void (*batch)(void), int failures, size_t count, int arrays, void **a)
 {
     switch (arrays) {
     CASE(2) CASE(3) CASE(4) CASE(5) CASE(6) CASE(7) CASE(8) CASE(9) CASE(10) CASE(11) CASE(12)
-    default: break;
+    default: return 0;
     }
 }
 
@@ -244,14 +243,16 @@ static PyObject *call(PyObject *object, PyObject *const *args, size_t nargsf, Py
     if (extras.theta != NULL) data[all++] = PyArray_DATA((PyArrayObject *)extras.theta);
     for (int i = 0; i < self->outputs; i++) data[all++] = PyArray_DATA(arrays[self->inputs + i]);
     void (*batch)(void) = extras.theta != NULL ? self->batch_theta : self->batch;
+    size_t failed;
     if (count < RELEASE_FROM) {
-        run(batch, self->can_fail, (size_t)count, all, data);
+        failed = run(batch, self->failures, (size_t)count, all, data);
     } else {
         Py_BEGIN_ALLOW_THREADS
-        run(batch, self->can_fail, (size_t)count, all, data);
+        failed = run(batch, self->failures, (size_t)count, all, data);
         Py_END_ALLOW_THREADS
     }
-    return result;
+    if (failed == 0 || self->failures < RAISES) return result;
+    Py_DECREF(result);
 slow:
     return PyObject_Vectorcall(self->slow, args, nargsf & ~PY_VECTORCALL_ARGUMENTS_OFFSET, names);
 }
@@ -326,24 +327,24 @@ static int read_theta(DirectCall *self, unsigned long long address, Py_ssize_t p
     return 1;
 }
 
-/* DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units, theta_address, parameters) */
+/* DirectCall(slow, address, failures, is_single, inputs, outputs, result, units, theta_address, parameters) */
 static PyObject *new(PyTypeObject *type, PyObject *args, PyObject *named_args)
 {
     PyObject *slow, *inputs, *outputs, *result, *units;
     unsigned long long address, theta;
     Py_ssize_t parameters;
-    int can_fail, is_single;
+    int failures, is_single;
     if (named_args != NULL && PyDict_GET_SIZE(named_args) > 0) {
         PyErr_SetString(PyExc_TypeError, "DirectCall() takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(args, "OKppO!O!OO!Kn", &slow, &address, &can_fail, &is_single, &PyTuple_Type, &inputs,
+    if (!PyArg_ParseTuple(args, "OKipO!O!OO!Kn", &slow, &address, &failures, &is_single, &PyTuple_Type, &inputs,
                           &PyTuple_Type, &outputs, &result, &PyTuple_Type, &units, &theta, &parameters)) return NULL;
     DirectCall *self = (DirectCall *)type->tp_alloc(type, 0);
     if (self == NULL) return NULL;
     self->vectorcall = call;
     self->type = is_single ? NPY_FLOAT : NPY_DOUBLE;
-    self->can_fail = can_fail;
+    self->failures = failures;
     self->batch = (void (*)(void))(uintptr_t)address;
     self->slow = Py_NewRef(slow);
     self->result = result == Py_None ? NULL : Py_NewRef(result);

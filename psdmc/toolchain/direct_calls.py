@@ -40,8 +40,9 @@ MOST_ARRAYS, MOST_UNITS = 12, 64
 class DirectCalls:
     """Whether direct calls are possible here.
 
-    make    the type DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units, theta_address,
-            parameters); None where they are not
+    make    the type DirectCall(slow, address, failures, is_single, inputs, outputs, result, units, theta_address,
+            parameters); None where they are not. `failures`: 0, no state can fail; 1, the results of such a state are NaN;
+            2, `slow` repeats such a call, and raises an error
     reason  why not, for people; empty where they are
     remedy  how to have them
     """

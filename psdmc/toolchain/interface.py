@@ -75,7 +75,8 @@ class Interface:
 
 
 def interface_of(package: PackageView) -> Interface:
-    """The interface of a package's library: the batch function of each kernel."""
+    """The interface of a package's library: the batch function of each kernel, and where Python raises errors that name a
+    pivot the one for one state."""
     values = [parameter.value for parameter in package.info.parameters]
     known = tuple(value for value in values if value is not None)
     return Interface(
@@ -102,6 +103,7 @@ def interface_of(package: PackageView) -> Interface:
             for kernel in package.kernels
             for prototype in kernel.prototypes.values()
             if prototype.symbol == batch_symbol(package.robot, kernel.name)
+            or (kernel.function.raises and prototype.symbol == single_symbol(package.robot, kernel.name))
         ),
     )
 
@@ -109,6 +111,11 @@ def interface_of(package: PackageView) -> Interface:
 def batch_symbol(robot: str, kernel: str) -> str:
     """The C function that computes a kernel for many states."""
     return f"{robot}_{kernel}_batch"
+
+
+def single_symbol(robot: str, kernel: str) -> str:
+    """The C function that computes a kernel for one state."""
+    return f"{robot}_{kernel}"
 
 
 def interface_to_json(interface: Interface, library: str) -> str:

@@ -90,12 +90,11 @@ _SIZES = {
 
 
 def _failures(function: Signature) -> list[str]:
-    """What NaN means."""
-    if function.positive is None:
-        return []
-    stage = " or in a stage of the step" if len(function.positive.quantity.axes) > 1 else ""
-    state = f"If the mass matrix is not positive definite in a state{stage},"
-    return [f"{state} the results of that state are NaN."]
+    """What happens where a matrix is not positive definite."""
+    return [
+        f"If {matrix.failure}, {'psdmc raises an InputError' if matrix.error else 'the results of that state are NaN'}."
+        for matrix in function.factorises
+    ]
 
 
 def _rows(named: list[tuple[str, str]]) -> str:

@@ -42,9 +42,7 @@ def function_errors(
     rng = np.random.default_rng(SEED)
     sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
-    given = {
-        q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
-    }
+    given = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes)))) for q in read.values()}
     given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}
     given[TAU.name] = robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])
     least = NOTHING * max(1.0, float(np.abs(given[TAU.name]).max(initial=0.0)))

@@ -94,7 +94,7 @@ class Bench:
         rng, sizes = np.random.default_rng(3), self.sizes
         read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
         found = {
-            q.name: (q.largest * rng.uniform(-1.0, 1.0, (COUNT, *sizes.shape(q.axes)))).astype(self.real)
+            q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *sizes.shape(q.axes)))).astype(self.real)
             for q in read.values()
         }
         exact = {name: array.astype(np.float64) for name, array in found.items()}

@@ -6,6 +6,7 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,7 @@ def test_nothing_else_lists_functions() -> None:
 
 def test_functions_that_can_fail_need_a_positive_mass_matrix() -> None:
     for recipe in RECIPES.values():
-        assert (recipe.needs is Needs.POSITIVE_MASS) == (recipe.signature.positive is not None), recipe.name
+        assert (recipe.needs is Needs.POSITIVE_MASS) == (bool(recipe.signature.factorises)), recipe.name
 
 
 def test_recipes_only_lean_on_functions_that_there_are() -> None:
@@ -106,8 +107,9 @@ def test_sizes_have_one_meaning_each_and_quantities_are_explained() -> None:
     for signature in SIGNATURES.values():
         assert re.fullmatch(r"(Compute|Return) .*\.", signature.summary)
         assert all(quantity.means for quantity in (*signature.inputs, *signature.outputs)), signature.name
-        for quantity in (*signature.inputs, *signature.stored):
-            assert all(axis in WORDS or axis.isdecimal() for axis in quantity.axes)
+        axes = [quantity.axes for quantity in (*signature.inputs, *signature.outputs)]
+        for axis in chain(*axes, *(matrix.axes for matrix in signature.factorises)):
+            assert axis in WORDS or axis.isdecimal()
 
 
 @pytest.mark.parametrize("name", list(RECIPES))

@@ -65,8 +65,7 @@ class WideRobot:
         rng = np.random.default_rng(11)
         read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
         found = {
-            q.name: q.largest * rng.uniform(-1.0, 1.0, (COUNT, *self.sizes.shape(q.axes)))
-            for q in read.values()
+            q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *self.sizes.shape(q.axes)))) for q in read.values()
         }
         for quantity in read.values():
             if quantity.axes == ("nq",):

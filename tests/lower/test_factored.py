@@ -12,7 +12,7 @@ from random_chains import Oracle, random_chain, relative_error, states
 from scipy.spatial.transform import Rotation
 from slow_cases import slow_but_for
 
-from psdmc.dynamics.solve import SingularMassMatrix, factorize
+from psdmc.dynamics.solve import SingularMatrix, factorize
 from psdmc.functions import RECIPES
 from psdmc.lower.carrier_columns import carrier_space
 from psdmc.lower.factored import trace_dynamics, trace_geometry
@@ -198,9 +198,9 @@ def test_every_choice_gives_pinocchios_torques():
 
 
 def test_a_mass_matrix_without_inertia_is_named_singular():
-    with pytest.raises(SingularMassMatrix) as caught:
+    with pytest.raises(SingularMatrix) as caught:
         factorize([[1.0, 0.0], [0.0, 0.0]])
-    assert caught.value.rate == 1
+    assert caught.value.row == 1
 
 
 def tilted(chain: Mechanism, angle: float) -> Mechanism:

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from limbed import FUNCTIONS, SHAPES, kernels, limbed, shape
+from limbed import DERIVATIVES, FUNCTIONS, SHAPES, kernels, limbed, shape
 from mimic_trees import as_urdf
 from random_trees import RandomTree
 from slow_cases import slow_but_for
@@ -57,7 +57,12 @@ def sizes_of(model: DynamicsModel) -> Sizes:
 
 def given_states(model: DynamicsModel, count: int = COUNT) -> dict[str, np.ndarray]:
     vectors = states_of(model.mechanism, np.random.default_rng(4), count)
-    return dict(zip(("q", "qd", "qdd"), vectors, strict=True)) | {"tau": 3.0 * vectors[2]}
+    along = np.random.default_rng(5).uniform(-1.0, 1.0, (4, *vectors[1].shape))
+    return (
+        dict(zip(("q", "qd", "qdd"), vectors, strict=True))
+        | {"tau": 3.0 * vectors[2]}
+        | dict(zip(("cotangent", "dq", "dqd", "dqdd"), along, strict=True))
+    )
 
 
 def values(program: Program, function: str, model: DynamicsModel) -> dict[str, np.ndarray]:
@@ -108,7 +113,7 @@ def counted_without_cutting(
     chain=some.text("RP", min_size=1, max_size=3),
     count=some.integers(2, 5),
     parallel=some.sampled_from([0.0, 0.3, 0.8, 1.0]),
-    function=some.sampled_from(FUNCTIONS),
+    function=some.sampled_from([*FUNCTIONS, *DERIVATIVES]),
 )
 def test_any_equal_limbs(
     seed: int, trunk: str, chain: str, count: int, parallel: float, function: str

@@ -25,7 +25,7 @@ from psdmc.lower.search import Search
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature, Sizes
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.accelerations import PIVOTS
+from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
 from psdmc.recipes.regressor_rows import traced_rows
 from psdmc.recipes.torques import torques
@@ -170,8 +170,8 @@ def sizes_of(model) -> Sizes:
 
 def recipe(trace, inputs, output) -> Recipe:
     """A recipe as a file of psdmc/functions has one, without comparisons."""
-    positive = PIVOTS if trace is mobility else None
-    signature = Signature(trace.__name__, 9999, "", inputs, (output,), theta=True, positive=positive)
+    matrices = (MASS_MATRIX,) if trace is mobility else ()
+    signature = Signature(trace.__name__, 9999, "", inputs, (output,), theta=True, factorises=matrices)
     return Recipe(signature, "", trace, None, "", None, shares="inverse_dynamics")  # type: ignore[arg-type]
 
 

@@ -6,10 +6,13 @@ import pytest
 
 from psdmc.errors import InternalError
 from psdmc.program.interpret import interpret
+from psdmc.program.limb_program import LimbGroup, LimbProgram, unpacked
+from psdmc.program.limb_stages import staged
+from psdmc.program.limb_sums import LimbSums
 from psdmc.program.program import Slot
 from psdmc.program.replay import substituted
 from psdmc.program.slopes import gradients, slopes
-from psdmc.program.trace import Tracer
+from psdmc.program.trace import Symbol, Tracer
 
 
 def test_derivatives_by_a_computed_value_are_refused() -> None:
@@ -78,3 +81,39 @@ def test_signs_beside_values_are_kept() -> None:
     )
     out = interpret(program, {"q": [3.0, 5.0]}, {"out": 3})["out"]
     assert out.tolist() == [-10.0, -6.0, -5.0 + 3.0]
+
+
+def test_derivatives_pass_through_sums_over_limbs() -> None:
+    """Three limbs give s = sum c x to the core; they put out y = s x and the core z = s^2. By hand."""
+    tracer = Tracer()
+    sums = LimbSums(tracer, [3])
+    inputs = {name: tuple(Slot(name, limb) for limb in range(3)) for name in ("x", "w", "dx")}
+    for name in inputs:
+        sums.add_input(f"group0_{name}", 0)
+    x, w, dx = (tracer.symbol(Slot(f"group0_{name}", 0)) for name in inputs)
+    (c,), (u,), (dc,) = (tracer.symbols(name, 1) for name in ("c", "u", "dc"))
+    s = sums.total(0, c * x)
+    of = [s * x, s * s]
+    (by_x,), (by_c,) = gradients(of, [w, u], [[x], [c]])
+    dy, dz = slopes(of, [x, c], [dx, dc])
+    own = {name: Slot("group0_output", k) for k, name in enumerate(("by_x", "dy"))}
+    spread = tuple((slot, tuple(Slot(name, limb) for limb in range(3))) for name, slot in own.items())
+    reads = tuple((Slot(f"group0_{name}", 0), slots) for name, slots in inputs.items())
+    group = LimbGroup(0, 3, reads, (), spread)
+    stored = [(own["by_x"], by_x), (own["dy"], dy), (Slot("by_c", 0), by_c), (Slot("dz", 0), dz)]
+    stored += [(Slot(group.partial, k), Symbol(tracer, index)) for k, index in enumerate(sums.partials[0])]
+    program = unpacked(LimbProgram((group,), staged(tracer.finish(stored), [group])))
+
+    values = {"x": [0.5, -1.5, 2.0], "w": [3.0, 1.0, -2.0], "dx": [0.25, 4.0, -0.5]}
+    given = values | {"c": [1.25], "u": [0.75], "dc": [-3.0]}
+    found = interpret(program, given, {"by_x": 3, "by_c": 1, "dy": 3, "dz": 1})
+
+    whole = sum(values["x"])
+    weighted = sum(a * b for a, b in zip(values["w"], values["x"], strict=True)) + 2 * 0.75 * 1.25 * whole
+    change = -3.0 * whole + 1.25 * sum(values["dx"])
+    assert list(found["by_c"]) == pytest.approx([whole * weighted])
+    assert list(found["by_x"]) == pytest.approx([a * 1.25 * whole + 1.25 * weighted for a in values["w"]])
+    assert list(found["dz"]) == pytest.approx([2 * 1.25 * whole * change])
+    assert list(found["dy"]) == pytest.approx(
+        [change * a + 1.25 * whole * b for a, b in zip(values["x"], values["dx"], strict=True)]
+    )

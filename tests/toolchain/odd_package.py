@@ -7,12 +7,13 @@ from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.model.equations import BaseParameter
+from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.kernel import Kernel
-from psdmc.program.signature import Positive, Q, Quantity, Signature
+from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.program.trace import Slot, Tracer
 
 N, L, FRAMES = 3, 2, 2
-PIVOT = Positive(Quantity("pivot", ("nv",)), "the joint that is odd", "outputs")
+PIVOT = SymmetricMatrix("the odd one", Structure.DENSE, ("nv",), "the joint that is odd", "one joint is odd")
 FUNCTION = Signature(
     "everything",
     1000,
@@ -25,7 +26,8 @@ FUNCTION = Signature(
         Quantity("M", ("nv", "nv")),
     ),
     theta=True,
-    positive=PIVOT,
+    factorises=(PIVOT,),
+    spoilt="outputs",
 )
 INFO = PackageInfo(
     name="odd",

@@ -19,6 +19,7 @@ from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
 from psdmc.functions import RECIPES
+from psdmc.functions.operational_space_inertia import MU
 from psdmc.lower.kernels import lower
 from psdmc.recipes.steps import DT
 
@@ -26,8 +27,9 @@ CALLS = 20
 SCALES = ("0", "1e-300", "1", "6", "1e5")
 """Standing still, denormal squares, ordinary motion, several turns, the sincos's whole range."""
 
-SHORT_STEP = 1e-9
-"""s: a long step from the largest states would leave the sincos's range."""
+DRAWN = {DT.name: "1e-9 * rand() / RAND_MAX", MU.name: "1.0 + rand() / (double)RAND_MAX"}
+"""Inputs of another size: a long step from the largest states would leave the sincos's range, and without a mu that is
+positive there is no operational-space inertia, which takes other instructions."""
 
 PACKAGES = {
     "two_link": tuple(RECIPES),
@@ -59,8 +61,10 @@ def program_text(package: PackageView) -> str:
     lines += ["    srand((unsigned)scale);", f"    for (int call = 0; call < {CALLS}; call++) {{"]
     for name in sorted({vector.name for kernel in package.kernels for vector in kernel.inputs}):
         lines += [f"        for (int k = 0; k < {sizes[name]}; k++) {{"]
-        times = f"{SHORT_STEP} * " if name == DT.name else "scale * "
-        lines += [f"            {name}[k] = {times}(rand() / (double)RAND_MAX - 0.5);", "        }"]
+        lines += [
+            f"            {name}[k] = {DRAWN.get(name, 'scale * (rand() / (double)RAND_MAX - 0.5)')};",
+            "        }",
+        ]
     for kernel in package.kernels:
         names = ", ".join(vector.name for vector in (*kernel.inputs, *kernel.outputs))
         lines += [f"        (void){package.robot}_{kernel.name}({names});"]

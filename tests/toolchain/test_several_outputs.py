@@ -160,7 +160,7 @@ def test_header_and_class_say_what_there_is() -> None:
 
 
 def test_a_name_that_c_takes_for_something_else_is_an_internal_error() -> None:
-    function = replace(FUNCTION, outputs=(Quantity("V"),), positive=None)
+    function = replace(FUNCTION, outputs=(Quantity("V"),), factorises=())
     program = Tracer().finish([(Slot("V", 0), 1.0)])
     kernel = Kernel(function, False, program, program, "factored")
     with pytest.raises(InternalError, match="takes 'V' for something else"):

@@ -192,7 +192,7 @@ def arm_references(count: int = 4, seed: int = 0) -> ReferenceStates:
     expected: dict[str, np.ndarray] = {}
     for name, kernel in kernels.items():
         function = kernel.function
-        if function.positive is None:
+        if not function.factorises:
             inputs = given | {"theta_b": theta}
             (expected[name],) = interpret(kernel.single, inputs, function.sizes(SIZES)).values()
     for suffix in ("", "_theta"):

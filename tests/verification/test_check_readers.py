@@ -32,6 +32,7 @@ OF_THE_TIP = (
     "frame drift",
     "derivatives of frame velocities",
     "inverse dynamics with wrenches",
+    "operational-space inertia",
 )
 """Functions that a frame's place matters to."""
 

@@ -51,14 +51,12 @@ def _forms(target: Target) -> tuple[str, ...]:
 
 
 def _failure(function: Signature, target: Target) -> tuple[str, ...]:
-    if function.positive is None:
+    if not function.factorises:
         return ()
+    status = f"{function.name} returns 0, or 1 + {', or 1 + '.join(function.pivot_numbers)}."
     if not target.has_batches:
-        return (
-            f"{function.name} returns 0, or 1 + {function.positive.which}.",
-            f"The {function.positive.spoilt} of such a state are NaN.",
-        )
+        return (status, f"The {function.spoilt} of such a state are NaN.")
     return (
-        f"{function.name} returns 0, or 1 + {function.positive.which}.",
-        f"A batch returns 0, or 1 + the first row that fails. The {function.positive.spoilt} of such a state are NaN.",
+        status,
+        f"A batch returns 0, or 1 + the first row that fails. The {function.spoilt} of such a state are NaN.",
     )

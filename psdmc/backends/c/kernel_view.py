@@ -101,8 +101,8 @@ class KernelView:
     @property
     def fails_alone(self) -> bool:
         """Whether the outputs that become NaN are one vector, as long as what must be positive."""
-        sizes = {output.size for output in self.outputs}
-        return self.positive is not None and len(self.outputs) == 1 and sizes == {self.positive.size}
+        shapes = [output.shape for output in self.outputs]
+        return self.positive is not None and shapes == [self.positive.shape]
 
     @property
     def mark_rows(self) -> str:

@@ -19,6 +19,10 @@ from psdmc.target.vectors import VectorUnit
 NARROWEST = 16
 """Bytes of the narrowest vector."""
 
+HELD = 32
+"""Values of a core's stage that may wait for its end to be put out. More of them do not fit the registers of any target:
+each is then stored as soon as it is known."""
+
 
 @dataclass(frozen=True, slots=True)
 class LimbWidth:
@@ -254,7 +258,8 @@ def _group(group: LimbGroup, stages: Sequence[Stage], suffix: str) -> GroupView:
 
 def _stage(stage: Stage, group: LimbGroup | None, suffix: str) -> StageView:
     if group is None:
-        return StageView(0, make_body(stage.program, (), {}, suffix, stores_early=False), ())
+        values = {i for slot, i in stage.program.outputs if slot.vector != CORE}
+        return StageView(0, make_body(stage.program, (), {}, suffix, stores_early=len(values) > HELD), ())
     own = {group.constant, group.kept} | {slot.vector for slot, _ in group.inputs}
     shared = frozenset(slot.vector for slot in stage.program.inputs()) - own
     body = make_body(stage.program, (), {}, suffix, stores_early=True, uniform=shared)

@@ -48,7 +48,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body
-    positive = _vector(function.positive.quantity, sizes) if function.positive else None
+    positive = _vector(function.pivots, sizes) if function.pivots else None
     return KernelView(
         name=kernel.name,
         function=function,

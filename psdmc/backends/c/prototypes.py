@@ -73,6 +73,6 @@ def friction_prototype(robot: str, real: str, by_position: bool) -> Prototype:
 
 def _returns(function: Signature, variant: Variant) -> str:
     """C's return type. A function that can fail returns which entry failed (one state), or which row (many)."""
-    if function.positive is None:
+    if not function.factorises:
         return "void"
     return "size_t" if variant.is_batch else "int"

@@ -19,7 +19,9 @@ LANES = 4
 """Angles are taken in a multiple of so many, two vectors of which hold a usual arm's: the compiler puts them in lanes."""
 
 _SUM, _PRODUCT, _SIGN, _ATOM = range(4)
-WRITTEN = frozenset({Op.LOAD, Op.CONST, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT, Op.SIN, Op.COS})
+WRITTEN = frozenset(
+    {Op.LOAD, Op.CONST, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT, Op.SELECT, Op.SIN, Op.COS}
+)
 """Operations that the crate has."""
 _SYMBOL = {Op.ADD: ("+", _SUM), Op.SUB: ("-", _SUM), Op.MUL: ("*", _PRODUCT), Op.DIV: ("/", _PRODUCT)}
 

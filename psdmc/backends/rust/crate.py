@@ -18,7 +18,7 @@ from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Quantity, Sizes
 
-LOCAL = re.compile(r"t\d+|(sin|cos)_\d+|entry|fma|sqrt|sin_cos")
+LOCAL = re.compile(r"t\d+|(sin|cos)_\d+|entry|fma|select|sqrt|sin_cos")
 """Names of a body's own; no quantity may have one."""
 
 ARRAYS = """Arrays: matrices are arrays of rows. Quaternions, and cosine and sine of an angle, are of length one."""
@@ -158,7 +158,7 @@ def _checks(given: Emission, robot: str) -> Iterator[Check]:
         names = [(given_name(q.name, kernel.theta).upper(), q.axes) for q in signature.inputs]
         words = [f"{'&' if axes else ''}{name}[k]" for name, axes in names]
         words += ["&THETA_B"] if kernel.theta else []
-        call = f"{robot}::{kernel.name}({', '.join(words)}){'.unwrap()' if signature.positive else ''}"
+        call = f"{robot}::{kernel.name}({', '.join(words)}){'.unwrap()' if signature.factorises else ''}"
         for k, output in enumerate(signature.outputs):
             label = signature.label(output, kernel.theta)
             rows = sizes.shape(output.axes)[0] if compared_by_row(output) else 1
@@ -197,8 +197,8 @@ def _kernel(kernel: Kernel, info: PackageInfo) -> KernelText:
         for each in zip(*((array(shapes[q.name]), variable(q.name)) for q in signature.outputs), strict=True)
     )
     positive = pivots = ""
-    if signature.positive:
-        positive, returns = signature.positive.quantity.name, f"Result<{returns}, crate::NotPositive>"
+    if signature.pivots:
+        positive, returns = signature.pivots.name, f"Result<{returns}, crate::NotPositive>"
         slots = [slot for slot, _ in kernel.single.outputs if slot.vector == positive]
         pivots = ", ".join(f"({slot.index}, {place(slot, shapes)})" for slot in slots)
     lines = statements(kernel.single, shapes, signature.stored)

@@ -54,7 +54,7 @@ def lower_expanded(
 
     The order of rows, and whether parameters enter before or after equal parts are found, are chosen by cost, the same
     on every machine. Raises InputError where the model has no E and P, or its base parameters are needed and unknown;
-    SingularMassMatrix where the mass matrix cannot be inverted for any q.
+    SingularMatrix where the mass matrix cannot be inverted for any q.
     """
     if recipe.polynomials is None or (theta and not recipe.signature.theta):
         raise ValueError(f"the expanded lowering does not make {recipe.name}{'_theta' * theta}")

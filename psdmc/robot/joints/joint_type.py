@@ -176,6 +176,11 @@ class JointType:
         return tuple(0 if any(angular) else 1 for _, angular in self.twists)
 
     @property
+    def has_length(self) -> bool:
+        """Whether the type itself contains a length in m, such as the pitch of a screw."""
+        return any(any(linear) and any(angular) for linear, angular in self.twists)
+
+    @property
     def comes_round(self) -> bool:
         """Whether q and q plus a whole turn are the same position."""
         return self.basis.has_sincos and not any(power for power, _, _ in self.basis.exponents)

@@ -12,10 +12,11 @@ from small import kernel, pendulum_info
 
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.options import EmitOptions
+from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Program
 from psdmc.program.regions import Call, Column, For, Region, Regions, Slice, run, straight
-from psdmc.program.signature import Positive, Quantity, Signature
+from psdmc.program.signature import Quantity, Signature
 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-pedantic", "-Werror"]
 NOTHING = Program((), ())
@@ -27,8 +28,10 @@ def package(
     quantities = [
         tuple(Quantity(name, (str(size),)) for name, size in each.items()) for each in (inputs, outputs)
     ]
-    positive = Positive(Quantity("pivot", (str(pivots),)), "which", "c") if pivots else None
-    function = Signature("trial", 1000, "regions", *quantities, theta=False, positive=positive)
+    matrix = SymmetricMatrix("any", Structure.DENSE, (str(pivots),), "which", "it fails")
+    function = Signature(
+        "trial", 1000, "regions", *quantities, theta=False, factorises=(matrix,) if pivots else ()
+    )
     kernels = {
         "forward_dynamics": kernel("forward_dynamics", CALLED),
         "trial": Kernel(function, False, NOTHING, NOTHING, "factored", regions=body),

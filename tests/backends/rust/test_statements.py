@@ -28,6 +28,7 @@ def run(lines: list[str], **given: object) -> dict[str, object]:
     names = {
         **given,
         "fma": lambda a, b, c: a * b + c,
+        "select": lambda a, b, x, y: x if a < b else y,
         "sqrt": math.sqrt,
         "sin_cos": lambda x: ([math.sin(each) for each in x], [math.cos(each) for each in x]),
     }

@@ -1,0 +1,66 @@
+"""The symmetric matrices that functions factorise: how their entries lie, what a pivot that is not positive means, and what
+the caller learns then.
+
+A matrix A = L^T D L is positive definite if all pivots, the entries of D, are positive. C returns the number of the first
+pivot that is not; Python gives NaN or an error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+
+class Structure(StrEnum):
+    """How the entries of a symmetric matrix lie.
+
+    DENSE   no entry is zero at every state
+    LIMBS   limbs on a core: entries of two joints are zero if neither joint carries the other. Elimination from the last
+            row up keeps these zeros (Featherstone 2008, section 6.5)
+    BLOCKS  square blocks on the diagonal, each factorised by itself; the other entries are zero
+    """
+
+    DENSE = "dense"
+    LIMBS = "limbs on a core"
+    BLOCKS = "blocks"
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricMatrix:
+    """A symmetric matrix that must be positive definite for a function to have a result.
+
+    name       in sentences
+    structure  how its entries lie
+    axes       lengths of what must be positive: pivots, or one sign for each block
+    number     which number a pivot or sign has that is not positive, from 0, in words; C returns 1 more
+    failure    what has happened then, in Python's documentation: words that follow "If "
+    unit, powers  of these, as Quantity has them
+    error      one line that Python raises as an error, in which {axis} stands for the name of an entry of that axis (such
+               as {frames}) and {input} for a scalar input; empty: the results of such a state are NaN
+    hint       the remedy, with the error
+    """
+
+    name: str
+    structure: Structure
+    axes: tuple[str, ...]
+    number: str
+    failure: str
+    error: str = ""
+    hint: str = ""
+    unit: str = "1"
+    powers: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.axes or (len(self.axes) > 1 and self.structure is not Structure.BLOCKS):
+            raise ValueError(f"{self.name}: {self.structure} with axes {self.axes}")
+
+    def in_blocks(self, count: str, number: str, failure: str) -> SymmetricMatrix:
+        """So many of this matrix, one after the other."""
+        return replace(
+            self,
+            structure=Structure.BLOCKS,
+            axes=(count, *self.axes),
+            powers=(0, *self.powers) if self.powers else (),
+            number=number,
+            failure=failure,
+        )

@@ -1,0 +1,63 @@
+"""Sums over limbs in a trace that records one limb of each group for all of them, and which values differ between limbs.
+
+A sum is an input of the trace, as `limb_stages` wants it: nothing but this says what it is the sum of.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from psdmc.program.lanes import Lanes
+from psdmc.program.limb_program import LimbGroup
+from psdmc.program.program import Op, Slot
+from psdmc.program.trace import Constant, Symbol, Tracer, arguments_of, constants_of
+
+CORE = -1
+"""In the place of a group's number, for what is the same for all limbs."""
+
+
+class LimbSums:
+    """The sums of one trace. Its tracer knows them from now on.
+
+    partials  of each group, the index of a value to the number of its sum
+    summed    the index of a sum to that of its value
+    """
+
+    def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
+        self.tracer, self.counts = tracer, counts
+        self.partials: list[dict[int, int]] = [{} for _ in counts]
+        self.summed: dict[int, int] = {}
+        self._names = [LimbGroup(number, count, (), (), ()).sum for number, count in enumerate(counts)]
+        self._owners = {constants_of(number): number for number in range(len(counts))}
+        self._groups: list[int] = []
+        tracer.limb_sums = self
+
+    def add_input(self, vector: str, group: int) -> None:
+        """Count the entries of a vector among what differs between a group's limbs."""
+        self._owners[vector] = group
+
+    def group_of(self, index: int) -> int:
+        """The number of the group whose limbs a value differs between; CORE: of none."""
+        groups, steps = self._groups, self.tracer.steps
+        for k in range(len(groups), index + 1):
+            op, a, b = steps[k]
+            if b is not None:
+                groups.append(max(groups[a], groups[b]))
+            elif op is Op.LOAD:
+                groups.append(self._owners.get(a.vector, CORE))
+            else:
+                groups.append(max((groups[each] for each in arguments_of(steps[k])), default=CORE))
+        return groups[index]
+
+    def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
+        """The sum over a group's limbs of a scalar that is one for each of them."""
+        if isinstance(value, Lanes):
+            return math.fsum(value.values)
+        if not isinstance(value, Symbol) or self.group_of(value.index) != group:
+            return value * self.counts[group]
+        numbers = self.partials[group]
+        number = numbers.setdefault(value.index, len(numbers))
+        found = self.tracer.symbol(Slot(self._names[group], number))
+        self.summed[found.index] = value.index
+        return -found if value.negative else found

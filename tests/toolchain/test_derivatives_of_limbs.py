@@ -1,0 +1,148 @@
+"""Derivatives of robots with limbs, compiled, against Pinocchio: one state, rows, lanes and parameters at run time."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from direct import Direct, shared_library
+from limbed import SHAPES, limbed
+from lowered import lowered
+from random_trees import RandomTree
+from slow_cases import slow_but_for
+
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
+from psdmc.derivation.derive import derive_model
+from psdmc.functions import RECIPES
+from psdmc.model.random_states import states_of
+from psdmc.program.signature import Sizes
+from psdmc.robot.mechanism import Placement
+from psdmc.robot.reference import Reference
+
+FUNCTIONS = (
+    "gravity_derivatives",
+    "inverse_dynamics_derivatives",
+    "inverse_dynamics_vjp",
+    "inverse_dynamics_jvp",
+)
+COUNT = 11
+"""States: no whole number of vectors."""
+
+EXACT = {"float64": 1e-12, "float32": 2e-4}
+"""Of an output's largest entry."""
+
+
+def almost_equal_legs() -> RandomTree:
+    """Four legs that differ by a billionth: numbers of limbs that are nearly one number stay a number for each."""
+    tree = limbed(1, *SHAPES["four legs of a floating body"])
+    rng = np.random.default_rng(5)
+    for joint in range(4, tree.n):
+        like = 1 + (joint - 1) % 3
+        place, near = tree.places[like], 1.0 + 1e-9 * rng.uniform(-1.0, 1.0, 13)
+        tree.places[joint] = Placement(place.rotation, place.translation * near[:3])
+        tree.parameters[joint] = tree.parameters[like] * near[3:]
+    tree.model, tree.joints = tree._pinocchio()
+    tree.data = tree.model.createData()
+    return tree
+
+
+TREES: dict[str, Callable[[], RandomTree]] = {
+    **{name: lambda name=name: limbed(1, *SHAPES[name]) for name in SHAPES},  # type: ignore[misc]
+    "almost equal legs": almost_equal_legs,
+    "legs of three, two and one joint": lambda: limbed(
+        2, "F", [(0, "RRR", 2), (0, "RR", 1), (0, "RP", 2), (0, "R", 1)]
+    ),
+    "a hand on an arm on a quadruped": lambda: limbed(3, "FRR", [(2, "RR", 3), (0, "RRR", 4)]),
+    "limbs on a spherical joint": lambda: limbed(4, "S", [(0, "RP", 3)]),
+}
+EQUAL, UNEQUAL = "four legs of a floating body", "legs of three, two and one joint"
+CASES = [
+    *((name, "float64", "gcc") for name in TREES),
+    *((name, "float32", "gcc") for name in TREES),
+    *((name, "float64", "clang") for name in TREES),
+]
+QUICK = [
+    (EQUAL, "float64", "gcc"),
+    (UNEQUAL, "float64", "clang"),
+    ("three fingers on a wrist", "float32", "gcc"),
+]
+
+
+@pytest.mark.parametrize(("name", "real", "compiler"), slow_but_for(QUICK, CASES, spread=True))
+def test_derivatives_are_pinocchios_in_every_layout(
+    name: str, real: str, compiler: str, tmp_path: Path
+) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    tree = TREES[name]()
+    model = derive_model(tree.mechanism(), expand=False)
+    kernels = lowered(model, "factored", FUNCTIONS)
+    assert any(kernels[function].limbs for function in FUNCTIONS)
+    package = package_view(package_info(model), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
+    compiled = Direct(package, shared_library(package, tmp_path, ["-O0", "-march=native"], compiler))
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    given = _states(tree, sizes, real)
+    assert tree.order == list(range(sizes.nv))
+    tree.model.addFrame(pin.Frame("tip", 1, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    oracle = Reference(tree.model, "tip")
+    theta_b = np.asarray(model.theta_b, real)
+
+    for function in FUNCTIONS:
+        expected = RECIPES[function].pinocchio(oracle, {k: v.astype(float) for k, v in given.items()})
+        for way, found in _every_layout(compiled, package, function, given, sizes, theta_b):
+            for block, values in expected.items():
+                error = np.abs(found[block].reshape(values.shape) - values).max()
+                assert error <= EXACT[real] * np.abs(values).max(), (function, way, block)
+
+
+def _states(tree: RandomTree, sizes: Sizes, real: str) -> dict[str, np.ndarray]:
+    q, qd, qdd = states_of(tree.mechanism(), np.random.default_rng(9), COUNT)
+    along = np.random.default_rng(10).uniform(-1.0, 1.0, (4, COUNT, sizes.nv))
+    given = {"q": q, "qd": qd, "qdd": qdd} | dict(zip(("cotangent", "dq", "dqd", "dqdd"), along, strict=True))
+    return {name: np.ascontiguousarray(rows, real) for name, rows in given.items()}
+
+
+def _every_layout(
+    compiled: Direct,
+    package: PackageView,
+    function: str,
+    given: dict[str, np.ndarray],
+    sizes: Sizes,
+    theta_b: np.ndarray,
+) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """What one state after the other, rows and lanes give, baked and with theta_b."""
+    signature = RECIPES[function].signature
+    inputs = [given[quantity.name] for quantity in signature.inputs]
+    found = []
+    for variant, theta in (("", []), ("_theta", [theta_b])):
+        one, rows = ({q.name: _empty(sizes.size(q), theta_b) for q in signature.outputs} for _ in range(2))
+        for k in range(COUNT):
+            state = [array[k].copy() for array in inputs]
+            compiled(f"{function}{variant}", *state, *theta, *(values[k] for values in one.values()))
+        compiled(f"{function}{variant}_batch", COUNT, *inputs, *theta, *rows.values())
+        found += [(f"one state{variant}", one), (f"rows{variant}", rows)]
+    lanes = {q.name: _in_lanes(_empty(sizes.size(q), theta_b), package.lanes) for q in signature.outputs}
+    laid = [_in_lanes(array, package.lanes) for array in inputs]
+    compiled(f"{function}_batch_soa", COUNT, *laid, *lanes.values())
+    by_lane = {
+        name: block.transpose(0, 2, 1).reshape(-1, block.shape[1])[:COUNT] for name, block in lanes.items()
+    }
+    found.append(("lanes", by_lane))
+    return found
+
+
+def _empty(size: int, like: np.ndarray) -> np.ndarray:
+    return np.full((COUNT, size), np.nan, like.dtype)
+
+
+def _in_lanes(rows: np.ndarray, lanes: int) -> np.ndarray:
+    blocks = -(-COUNT // lanes)
+    padded = np.zeros((blocks * lanes, rows.shape[1]), rows.dtype)
+    padded[:COUNT] = rows
+    return np.ascontiguousarray(padded.reshape(blocks, lanes, -1).transpose(0, 2, 1))
