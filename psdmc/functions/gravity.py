@@ -31,21 +31,17 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     return {"g": robot.gravity(given["q"])}
 
 
+G = Quantity(
+    "g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints", unit="J", powers=(-1,)
+)
+
 RECIPE = Recipe(
     Signature(
         "gravity",
         60,
         "gravity torques g(q), which hold the robot still",
         (Q,),
-        (
-            Quantity(
-                "g",
-                ("nv",),
-                means="gravity torques (N m), or forces (N) of sliding joints",
-                unit="J",
-                powers=(-1,),
-            ),
-        ),
+        (G,),
         theta=True,
         summary="Compute the gravity torques g(q): the torques that keep the robot at rest.",
     ),

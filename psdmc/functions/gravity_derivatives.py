@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
-from psdmc.program.signature import Q, Quantity, Signature, jacobian_of
+from psdmc.functions.gravity import G
+from psdmc.program.signature import Q, Signature, jacobian_of
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -51,13 +52,7 @@ RECIPE = Recipe(
         "gravity torques g(q), and d g / d q; row i: derivatives of g[i]",
         (Q,),
         (
-            Quantity(
-                "g",
-                ("nv",),
-                means="gravity torques (N m), or forces (N) of sliding joints",
-                unit="J",
-                powers=(-1,),
-            ),
+            G,
             jacobian_of("g", "q"),
         ),
         theta=True,
