@@ -30,7 +30,7 @@ def calibrate(
     model, even if the verdict is "not usable".
 
     model              a model, or the path of a model file
-    logs               paths of the logs, or the path of a log description (TOML)
+    logs               paths of the logs, of a log description (TOML), or of a campaign folder that `psdmc excite` wrote
     options            filter and friction law of the fit; None: those of the log description, or the defaults
     torque_constants   N m/A at the joint (after the gear) by joint name, for logs of motor currents. With `loaded`,
                        psdmc finds the constants of all joints that feel the load; give only those of the other joints

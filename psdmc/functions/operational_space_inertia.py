@@ -37,8 +37,8 @@ SEEN_BY_FRAMES = SymmetricMatrix(
     Structure.BLOCKS,
     ("frames",),
     number="the number, from 0, of the named frame at which J M^-1 J^T + mu I is not positive definite",
-    failure="J M^-1 J^T + mu I of a frame is not positive definite, as with mu = 0 if the frame cannot move in all six "
-    "directions,",
+    failure="J M^-1 J^T + mu I of a frame is not positive definite (for example, if mu = 0 and the frame cannot move in "
+    "all six directions)",
     error="frame {frames!r}: J M^-1 J^T + mu I is not positive definite at mu = {mu:g}",
     hint="give mu > 0, such as 1e-3, or a pose in which the frame can move in all six directions",
 )

@@ -77,12 +77,12 @@ def documentation(function: Signature) -> str:
     return "\n\n".join([function.summary, _rows(given), returned, _rows(made), footer])
 
 
-_STATES = "For many states, the axes (...) count the states; for one state, there are no such axes."
+_STATES = "The dots (...) in a shape are axes that count states; arrays of one state do not have them."
 _SIZES = {
     "nq": "nq is the length of q, which is the number of joints if every joint has one coordinate.",
     "nv": "nv is the number of joint rates.",
-    "nx": "nx is 2 nv: the first nv rows or columns are for q, the last nv for qd. A quaternion in q has three of them, "
-    "for a small rotation as a rotation vector.",
+    "nx": "nx is 2 nv: the first nv rows or columns are for q, the last nv for qd. A quaternion in q has three rows or "
+    "columns, for a small rotation as a rotation vector.",
     "l": "l is the number of base parameters.",
     "frames": "frames is the number of named frames.",
     "nonzeros": "nonzeros is the number of entries that can differ from zero.",
