@@ -38,7 +38,8 @@ def calibrate(
                        validation logs, psdmc tests the fit with the last part of each log
     loaded             logs of motor currents that were recorded with a known load. From `logs` and `loaded`, psdmc finds
                        torque constants
-    load               the load of `loaded`: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
+    load               the known load of the logs `loaded`, as four numbers: mass (kg), and x, y, z of the centre of mass (m,
+                       in the tip frame). Instead, you can give the path of a load file that `psdmc payload` wrote
 
     Raises InputError if a file is missing or if psdmc cannot use a log.
     """

@@ -116,8 +116,8 @@ RECIPE = Recipe(
             Quantity(
                 "Lambda",
                 ("frames", "6", "6"),
-                means="symmetric matrix of each frame: kg, kg m, kg m^2; three linear, then three angular axes, "
-                "of the base frame",
+                means="symmetric matrix of each frame, along the axes of the base frame: three linear rows and "
+                "columns, then three angular ones; kg, kg m and kg m^2",
                 unit="kg m^2",
                 powers=(0, -1, -1),
             ),

@@ -166,7 +166,7 @@ class DynamicsModel(Answers):
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Return the l indices of the base parameters' pivots among the 11n standard parameters.
+        """Return, for each of the l base parameters, the index of its pivot among the 11n standard parameters.
 
         The pivot of a base parameter is the first standard parameter that this base parameter contains with factor one and
         that no other base parameter contains.
@@ -391,9 +391,11 @@ class DynamicsModel(Answers):
             joint    name of the joint, or its number: 0 is the first joint
             numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1 and qdd1 are for joint 0. Raises InputError if the robot has no such joint, or if the torque
-        has more than 2,000 monomials. Raises InputError also if the model has no monomials, for example because it was
-        derived with `expand=False`. Raises ToolchainError if SymPy is missing.
+        The names of the symbols count joints from 1, so q1, qd1 and qdd1 belong to the first joint.
+
+        Raises InputError if the robot has no such joint, or if the torque has more than 2,000 monomials. Raises InputError
+        also if the model has no monomials, for example because it was derived with `expand=False`. Raises ToolchainError
+        if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
@@ -402,7 +404,7 @@ class DynamicsModel(Answers):
     def content_hash(self) -> str:
         """Return the SHA-256 hash of the model as 64 hexadecimal digits. Equal models have equal hashes.
 
-        psdmc computes the hash from the arrays and the manifest that `save` writes into the model file.
+        psdmc computes the hash from the content of the model file: the arrays and the manifest (a JSON text).
         """
         return store.content_hash(self)
 
