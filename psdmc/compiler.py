@@ -153,7 +153,7 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   how psdmc generates the arithmetic. With "expanded", the code sums monomials, by the model's matrices E and P.
+    lowering   how psdmc generates the arithmetic. With "expanded", the code sums the monomials of the model (E and P).
                With "factored", the code is a recursion over the links. "auto" selects the code with fewer operations
     functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
