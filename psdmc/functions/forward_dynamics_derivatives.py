@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.arrow import any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
-from psdmc.program.signature import QD, QDD, TAU, Q, Signature, jacobian_of
+from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_of
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -27,6 +28,8 @@ def trace(g: Ingredients) -> Outputs:
     M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd. Both blocks
     are multiplied by M^-1 behind the trace; that by qd comes first, so that its entries need not wait.
     """
+    if any_limbs(g.frames):
+        return _in_limbs(g)
     at_rest = _torque_derivatives(g, g.still)
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
@@ -41,6 +44,25 @@ def trace(g: Ingredients) -> Outputs:
         "dtau_dq": list(zip(*moving.by_q, strict=True)),
         "dqdd_dtau": by_tau,
         "pivot": factors.pivots,
+    }
+
+
+def _in_limbs(g: Ingredients) -> Outputs:
+    """The same by thin factors: - M^-1 D, and M^-1 itself as - M^-1 times minus the identity."""
+    at_rest = _torque_derivatives(g, g.still)
+    arrow = eliminated(g.frames, at_rest.by_qdd)
+    load = [tau - own for tau, own in zip(g.inputs["tau"], at_rest.gravity, strict=True)]
+    accelerations = arrow.solved(load, at_rest.by_qd, [0.5 * rate for rate in g.inputs["qd"]])
+    moving = _torque_derivatives(g, accelerations)
+    n = len(load)
+    minus_one = [[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
+    return {
+        "qdd": accelerations,
+        "dqdd_dq": arrow.thin(moving.by_q),
+        "dqdd_dqd": arrow.thin(at_rest.by_qd),
+        "dqdd_dtau": arrow.thin(minus_one),
+        "pivot": arrow.pivots,
+        THIN: arrow.factors,
     }
 
 
@@ -89,6 +111,7 @@ RECIPE = Recipe(
         summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
         factorises=(MASS_MATRIX,),
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
+        thin=("dqdd_dq", "dqdd_dqd", "dqdd_dtau"),
     ),
     "derivatives of forward dynamics",
     trace,
@@ -96,5 +119,6 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     benched=True,
 )

@@ -103,8 +103,9 @@ def test_derivatives_are_pinocchios_in_every_layout(
 
 def _states(tree: RandomTree, sizes: Sizes, real: str) -> dict[str, np.ndarray]:
     q, qd, qdd = states_of(tree.mechanism(), np.random.default_rng(9), COUNT)
-    along = np.random.default_rng(10).uniform(-1.0, 1.0, (4, COUNT, sizes.nv))
-    given = {"q": q, "qd": qd, "qdd": qdd} | dict(zip(("cotangent", "dq", "dqd", "dqdd"), along, strict=True))
+    along = np.random.default_rng(10).uniform(-1.0, 1.0, (6, COUNT, sizes.nv))
+    names = ("cotangent", "dq", "dqd", "dqdd", "dtau", "tau")
+    given = {"q": q, "qd": qd, "qdd": qdd} | dict(zip(names, along, strict=True))
     return {name: np.ascontiguousarray(rows, real) for name, rows in given.items()}
 
 
