@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.arrow import any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
+from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
 from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_of
+from psdmc.program.thin_products import Thin
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -56,14 +58,38 @@ def _in_limbs(g: Ingredients) -> Outputs:
     moving = _torque_derivatives(g, accelerations)
     n = len(load)
     minus_one = [[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
+    by_q, by_qd = moving.by_q, at_rest.by_qd
+    if not has_free_root(g.frames):
+        by_q, by_qd = arrow.thin(by_q), arrow.thin(by_qd)
+    else:
+        known = known_derivatives(g.frames, g.inputs["q"], g.inputs["qd"], g.base_acceleration)
+        by_q, by_qd = (
+            _with_block(arrow.thin(_without_columns(matrix, count)), block, count - 3)
+            for matrix, block, count in zip((by_q, by_qd), known, (KNOWN_BY_Q, KNOWN_BY_QD), strict=True)
+        )
     return {
         "qdd": accelerations,
-        "dqdd_dq": arrow.thin(moving.by_q),
-        "dqdd_dqd": arrow.thin(at_rest.by_qd),
+        "dqdd_dq": by_q,
+        "dqdd_dqd": by_qd,
         "dqdd_dtau": arrow.thin(minus_one),
         "pivot": arrow.pivots,
         THIN: arrow.factors,
     }
+
+
+def _without_columns(matrix: Sequence[Sequence[Scalar]], count: int) -> list[list[Scalar]]:
+    """The matrix, with zeros in its first columns."""
+    return [[0.0] * count + list(row[count:]) for row in matrix]
+
+
+def _with_block(
+    matrix: Sequence[Sequence[Scalar]], block: Sequence[Sequence[Scalar]], column: int
+) -> list[list[Scalar]]:
+    """The matrix, with a block in its first rows."""
+    found = [list(row) for row in matrix]
+    for row, values in zip(found, block, strict=False):
+        row[column : column + len(values)] = values
+    return found
 
 
 def multiplied(g: Ingredients) -> Outputs:
@@ -111,7 +137,7 @@ RECIPE = Recipe(
         summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
         factorises=(MASS_MATRIX,),
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
-        thin=("dqdd_dq", "dqdd_dqd", "dqdd_dtau"),
+        thin=(Thin("dqdd_dq", KNOWN_BY_Q), Thin("dqdd_dqd", KNOWN_BY_QD), Thin("dqdd_dtau")),
     ),
     "derivatives of forward dynamics",
     trace,

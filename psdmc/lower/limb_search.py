@@ -114,7 +114,7 @@ class LimbSearch:
     def lowered(self, found: LimbArrangement, straight: Program) -> LimbProgram | None:
         """The function so arranged; None where no width makes it worth while against the straight line."""
         limbs = self._ordered(self._traced(found.arrangement, found.groups))
-        if limbs.products is not None and limbs.products.n < AT_ONCE:
+        if limbs.products is not None and limbs.products.narrowest < AT_ONCE:
             return None
         limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
         paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]

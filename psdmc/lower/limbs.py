@@ -8,6 +8,7 @@ from functools import partial
 from itertools import accumulate, product
 
 from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.free_root import has_free_root
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
@@ -18,7 +19,7 @@ from psdmc.program.limb_program import LimbGroup, Spread
 from psdmc.program.limb_sums import LimbSums
 from psdmc.program.program import Program, Slot
 from psdmc.program.signature import THIN, Quantity
-from psdmc.program.thin_products import ThinProducts, Shares
+from psdmc.program.thin_products import Shares, ThinProducts
 from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
 from psdmc.robot.limbs import Limbs
@@ -74,7 +75,11 @@ class _Trace:
         self, recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
     ) -> None:
         self.signature = recipe.signature.of_limbs
-        self.recipe, self.arrangement, self.robot = replace(recipe, signature=self.signature), arrangement, robot
+        self.recipe, self.arrangement, self.robot = (
+            replace(recipe, signature=self.signature),
+            arrangement,
+            robot,
+        )
         self.products: ThinProducts | None = None
         self.tracer = Tracer()
         self.groups = [_Group(number, len(limbs)) for number, limbs in enumerate(groups)]
@@ -185,7 +190,14 @@ class _Trace:
             whole = tuple(entries[row][1][limb] for limb in range(group.count) for row in rows)
             groups.append(Shares(f"{group.vectors.name}_shares", whole, tuple(used)))
         own = tuple(entries[k][1][0] for k in core)
-        return ThinProducts(self.recipe.signature.thin, self.first["nv"][-1], own, tuple(groups))
+        thin, is_free = self.recipe.signature.thin, has_free_root(self.reframed.frames)
+        return ThinProducts(
+            tuple(each.name for each in thin),
+            tuple(each.known if is_free else 0 for each in thin),
+            self.first["nv"][-1],
+            own,
+            tuple(groups),
+        )
 
     def _flat(self, quantity: Quantity, indices: Sequence[int]) -> int:
         flat = 0

@@ -137,7 +137,9 @@ def _products_from_plain(plain: Any) -> ThinProducts | None:
     if plain is None:
         return None
     groups = tuple(Shares(g["vector"], tuple(g["rows"]), tuple(g["carriers"])) for g in plain["groups"])
-    return ThinProducts(tuple(plain["outputs"]), plain["n"], tuple(plain["core"]), groups)
+    return ThinProducts(
+        tuple(plain["outputs"]), tuple(plain["known"]), plain["n"], tuple(plain["core"]), groups
+    )
 
 
 def _spread(plain: Any) -> tuple[Spread, ...]:

@@ -13,6 +13,7 @@ from psdmc.errors import InternalError
 from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
 from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
+from psdmc.program.thin_products import Thin
 
 WORDS = ("n", "nq", "nv", "nx", "l", "frames", "nonzeros")
 """Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames; and, of
@@ -149,7 +150,7 @@ class Signature:
     theta: bool
     factorises: tuple[SymmetricMatrix, ...] = ()
     products: tuple[Product, ...] = ()
-    thin: tuple[str, ...] = ()
+    thin: tuple[Thin, ...] = ()
     calls: str | None = None
     normalizes: bool = False
     summary: str = ""

@@ -22,6 +22,18 @@ INVERSE = "core_inverse"
 
 
 @dataclass(frozen=True, slots=True)
+class Thin:
+    """A function's output that a trace with limbs gives as factors.
+
+    name   of the output
+    known  its first columns, which the trace gives themselves where a free joint carries the whole robot
+    """
+
+    name: str
+    known: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Shares:
     """Limbs of a group.
 
@@ -45,13 +57,15 @@ class ThinProducts:
     """Outputs n x n whose rows of the core are x = - V E, and whose rows of a limb are Y - T x. Stages store V, T and E, and Y
     in the outputs themselves.
 
-    outputs  their names
+    outputs  their names, and
+    known    how many of their first columns stages store themselves
     n        rows, and columns
     core     rows of the core
     groups   of limbs
     """
 
     outputs: tuple[str, ...]
+    known: tuple[int, ...]
     n: int
     core: tuple[int, ...]
     groups: tuple[Shares, ...]
@@ -69,17 +83,24 @@ class ThinProducts:
         return found | {self.right(output): wide * self.n for output in self.outputs}
 
     @property
+    def narrowest(self) -> int:
+        """The least number of columns of an output that are computed here."""
+        return self.n - max(self.known)
+
+    @property
     def written(self) -> set[Slot]:
-        """The outputs' rows of the core."""
-        n = self.n
-        return {
-            Slot(output, row * n + k) for output in self.outputs for row in self.core for k in range(n)
-        }
+        """The outputs' rows of the core, and entries of E that are not read."""
+        wide, n = len(self.core), self.n
+        found: set[Slot] = set()
+        for output, known in zip(self.outputs, self.known, strict=True):
+            found |= {Slot(output, row * n + k) for row in self.core for k in range(known, n)}
+            found |= {Slot(self.right(output), row * n + k) for row in range(wide) for k in range(known)}
+        return found
 
     @property
     def cost(self) -> Cost:
         """Operations on AT_ONCE columns: a multiply-add for each entry of V and T but the first of each row of V."""
-        blocks = len(self.outputs) * -(-self.n // AT_ONCE)
+        blocks = sum(-(-(self.n - known) // AT_ONCE) for known in self.known)
         mul = blocks * (len(self.core) ** 2 + sum(group.size for group in self.groups))
         add = mul - blocks * len(self.core)
         return Cost(mul, add, div=0, neg=0, sincos=0, fused=add)
@@ -87,7 +108,8 @@ class ThinProducts:
     def place(self, slot: Slot, factors: str) -> Slot:
         """Where an entry of a trace's outputs is stored; `factors`: the name of V and T there."""
         row, column = divmod(slot.index, self.n)
-        if slot.vector in self.outputs and row in self.core:
+        known = dict(zip(self.outputs, self.known, strict=True)).get(slot.vector, self.n)
+        if row in self.core and column >= known:
             return Slot(self.right(slot.vector), self.core.index(row) * self.n + column)
         if slot.vector != factors:
             return slot
@@ -95,15 +117,13 @@ class ThinProducts:
         if row in self.core:
             return Slot(INVERSE, self.core.index(row) * len(self.core) + number)
         group = next(group for group in self.groups if row in group.rows)
-        return Slot(
-            group.vector, group.rows.index(row) * len(group.carriers) + group.carriers.index(number)
-        )
+        return Slot(group.vector, group.rows.index(row) * len(group.carriers) + group.carriers.index(number))
 
     def multiplied(self, stored: Mapping[Slot, Any]) -> Iterator[tuple[Slot, Any]]:
         """The outputs, entry by entry, from all that stages have stored; what they have not stored is zero."""
         n, wide = self.n, len(self.core)
-        for output in self.outputs:
-            for column in range(n):
+        for output, known in zip(self.outputs, self.known, strict=True):
+            for column in range(known, n):
                 given = [stored.get(Slot(self.right(output), c * n + column), 0.0) for c in range(wide)]
                 found = []
                 for number, row in enumerate(self.core):

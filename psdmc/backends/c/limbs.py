@@ -198,7 +198,8 @@ class ThinView:
     """Products behind limbs.
 
     arrays   names and lengths of what stages store for them
-    rights   names of E, output by output
+    rights   names of E, and
+    known    first columns that are stored already, output by output
     n        columns
     places   where the core's rows begin in an output, and
     begins   in E
@@ -208,6 +209,7 @@ class ThinView:
     arrays: tuple[tuple[str, int], ...]
     outputs: tuple[str, ...]
     rights: tuple[str, ...]
+    known: tuple[int, ...]
     n: int
     places: tuple[int, ...]
     begins: tuple[int, ...]
@@ -221,6 +223,7 @@ def _thin_view(products: ThinProducts) -> ThinView:
         tuple(products.sizes.items()),
         products.outputs,
         tuple(map(products.right, products.outputs)),
+        products.known,
         n,
         tuple(row * n for row in products.core),
         tuple(row * n for row in range(wide)),
