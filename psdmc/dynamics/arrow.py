@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.slices import first_rates
-from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, inverse
+from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, inverse, solve
 
 Matrix = Sequence[Sequence[Scalar]]
 
@@ -28,16 +28,14 @@ class Limb:
     rates     its rows
     carriers  rows of the core that have entries in common with it
     total     the sum over the group's limbs of a scalar that each of them has
-    pivots    one per rate
-    inverse   Q
+    factors   of its block
     shares    T: a row per rate, a column per carrier
     """
 
     rates: tuple[int, ...]
     carriers: tuple[int, ...]
     total: Callable[[Scalar], Scalar]
-    pivots: tuple[Scalar, ...]
-    inverse: Matrix
+    factors: Factors
     shares: Matrix
 
     def reduced(self, right: Sequence[Scalar]) -> list[Scalar]:
@@ -45,8 +43,8 @@ class Limb:
         own, found = [right[k] for k in self.rates], list(right)
         for k, column in zip(self.carriers, zip(*self.shares, strict=True), strict=True):
             found[k] = found[k] - inner_product(column, own)
-        for k, row in zip(self.rates, self.inverse, strict=True):
-            found[k] = inner_product(row, own)
+        for k, value in zip(self.rates, solve(self.factors, own), strict=True):
+            found[k] = value
         return found
 
 
@@ -56,13 +54,13 @@ class Arrow:
 
     core     rows of the core
     limbs    one of each group
-    inverse  V
+    factors  of the inverse of V
     pivots   of all rows
     """
 
     core: tuple[int, ...]
     limbs: tuple[Limb, ...]
-    inverse: Matrix
+    factors: Factors
     pivots: tuple[Scalar, ...]
 
     def solved(
@@ -71,8 +69,8 @@ class Arrow:
         """x of M x = right, or of M x = right - matrix vector, where no two limbs have common entries in the matrix."""
         found = self._reduced(right) if matrix is None else self._reduced_by(right, matrix, vector)
         above = [found[k] for k in self.core]
-        for k, row in zip(self.core, self.inverse, strict=True):
-            found[k] = inner_product(row, above)
+        for k, value in zip(self.core, solve(self.factors, above), strict=True):
+            found[k] = value
         for limb in self.limbs:
             given = [found[k] for k in limb.carriers]
             for k, shares in zip(limb.rates, limb.shares, strict=True):
@@ -127,11 +125,11 @@ class Arrow:
         return [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
 
     @property
-    def factors(self) -> list[list[Scalar]]:
+    def thin_factors(self) -> list[list[Scalar]]:
         """V in the rows of the core, T in those of limbs, both in the columns of the core."""
         n = len(self.pivots)
         found: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
-        for k, row in zip(self.core, self.inverse, strict=True):
+        for k, row in zip(self.core, inverse(self.factors), strict=True):
             for j, value in zip(self.core, row, strict=True):
                 found[k][j] = value
         for limb in self.limbs:
@@ -152,12 +150,12 @@ def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
         for i, row in zip(limb.carriers, _lower(limb, matrix), strict=True):
             for j, value in zip(limb.carriers, row, strict=False):
                 rest[i, j] = rest[i, j] - limb.total(value)
-        for k, pivot in zip(limb.rates, limb.pivots, strict=True):
+        for k, pivot in zip(limb.rates, limb.factors.pivots, strict=True):
             pivots[k] = pivot
     factors = _factorized(core, [[rest[max(i, j), min(i, j)] for j in core] for i in core])
     for k, pivot in zip(core, factors.pivots, strict=True):
         pivots[k] = pivot
-    return Arrow(core, tuple(limbs), inverse(factors), tuple(pivots))
+    return Arrow(core, tuple(limbs), factors, tuple(pivots))
 
 
 def _lower(limb: Limb, matrix: Matrix) -> list[list[Scalar]]:
@@ -173,10 +171,10 @@ def _eliminated(
     rates: tuple[int, ...], total: Callable[[Scalar], Scalar], core: Sequence[int], matrix: Matrix
 ) -> Limb:
     factors = _factorized(rates, [[matrix[i][j] for j in rates] for i in rates])
-    own = inverse(factors)
     carriers = tuple(c for c in core if any(not _is_zero(matrix[k][c]) for k in rates))
-    shares = [[inner_product(row, [matrix[k][c] for k in rates]) for c in carriers] for row in own]
-    return Limb(rates, carriers, total, factors.pivots, own, shares)
+    columns = [solve(factors, [matrix[k][c] for k in rates]) for c in carriers]
+    shares = [[column[k] for column in columns] for k in range(len(rates))]
+    return Limb(rates, carriers, total, factors, shares)
 
 
 def _factorized(rates: Sequence[int], block: Matrix) -> Factors:

@@ -73,7 +73,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
         "dqdd_dqd": by_qd,
         "dqdd_dtau": arrow.thin(minus_one),
         "pivot": arrow.pivots,
-        THIN: arrow.factors,
+        THIN: arrow.thin_factors,
     }
 
 

@@ -57,11 +57,11 @@ def sizes_of(model: DynamicsModel) -> Sizes:
 
 def given_states(model: DynamicsModel, count: int = COUNT) -> dict[str, np.ndarray]:
     vectors = states_of(model.mechanism, np.random.default_rng(4), count)
-    along = np.random.default_rng(5).uniform(-1.0, 1.0, (4, *vectors[1].shape))
+    along = np.random.default_rng(5).uniform(-1.0, 1.0, (5, *vectors[1].shape))
     return (
         dict(zip(("q", "qd", "qdd"), vectors, strict=True))
         | {"tau": 3.0 * vectors[2]}
-        | dict(zip(("cotangent", "dq", "dqd", "dqdd"), along, strict=True))
+        | dict(zip(("cotangent", "dq", "dqd", "dqdd", "dtau"), along, strict=True))
     )
 
 
