@@ -109,8 +109,7 @@ class Arrow:
         return found
 
     def thin(self, matrix: Matrix) -> list[list[Scalar]]:
-        """The factors of - M^-1 D, for a matrix D without common entries of two limbs: E in the rows of the core, Y in those of
-        limbs.
+        """The factors of - M^-1 D, if no two limbs have common entries in D: E in the rows of the core, Y in those of limbs.
 
         - M^-1 D is x = - V E in the rows of the core, and Y - T x in those of a limb, Y being zero in other limbs' columns.
         """
@@ -125,6 +124,12 @@ class Arrow:
         return [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
 
     @property
+    def thin_inverse(self) -> list[list[Scalar]]:
+        """The factors of M^-1 itself."""
+        n = len(self.pivots)
+        return self.thin([[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)])
+
+    @property
     def thin_factors(self) -> list[list[Scalar]]:
         """V in the rows of the core, T in those of limbs, both in the columns of the core."""
         n = len(self.pivots)
@@ -133,15 +138,15 @@ class Arrow:
             for j, value in zip(self.core, row, strict=True):
                 found[k][j] = value
         for limb in self.limbs:
-            for k, row in zip(limb.rates, limb.shares, strict=True):
-                for j, value in zip(limb.carriers, row, strict=True):
+            for k, shares in zip(limb.rates, limb.shares, strict=True):
+                for j, value in zip(limb.carriers, shares, strict=True):
                     found[k][j] = value
         return found
 
 
 def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
-    """A symmetric matrix over the rates of these frames after elimination of their limbs. Raises SingularMatrix where a pivot
-    is a constant not above 0."""
+    """A symmetric matrix over the rates of these frames, factorized limb by limb. Raises SingularMatrix if a pivot is a
+    constant not above 0."""
     core, groups = limbs_of(frames)
     rest = {(i, j): matrix[i][j] for i in core for j in core if j <= i}
     pivots: list[Scalar] = [0.0] * len(matrix)

@@ -1,6 +1,6 @@
 """Derivatives of forward dynamics that need no dynamics: those by the motion of a free joint that carries the whole robot.
 
-Its place, its orientation and its linear rate v enter the equations of motion through one vector alone, along the moved axes:
+Its place, its orientation and its linear rate v enter the equations of motion through one vector alone, along its own axes:
 a = dv/dt + w x v + R^T up, with up = minus gravity. At equal torques, a and all other accelerations stay what they are if
 these change. Then dv/dt changes by minus the rest.
 """
@@ -26,8 +26,8 @@ def has_free_root(frames: Sequence[Frame]) -> bool:
 def known_derivatives(
     frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], up: Vector
 ) -> tuple[Matrix, Matrix]:
-    """The derivatives of the root's linear accelerations by its orientation and by its linear rates, 3 x 3 each; all others by
-    its position, its orientation and its linear rates are zero."""
+    """The derivatives of the root's linear accelerations by its orientation and by its linear rates, 3 x 3 each. Those by
+    its position, and all derivatives of other accelerations by these three, are zero."""
     root = frames[0]
     turned = outward(joint_turn(root, positions(frames, q)[0]), from_previous(root, up))
     own = rates(frames, qd)[0]

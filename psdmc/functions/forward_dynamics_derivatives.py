@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.arrow import any_limbs, eliminated
+from psdmc.dynamics.arrow import Matrix, any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
 from psdmc.dynamics.scalar import Scalar
@@ -50,41 +50,37 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def _in_limbs(g: Ingredients) -> Outputs:
-    """The same by thin factors: - M^-1 D, and M^-1 itself as - M^-1 times minus the identity."""
+    """The same by thin factors, without a product of n x n matrices."""
     at_rest = _torque_derivatives(g, g.still)
     arrow = eliminated(g.frames, at_rest.by_qdd)
     load = [tau - own for tau, own in zip(g.inputs["tau"], at_rest.gravity, strict=True)]
     accelerations = arrow.solved(load, at_rest.by_qd, [0.5 * rate for rate in g.inputs["qd"]])
     moving = _torque_derivatives(g, accelerations)
-    n = len(load)
-    minus_one = [[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
-    by_q, by_qd = moving.by_q, at_rest.by_qd
-    if not has_free_root(g.frames):
-        by_q, by_qd = arrow.thin(by_q), arrow.thin(by_qd)
-    else:
+    blocks: list[Matrix] = [moving.by_q, at_rest.by_qd]
+    if has_free_root(g.frames):
         known = known_derivatives(g.frames, g.inputs["q"], g.inputs["qd"], g.base_acceleration)
-        by_q, by_qd = (
+        thin = [
             _with_block(arrow.thin(_without_columns(matrix, count)), block, count - 3)
-            for matrix, block, count in zip((by_q, by_qd), known, (KNOWN_BY_Q, KNOWN_BY_QD), strict=True)
-        )
+            for matrix, block, count in zip(blocks, known, (KNOWN_BY_Q, KNOWN_BY_QD), strict=True)
+        ]
+    else:
+        thin = [arrow.thin(matrix) for matrix in blocks]
     return {
         "qdd": accelerations,
-        "dqdd_dq": by_q,
-        "dqdd_dqd": by_qd,
-        "dqdd_dtau": arrow.thin(minus_one),
+        "dqdd_dq": thin[0],
+        "dqdd_dqd": thin[1],
+        "dqdd_dtau": arrow.thin_inverse,
         "pivot": arrow.pivots,
         THIN: arrow.thin_factors,
     }
 
 
-def _without_columns(matrix: Sequence[Sequence[Scalar]], count: int) -> list[list[Scalar]]:
+def _without_columns(matrix: Matrix, count: int) -> list[list[Scalar]]:
     """The matrix, with zeros in its first columns."""
     return [[0.0] * count + list(row[count:]) for row in matrix]
 
 
-def _with_block(
-    matrix: Sequence[Sequence[Scalar]], block: Sequence[Sequence[Scalar]], column: int
-) -> list[list[Scalar]]:
+def _with_block(matrix: Matrix, block: Matrix, column: int) -> list[list[Scalar]]:
     """The matrix, with a block in its first rows."""
     found = [list(row) for row in matrix]
     for row, values in zip(found, block, strict=False):

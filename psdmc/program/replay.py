@@ -23,8 +23,8 @@ def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> l
 
 
 def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:
-    """Recorded values, with other values in place of some of the inputs that they are computed from. A sum over limbs becomes
-    the sum of the values that its limbs have then."""
+    """Recorded values, with other values in place of some of the inputs that they are computed from. Of a sum over limbs, the
+    values that it sums are replaced."""
     tracer = inputs[0].tracer
     if any(symbol.slot is None for symbol in inputs):
         raise InternalError("only inputs can be replaced")

@@ -1,8 +1,7 @@
 """Products with the inverse of a matrix of limbs on a core (dynamics/arrow.py), done behind a function's limb stages.
 
 Entries of an output in the rows of one limb and the columns of another belong to both. Stages cannot compute them, and need
-not: they are the limb's shares T times rows of the core, which are in memory by then. All columns, the core's and limbs', are
-neighbours there.
+not: they are the limb's shares T times rows of the core, which are in memory by then. There, all columns are neighbours.
 """
 
 from __future__ import annotations
@@ -54,8 +53,8 @@ class Shares:
 
 @dataclass(frozen=True, slots=True)
 class ThinProducts:
-    """Outputs n x n whose rows of the core are x = - V E, and whose rows of a limb are Y - T x. Stages store V, T and E, and Y
-    in the outputs themselves.
+    """Outputs n x n with x = - V E in the rows of the core, and Y - T x in those of a limb. Stages store V, T and E, and
+    store Y in the outputs.
 
     outputs  their names, and
     known    how many of their first columns stages store themselves
