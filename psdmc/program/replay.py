@@ -23,7 +23,7 @@ def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> l
 
 
 def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:
-    """Recorded values, with other values in place of some of the inputs that they are computed from. Of a sum over limbs, the
+    """Recorded values, with other values in place of some of the inputs that they are computed from. Of sums over limbs, the
     values that it sums are replaced."""
     tracer = inputs[0].tracer
     if any(symbol.slot is None for symbol in inputs):
