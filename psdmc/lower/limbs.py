@@ -74,7 +74,7 @@ class _Trace:
     def __init__(
         self, recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
     ) -> None:
-        self.signature = recipe.signature.of_limbs
+        self.signature = recipe.signature.of_limbs if groups else recipe.signature
         self.recipe, self.arrangement, self.robot = (
             replace(recipe, signature=self.signature),
             arrangement,
@@ -177,7 +177,7 @@ class _Trace:
         """What is multiplied behind the stages; None where nothing is, as the robot has no core."""
         entries = [(place, own) for place in self.places for own in self._entries(place, "nv")]
         core = [k for k, (place, _) in enumerate(entries) if place.group is None]
-        if not self.recipe.signature.thin or not core:
+        if not self.groups or not self.signature.thin or not core:
             return None
         groups = []
         for group in self.groups:
@@ -190,7 +190,7 @@ class _Trace:
             whole = tuple(entries[row][1][limb] for limb in range(group.count) for row in rows)
             groups.append(Shares(f"{group.vectors.name}_shares", whole, tuple(used)))
         own = tuple(entries[k][1][0] for k in core)
-        thin, is_free = self.recipe.signature.thin, has_free_root(self.reframed.frames)
+        thin, is_free = self.signature.thin, has_free_root(self.reframed.frames)
         return ThinProducts(
             tuple(each.name for each in thin),
             tuple(each.known if is_free else 0 for each in thin),
