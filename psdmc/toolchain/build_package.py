@@ -149,13 +149,18 @@ def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
     A compiler says nothing while it works: without this a build would be one step, however long. Files of an earlier
     build are there from the beginning, and then the time left is not known.
     """
-    done = threading.Event()
+    done, most = threading.Event(), 0
+
+    def tell() -> None:
+        nonlocal most
+        most = max(most, min(files, _compiled(build)))
+        progress(Step(f"building: {most} of {files} files", most / max(files, 1)))
 
     def watch() -> None:
         while not done.wait(TICK):
-            progress(_step(build, files))
+            tell()
 
-    progress(_step(build, files))
+    tell()
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
     try:
@@ -165,9 +170,9 @@ def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
         watcher.join()
 
 
-def _step(build: Path, files: int) -> Step:
-    count = 0
-    with suppress(OSError):  # a folder that the build takes away at this moment
+def _compiled(build: Path) -> int:
+    """Count the object files below `build`; 0 while the build takes a folder away."""
+    with suppress(OSError):
         found = [path.parent for pattern in OBJECTS for path in build.rglob(pattern)]
-        count = min(files, sum(1 for folder in found if folder == build or folder.name in FOLDERS))
-    return Step(f"building: {count} of {files} files", count / max(files, 1))
+        return sum(1 for folder in found if folder == build or folder.name in FOLDERS)
+    return 0

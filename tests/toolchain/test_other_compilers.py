@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from pathlib import Path
+from time import sleep
 
 import pytest
 from bundled import bundled_model
@@ -107,6 +108,27 @@ def test_a_build_says_how_far_it_is(tmp_path: Path, tool: str, monkeypatch: pyte
     assert steps[0] == "building: 0 of 3 files"
     assert [step.share for step in steps] == sorted(step.share for step in steps)
     assert 0.6 < steps[-1].share <= 1.0
+
+
+def test_a_step_stays_where_the_build_takes_an_object_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(building, "TICK", 0.001)
+    first, second = (tmp_path / name for name in ("one.o", "two.o"))
+    steps: list[Step] = []
+    first.touch()
+
+    with building.told(tmp_path, 2, lambda step: steps.append(step)):  # type: ignore[arg-type]
+        first.unlink()
+        while len(steps) < 3:
+            sleep(0.001)
+        first.touch()
+        second.touch()
+        while steps[-1].share < 1.0:
+            sleep(0.001)
+
+    assert {step.share for step in steps} == {0.5, 1.0}
+    assert [step.share for step in steps] == sorted(step.share for step in steps)
 
 
 def test_a_board_s_library_holds_the_boards_code_alone(tmp_path: Path) -> None:

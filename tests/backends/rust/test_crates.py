@@ -59,6 +59,7 @@ def test_every_function_of_a_small_robot(tmp_path: Path) -> None:
     assert passed(cargo(tmp_path, "test")) > len(RECIPES)
 
 
+@pytest.mark.slow
 @pytest.mark.needs("cargo")
 def test_of_a_floating_base(tmp_path: Path) -> None:
     try:
