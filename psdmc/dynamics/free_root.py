@@ -12,15 +12,15 @@ from collections.abc import Sequence
 from psdmc.dynamics.frames import BASE, Frame, from_previous, joint_turn, outward
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.slices import positions, rates
-from psdmc.robot.joints.free import FREE
+from psdmc.robot.joints.joint_type import SLIDES, TURNS
 
 KNOWN_BY_Q, KNOWN_BY_QD = 6, 3
 """Columns of a free root, which comes first, that are known without dynamics."""
 
 
 def has_free_root(frames: Sequence[Frame]) -> bool:
-    """Whether a free joint carries the whole robot."""
-    return frames[0].joint is FREE and all(frame.parent != BASE for frame in frames[1:])
+    """Whether a joint that leaves every motion, with rates along its own axes, carries the whole robot."""
+    return frames[0].joint.twists == (*SLIDES, *TURNS) and all(frame.parent != BASE for frame in frames[1:])
 
 
 def known_derivatives(
