@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -135,6 +135,10 @@ golden: $(READY) ## rewrite the golden files; review their diff like code
 bench: $(READY) ## time the standard robots against other programs, on an idle machine; page and JSON in generated/
 	$(RUN)/python -m psdmc.bench --json $(GENERATED)/bench.json
 	$(RUN)/python -m psdmc.report.bench_page $(GENERATED)/bench.json $(GENERATED)/bench.html
+
+LEGS ?=
+bench-legged: $(READY) ## time derivatives and matrices of seven legged robots, on an idle machine; LEGS='hyq go1' for some
+	$(RUN)/python -m psdmc.bench.legged $(LEGS) --json $(GENERATED)/bench-legged.json
 
 bench-save: $(READY) ## rewrite benchmarks/baseline.json: operations and instructions, not times
 	$(RUN)/python -m psdmc.bench.gate save

@@ -66,8 +66,9 @@ def derive(
 ) -> DynamicsModel:
     """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
-    The result is a DynamicsModel, with the matrices E and P and the base parameters theta_b. Before `derive` returns the
-    model, it compares the model's torques with those of the Newton-Euler algorithm.
+    The result is a DynamicsModel. It contains the base parameters theta_b and, unless `expand` leaves them out, the
+    exponents E and the coefficients P of the monomials in the torques. Before `derive` returns the model, it compares the
+    model's torques with those of the Newton-Euler algorithm.
 
     robot          path of the robot file
     base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
@@ -152,8 +153,8 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   how psdmc generates the arithmetic. With "expanded", the code sums monomials, by the model's matrices E and P.
-               With "factored", it is a recursion over the links. With "auto", psdmc takes the one with fewer operations
+    lowering   how psdmc generates the arithmetic. With "expanded", the code sums the monomials of the model (E and P).
+               With "factored", the code is a recursion over the links. "auto" selects the code with fewer operations
     functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
     trig       how the code computes sines. "inline": by its own code, with libm only for angles over 1e5 rad;
@@ -171,8 +172,8 @@ def emit_c(
     Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises
     InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
 
-    Raises InputError also if the mass matrix is not positive definite at some pose within the joint limits. If so,
-    generate only functions that do not solve for accelerations.
+    Forward dynamics and some other functions need the inverse of the mass matrix. If the mass matrix is not positive
+    definite at some pose within the joint limits, these functions also raise InputError. Leave them out of `functions`.
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)

@@ -37,7 +37,7 @@ class PsdmcError(Exception):
 class InputError(PsdmcError):
     """psdmc raises this error if an input file, an option or an argument is wrong.
 
-    A psdmc command then ends with exit status 2.
+    If a psdmc command fails with an InputError, its exit status is 2.
     """
 
     exit_status = 2
@@ -46,8 +46,8 @@ class InputError(PsdmcError):
 class DerivationError(PsdmcError):
     """psdmc cannot derive a model with the given options, although the robot file has no mistake.
 
-    For example, the matrices E and P of a robot with many joints can need too much memory. The option `expand=False`
-    leaves out E and P. A psdmc command then ends with exit status 3.
+    For example, the matrices E and P (the formula of the torques) of a robot with many joints can need too much memory.
+    The option `expand=False` leaves out E and P. If a psdmc command fails with a DerivationError, its exit status is 3.
     """
 
     exit_status = 3
@@ -56,7 +56,7 @@ class DerivationError(PsdmcError):
 class ToolchainError(PsdmcError):
     """psdmc raises this error if a compiler, another program, a disk or a folder of this machine fails.
 
-    A psdmc command then ends with exit status 4.
+    If a psdmc command fails with a ToolchainError, its exit status is 4.
     """
 
     exit_status = 4
@@ -65,7 +65,7 @@ class ToolchainError(PsdmcError):
 class InternalError(Exception):
     """psdmc raises this error if psdmc itself has a bug. Please report the error message and your input.
 
-    A psdmc command then ends with exit status 70.
+    If a psdmc command fails with an InternalError, its exit status is 70.
     """
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable
+
+START = time.monotonic()
 
 Progress = Callable[[str], None]
 """Called with the name of each step as it begins, and again as it goes on; a Step says how far it is."""
@@ -35,3 +39,8 @@ def within(stage: str, progress: Progress) -> Progress:
 
 def silent(step: str) -> None:
     """Ignore progress: the default where none is asked for."""
+
+
+def on_standard_error(step: str) -> None:
+    """Print the step, after the seconds since this module was loaded."""
+    print(f"{time.monotonic() - START:6.0f} s  {step}", file=sys.stderr, flush=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,10 +19,9 @@ from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import Settings, run
 from psdmc.bench.table import as_text
 from psdmc.errors import exit_status_of
+from psdmc.progress import on_standard_error
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement, serial_parents
-
-START = time.perf_counter()
 
 
 def main() -> int:
@@ -48,17 +46,13 @@ def _measure(options: argparse.Namespace) -> int:
     settings = Settings(
         rounds=options.rounds, rivals=rivals, count=full, threads=full, cold=full or options.cold
     )
-    cases = list(standard_cases(options.names or None, progress=_tell))
-    scaling = list(scaling_cases(progress=_tell)) if full and not options.names else []
-    result = run(cases, settings, _tell, scaling)
+    cases = list(standard_cases(options.names or None, progress=on_standard_error))
+    scaling = list(scaling_cases(progress=on_standard_error)) if full and not options.names else []
+    result = run(cases, settings, on_standard_error, scaling)
     print(as_text(result))
     if options.json:
         write_whole(options.json, result.to_json())
     return 1 if result.wrong else 0
-
-
-def _tell(message: str) -> None:
-    print(f"{time.perf_counter() - START:6.0f} s  {message}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ BENCHED = tuple(name for name, recipe in RECIPES.items() if recipe.benched)
 """The functions that the benchmark measures."""
 
 DIFFERENTIATED = ("_derivatives", "_vjp")
-MOST_DIFFERENTIATED = 20
+MOST_DIFFERENTIATED = 24
 """Rates up to which functions with these endings are measured: a humanoid's matrices take every contestant minutes to
 compile."""
 
@@ -42,6 +42,7 @@ class Case:
     note            where its numbers come from
     derive_seconds  how long a warm derivation took, None where the model was given
     derive_bytes    peak memory of a process that did nothing else, None where unknown
+    named           functions to measure; empty: those that every robot's benchmark has
     """
 
     name: str
@@ -49,6 +50,7 @@ class Case:
     note: str = ""
     derive_seconds: float | None = None
     derive_bytes: int | None = None
+    named: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.chain.nq > LONGEST_INPUT:
@@ -78,13 +80,18 @@ class Case:
     @property
     def functions(self) -> tuple[str, ...]:
         """The functions that the benchmark measures on this robot."""
-        return tuple(name for name in BENCHED if name not in self.left_out)
+        return self.named or tuple(name for name in BENCHED if name not in self.costly)
 
     @property
     def left_out(self) -> tuple[str, ...]:
+        """The functions that the benchmark leaves out because they are costly."""
+        return () if self.named else self.costly
+
+    @property
+    def costly(self) -> tuple[str, ...]:
         """Derivatives of a robot with more rates than MOST_DIFFERENTIATED."""
         large = self.chain.nv > MOST_DIFFERENTIATED
-        return tuple(name for name in BENCHED if large and name.endswith(DIFFERENTIATED))
+        return tuple(name for name in self.named or BENCHED if large and name.endswith(DIFFERENTIATED))
 
     @property
     def is_wide(self) -> bool:

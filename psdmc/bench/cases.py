@@ -40,6 +40,17 @@ POPULAR: dict[str, tuple[str, dict[str, Any]]] = {
 """Path inside example-robot-data's robots, and how it is read: the tip or the locks leave grippers out, whose fingers follow
 each other, so that every rival can take part."""
 
+LEGGED = {
+    "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
+    "solo12": "solo_description/robots/solo12.urdf",
+    "anymal_b": "anymal_b_simple_description/robots/anymal.urdf",
+    "go1": "go1_description/urdf/go1.urdf",
+    "b1-z1": "b1_description/urdf/b1-z1.urdf",
+    "talos_reduced": "talos_data/robots/talos_reduced.urdf",
+    "icub": "icub_description/robots/icub.urdf",
+}
+"""Four quadrupeds, a quadruped with an arm, two humanoids: paths as in POPULAR."""
+
 ARMS, TREES = ("UR5", "Panda"), ("solo12", "anymal_b", "talos", "allegro", "baxter")
 """Of POPULAR."""
 
@@ -73,6 +84,23 @@ def standard_cases(
         found = derive_fresh(makers[name]())
         note = f"generic physical inertias, floor mount, no drive inertia, seed {seed}"
         yield Case(name, found.model, note, found.seconds, found.peak_bytes)
+
+
+def legged_cases(
+    functions: tuple[str, ...],
+    names: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda message: None,
+) -> Iterator[Case]:
+    """Legged robots with the inertias of their files, each derived in a process of its own; all where none is named.
+
+    InputError as for `standard_cases`.
+    """
+    for name in names or LEGGED:
+        if name not in LEGGED:
+            raise InputError(f"there is no legged robot {name!r}", f"choose from {', '.join(LEGGED)}")
+        progress(f"{name}: deriving")
+        found = derive_fresh(load_robot(_robot_data() / LEGGED[name], floating=True).chain)
+        yield Case(name, found.model, "inertias of its file", found.seconds, found.peak_bytes, functions)
 
 
 def oblique_chain(n: int, seed: int) -> Mechanism:

@@ -30,7 +30,7 @@ def calibrate(
     model, even if the verdict is "not usable".
 
     model              a model, or the path of a model file
-    logs               paths of the logs, or the path of a log description (TOML)
+    logs               paths of the logs, of a log description (TOML), or of a campaign folder that `psdmc excite` wrote
     options            filter and friction law of the fit; None: those of the log description, or the defaults
     torque_constants   N m/A at the joint (after the gear) by joint name, for logs of motor currents. With `loaded`,
                        psdmc finds the constants of all joints that feel the load; give only those of the other joints
@@ -38,7 +38,8 @@ def calibrate(
                        validation logs, psdmc tests the fit with the last part of each log
     loaded             logs of motor currents that were recorded with a known load. From `logs` and `loaded`, psdmc finds
                        torque constants
-    load               the load of `loaded`: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
+    load               the known load of the logs `loaded`, as four numbers: mass (kg), and x, y, z of the centre of mass (m,
+                       in the tip frame). Instead, you can give the path of a load file that `psdmc payload` wrote
 
     Raises InputError if a file is missing or if psdmc cannot use a log.
     """

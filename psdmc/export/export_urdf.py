@@ -59,8 +59,8 @@ def export_urdf(
     chooses those that are nearest to the ones in the robot file. If the model comes from a URDF, psdmc copies names,
     limits and shapes from that file. If the model is calibrated, its friction becomes the elements <dynamics>.
 
-    After writing, psdmc reads the URDF with Pinocchio and compares its torques with those of the model. If psdmc also
-    wrote an MJCF, it compares the torques of that file with MuJoCo.
+    Before psdmc writes the URDF, Pinocchio reads its text, and psdmc compares Pinocchio's torques with those of the model.
+    If psdmc also writes an MJCF, it compares MuJoCo's torques for the MJCF with those of the model.
 
     Returns an object with the paths, the parameters of the links and the largest torque differences.
 

@@ -37,8 +37,8 @@ FROM, TO = (
 WAY = Quantity(
     "v",
     ("nv",),
-    means="displacement: q1 - q0 for joints with one coordinate; for quaternions the rotation vector (rad) "
-    "of the shorter rotation, in the body frame at q0",
+    means="displacement: q1 - q0 for joints with one coordinate; for a quaternion the rotation vector (rad) "
+    "of the shorter rotation from q0 to q1, along the axes of the body at q0",
     unit="1",
     powers=(1,),
 )

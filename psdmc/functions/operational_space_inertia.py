@@ -37,8 +37,8 @@ SEEN_BY_FRAMES = SymmetricMatrix(
     Structure.BLOCKS,
     ("frames",),
     number="the number, from 0, of the named frame at which J M^-1 J^T + mu I is not positive definite",
-    failure="J M^-1 J^T + mu I of a frame is not positive definite, as with mu = 0 if the frame cannot move in all six "
-    "directions,",
+    failure="J M^-1 J^T + mu I of a frame is not positive definite (for example, if mu = 0 and the frame cannot move in "
+    "all six directions)",
     error="frame {frames!r}: J M^-1 J^T + mu I is not positive definite at mu = {mu:g}",
     hint="give mu > 0, such as 1e-3, or a pose in which the frame can move in all six directions",
 )
@@ -116,8 +116,8 @@ RECIPE = Recipe(
             Quantity(
                 "Lambda",
                 ("frames", "6", "6"),
-                means="symmetric matrix of each frame: kg, kg m, kg m^2; three linear, then three angular axes, "
-                "of the base frame",
+                means="symmetric matrix of each frame, along the axes of the base frame: three linear rows and "
+                "columns, then three angular ones; kg, kg m and kg m^2",
                 unit="kg m^2",
                 powers=(0, -1, -1),
             ),

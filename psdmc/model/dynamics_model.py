@@ -42,9 +42,9 @@ class DynamicsModel(Answers):
     sin q, cos q, qd and qdd. The columns of the matrix E are the exponents of the monomials. The matrices P[i] and the l
     base parameters theta_b are constants of the robot.
 
-    A model has the same methods as a compiled robot, such as `forward_dynamics`, and computes them in NumPy. In arguments
-    and results, q has the shape (..., nq), and rates, accelerations and torques have the shape (..., nv). All numbers are
-    in SI units. The axes (...) count states.
+    A model has the same methods as a compiled robot (the result of `psdmc.compile`), such as `forward_dynamics`, but it
+    computes them in NumPy. In arguments and results, q has the shape (..., nq), and rates, accelerations and torques have
+    the shape (..., nv). All numbers are in SI units. The axes (...) count states.
 
     expansion    the matrices E and P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
@@ -166,7 +166,7 @@ class DynamicsModel(Answers):
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Return the l indices of the base parameters' pivots among the 11n standard parameters.
+        """Return, for each of the l base parameters, the index of its pivot among the 11n standard parameters.
 
         The pivot of a base parameter is the first standard parameter that this base parameter contains with factor one and
         that no other base parameter contains.
@@ -177,7 +177,8 @@ class DynamicsModel(Answers):
     def is_reduced(self) -> bool:
         """True if each base parameter contains, with factor one, a standard parameter that no other base parameter contains.
 
-        This standard parameter is its pivot (see `pivots`). Every model that psdmc derives has pivots.
+        Such a standard parameter is called the pivot of the base parameter (see `pivots`). In every model that psdmc
+        derives, each base parameter has a pivot.
         """
         return bool(self._leads.any(axis=1).all())
 
@@ -191,10 +192,12 @@ class DynamicsModel(Answers):
     def representative(self) -> Array:
         """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
-        Many vectors of standard parameters have the same theta_b, and R gives one of them. In x, the pivot of each base
-        parameter (see `pivots`) has the value of the base parameter, and all other standard parameters are zero. There is
-        one exception: an assumption such as `assume_zero` can tie a standard parameter to a pivot by a fixed factor. Then
-        x contains the value of the pivot times this factor. B @ R is the identity, with the model's matrix B, (l, 11n).
+        Many vectors of standard parameters have the same theta_b, and R gives one of them. In this vector x, the pivot of
+        each base parameter (see `pivots`) has the value of the base parameter, and all other standard parameters are zero.
+        B @ R is the identity, with the model's matrix B, (l, 11n).
+
+        There is one exception. If the model was derived with an assumption such as `assume_zero`, a standard parameter
+        can be a fixed multiple of a pivot. In x, this standard parameter is then the same multiple of the pivot's value.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -246,10 +249,9 @@ class DynamicsModel(Answers):
     def equivalent_parameters(self) -> Array:
         """Return a vector of standard parameters that gives the same torques as the model.
 
-        The vector has 11 numbers for each of the n links: mass, first moments (3), inertias (6) and the drive inertia of
-        its joint. It is `representative @ theta_b`, with the model's matrix `representative`, (11n, l). Many other
-        vectors give the same torques. The returned vector does not describe the real links, and can contain negative
-        masses.
+        The vector has 11 numbers for each of the n links: mass, first moments (3), inertias (6) and drive inertia. The
+        matrix `representative`, (11n, l), times theta_b gives this vector. Many other vectors give the same torques. The
+        returned vector does not describe the real links, and can contain negative masses.
 
         Raises InputError if theta_b is unknown.
         """
@@ -278,8 +280,8 @@ class DynamicsModel(Answers):
         Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
 
         Raises InputError if a number is not finite, or is larger than robot files allow, or if a mass is negative. Raises
-        InputError also if an inertia is not symmetric, or belongs to a link without mass. The same error is raised if a
-        value is not zero, but the model was derived with the assumption that it is (option `assume_zero`).
+        InputError also if an inertia is not symmetric, or belongs to a link without mass. If the model was derived with
+        the assumption that a parameter is zero (option `assume_zero`), another value also raises InputError.
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -389,9 +391,11 @@ class DynamicsModel(Answers):
             joint    name of the joint, or its number: 0 is the first joint
             numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1 and qdd1 are for joint 0. Raises InputError if the robot has no such joint, or if the torque
-        has more than 2,000 monomials. Raises InputError also if the model has no monomials, for example because it was
-        derived with `expand=False`. Raises ToolchainError if SymPy is missing.
+        The names of the symbols count joints from 1, so q1, qd1 and qdd1 belong to the first joint.
+
+        Raises InputError if the robot has no such joint, or if the torque has more than 2,000 monomials. Raises InputError
+        also if the model has no monomials, for example because it was derived with `expand=False`. Raises ToolchainError
+        if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
@@ -400,7 +404,7 @@ class DynamicsModel(Answers):
     def content_hash(self) -> str:
         """Return the SHA-256 hash of the model as 64 hexadecimal digits. Equal models have equal hashes.
 
-        psdmc computes the hash from the arrays and the manifest that `save` writes into the model file.
+        psdmc computes the hash from the content of the model file: the arrays and the manifest (a JSON text).
         """
         return store.content_hash(self)
 

@@ -245,10 +245,11 @@ TAU = Quantity(
 
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
-    entry = "q along joint rate j (of q[j], if every joint has one coordinate)" if by == "q" else f"{by}[j]"
+    of_q = "the change of q that joint rate j causes (for q[j], if every joint has one coordinate)"
+    entry = of_q if by == "q" else f"{by}[j]"
     known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}
     above, below = known.get(output, TAU), known[by]
     unit = str(times(above.dimension, below.dimension, -1))
     powers = (above.powers[0], -below.powers[0])
-    means = f"derivatives of {output} by {by}: row i for {output}[i], column j for a change of {entry}"
+    means = f"derivatives of {output} by {by}: row i for {output}[i], column j for {entry}"
     return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means, unit=unit, powers=powers)

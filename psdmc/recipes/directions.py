@@ -24,20 +24,22 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum", unit="1", powers=(1,))
+COTANGENT = Quantity(
+    "cotangent", ("nv",), means="weights: cotangent[i] multiplies output i in the sum", unit="1", powers=(1,)
+)
 """Of torques; their weighted sum, and that of accelerations, has the unit of energy here."""
 
 COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
 
 _ENTRY = {
     each: f"{each.name}; entry j is for "
-    f"{'a change of q along joint rate j' if each is Q else f'{each.name}[j]'}"
+    f"{'the change of q that joint rate j causes' if each is Q else f'{each.name}[j]'}"
     for each in (Q, QD, QDD, TAU)
 }
 """What an entry per joint rate belongs to."""
 
 DQ, DQD, DQDD, DTAU = (
-    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"change of {entry}")
+    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"direction: change of {entry}")
     for each, entry in _ENTRY.items()
 )
 """Directions of inputs, and derivatives of outputs along them."""

@@ -33,10 +33,10 @@ class CompiledRobot(CompiledFunctions):
     out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
              the shape and dtype of the result, and may be an input array
 
-    If the robot has a floating base, "base frame" means the world frame. A call takes
-    about 0.3 us more than its arithmetic if all input arrays are contiguous and have the robot's dtype and equal axes
-    (...). With other input arrays, a call takes about 10 us more than its arithmetic. If Python's C headers are not
-    installed, all calls take about 10 us more.
+    If the robot has a floating base, "base frame" means the world frame.
+
+    In addition to the arithmetic, a call takes about 0.3 us if all input arrays are contiguous and have the robot's dtype
+    and equal axes (...). With other input arrays, or if Python's C headers are not installed, it takes about 10 us.
     """
 
     def _bind(self, compiled: CompiledFunctions) -> None:

@@ -238,11 +238,11 @@ class CompiledFunctions(RobotFacts):
         theta_b: ArrayLike | None = None,
         out: Any = None,
     ) -> Any:
-        """Call the generated function that a declaration describes, and return its result.
+        """Call a generated function by its entry in `psdmc.functions.SIGNATURES`, and return the result.
 
-        `robot.call(SIGNATURES["gravity"], [q])` returns the same as `robot.gravity(q)`.
+        For example, `robot.call(SIGNATURES["gravity"], [q])` returns the same as `robot.gravity(q)`.
 
-        function  a declaration from psdmc.functions.SIGNATURES
+        function  an entry of `psdmc.functions.SIGNATURES`
         inputs    the inputs of the function, as a list of arrays
         theta_b   (l,) base parameters that replace those in the code; optional
         out       array into which psdmc writes the result, or a tuple of arrays for several results; optional

@@ -55,7 +55,7 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 
 def documentation(function: Signature) -> str:
-    """A method's docstring: what it computes, its arguments and results, what NaN means, and the words for sizes."""
+    """A method's docstring: what it computes, its arguments and results, what NaN means, and the lengths of axes."""
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
@@ -70,22 +70,21 @@ def documentation(function: Signature) -> str:
     made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
     axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
     axes |= {"l"} if function.theta else set()
-    notes = [*_failures(function), *([_STATES] if lead else [])]
-    notes += [meaning for size, meaning in _SIZES.items() if size in axes]
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
-    footer = textwrap.fill(" ".join(notes), 100)
-    return "\n\n".join([function.summary, _rows(given), returned, _rows(made), footer])
+    failures = [textwrap.fill(" ".join(_failures(function)), 100)] if function.factorises else []
+    lengths = [(size, meaning) for size, meaning in _SIZES.items() if size in {*axes, *lead}]
+    parts = [_rows(given), returned, _rows(made), *failures, "In these shapes:", _rows(lengths)]
+    return "\n\n".join([function.summary, *parts])
 
 
-_STATES = "For many states, the axes (...) count the states; for one state, there are no such axes."
 _SIZES = {
-    "nq": "nq is the length of q, which is the number of joints if every joint has one coordinate.",
-    "nv": "nv is the number of joint rates.",
-    "nx": "nx is 2 nv: the first nv rows or columns are for q, the last nv for qd. A quaternion in q has three of them, "
-    "for a small rotation as a rotation vector.",
-    "l": "l is the number of base parameters.",
-    "frames": "frames is the number of named frames.",
-    "nonzeros": "nonzeros is the number of entries that can differ from zero.",
+    "...": "axes that count states; the arrays of one state do not have them",
+    "nq": "length of q, which is the number of joints if every joint has one coordinate",
+    "nv": "number of joint rates",
+    "nx": "2 nv: nv rows or columns for changes of q, each caused by one joint rate, then nv for qd",
+    "l": "number of base parameters",
+    "frames": "number of named frames",
+    "nonzeros": "number of matrix entries that can differ from zero",
 }
 
 

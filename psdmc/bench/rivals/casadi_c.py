@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from psdmc.bench.build import built, cxx
-from psdmc.bench.case import Case, robot_as_numbers
+from psdmc.bench.case import MOST_DIFFERENTIATED, Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.machine import version_of
 from psdmc.bench.measure import code_sizes
@@ -50,11 +50,15 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavail
     """CasADi's functions for one robot."""
     generated, counts = written(case)
     found: list[Contestant | Unavailable] = []
-    for layout, build in (("state", _scalar), ("lanes", _by_lane)):
+    builds = {"state": _scalar} if case.named else {"state": _scalar, "lanes": _by_lane}
+    for layout, build in builds.items():
         try:
             found += _entered(case, build(case, generated, flags), layout == "lanes", counts)
         except ToolchainError as error:
             found.append(Unavailable(f"{RIVAL} ({layout})", error.message))
+    if case.named and case.costly:
+        reason = f"its C of a robot with more than {MOST_DIFFERENTIATED} rates takes too long to compile"
+        found.append(Unavailable(f"{RIVAL}, {', '.join(case.costly)}", reason))
     return [*found, *incomparable(case, RIVAL)]
 
 

@@ -159,6 +159,12 @@ struct Writer {
     return symmetric(data.M);
   }
 
+  Matrix inverse_of_mass_matrix() const {
+    Data data(model);
+    pinocchio::computeMinverse(model, data, q_);
+    return symmetric(data.Minv);
+  }
+
   Vector nonlinear_effects() const {
     Data data(model);
     return pinocchio::nonLinearEffects(model, data, q_, qd_);
@@ -171,6 +177,7 @@ struct Writer {
     if (name == "forward_dynamics_aba") return function(name, pinocchio::aba(model, data, q_, qd_, x_));
     if (name == "forward_dynamics_ldl") return function(name, solved(mass_matrix(), x_ - nonlinear_effects()));
     if (name == "mass_matrix") return function(name, mass_matrix());
+    if (name == "mass_matrix_inverse") return function(name, inverse_of_mass_matrix());
     if (name == "nonlinear_effects") return function(name, nonlinear_effects());
     if (name == "gravity") return function(name, pinocchio::computeGeneralizedGravity(model, data, q_));
     if (name == "regressor") return function(name, pinocchio::computeJointTorqueRegressor(model, data, q_, qd_, x_));

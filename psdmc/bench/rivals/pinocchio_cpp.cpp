@@ -55,6 +55,12 @@ void crba(const double *q, const double *, const double *, double *M) {
   give_matrix(data->M, M);
 }
 
+void inverse_of_mass_matrix(const double *q, const double *, const double *, double *inverse) {
+  pinocchio::computeMinverse(*model, *data, positions(q));
+  if (copies_matrices) data->Minv.triangularView<Eigen::StrictlyLower>() = data->Minv.transpose();
+  give_matrix(data->Minv, inverse);
+}
+
 void nonlinear_effects(const double *q, const double *qd, const double *, double *h) {
   give(pinocchio::nonLinearEffects(*model, *data, positions(q), vector(qd)), h);
 }
@@ -126,6 +132,7 @@ PSDMC_CONTESTANT(forward_dynamics_local, aba<Convention::LOCAL>)
 PSDMC_CONTESTANT(forward_dynamics_world, aba<Convention::WORLD>)
 PSDMC_CONTESTANT(mass_matrix_local, crba<Convention::LOCAL>)
 PSDMC_CONTESTANT(mass_matrix_world, crba<Convention::WORLD>)
+PSDMC_CONTESTANT(mass_matrix_inverse, inverse_of_mass_matrix)
 PSDMC_CONTESTANT(nonlinear_effects, nonlinear_effects)
 PSDMC_CONTESTANT(gravity, gravity)
 PSDMC_CONTESTANT(regressor, regressor)

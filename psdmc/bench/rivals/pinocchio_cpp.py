@@ -27,6 +27,7 @@ SYMBOLS = {
     "inverse_dynamics": ("inverse_dynamics",),
     "forward_dynamics": ("forward_dynamics_local", "forward_dynamics_world"),
     "mass_matrix": ("mass_matrix_local", "mass_matrix_world"),
+    "mass_matrix_inverse": ("mass_matrix_inverse",),
     "nonlinear_effects": ("nonlinear_effects",),
     "gravity": ("gravity",),
     "regressor": ("regressor",),
@@ -89,7 +90,7 @@ def ways_of(case: Case, ways: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[
     return {
         function: tuple(way for way in ways[function] if not (case.is_wide and way.endswith(BY_COORDINATES)))
         for function in case.functions
-        if function in ways and is_comparable(case, function)
+        if function in ways and is_comparable(case, function) and function not in case.costly
     }
 
 
