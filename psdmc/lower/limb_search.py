@@ -195,7 +195,7 @@ class LimbSearch:
         )
 
     def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:
-        """Choose articulated bodies if limbs hang on a body: elimination in a mass matrix does not show what it sums."""
+        """Choose articulated bodies if limbs hang on a body. Elimination in a mass matrix has not been compared (0154)."""
         hang = any(start.reframed.frames[limbs[0][0]].parent != BASE for limbs in groups)
         if not self.recipe.accelerates or not hang:
             return start
