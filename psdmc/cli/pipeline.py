@@ -365,8 +365,9 @@ def emit(
     for reason in lacking(found.mechanism, names(adapters)):
         work = ", ".join(kernels.wanted(wanted, found.mechanism))
         print(f"note: {reason} (the C code is not affected); CasADi can call, without derivatives: {work}")
+    ending = "; CasADi's files do not have them" if "casadi" in names(adapters) else ""
     for note in run_time_only(found, wanted):
-        print(f"note: {note}")
+        print(f"note: {note}{ending}")
     for what in beyond_friction(found):
         print(f"note: not in the package, though calibrated: {what}; add its torque to inverse dynamics'")
     say_next_line(language.next(quoted(folder)))

@@ -17,7 +17,7 @@ from psdmc.robot.limits import shown
 from psdmc.robot.missing_inertia import idle_joints, massless_words, unknown_option
 
 REMEDY = {
-    Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency",
+    Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency; use --unknown for a massless link",
     Needs.STANDARD: "derive the model from a file with the inertias of all links",
 }
 
@@ -51,7 +51,8 @@ def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tupl
     names = [name for name in wanted(functions, model.mechanism) if RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()
-    return (f"the base parameters are unknown: {', '.join(names)} take them at run time only, as NAME_theta",)
+    forms = ", ".join(f"{name}_theta" for name in names)
+    return (f"the base parameters are unknown, so functions take theta_b as an argument: {forms}",)
 
 
 def _lacking(model: DynamicsModel, names: Sequence[str]) -> dict[str, str]:

@@ -100,7 +100,7 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
     if unknown:
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
     if not names:
-        raise InputError("no function is named", f"psdmc generates {', '.join(RECIPES)}")
+        raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
     called = {RECIPES[name].signature.calls for name in names}
     return tuple(name for name in RECIPES if name in names or name in called)
 

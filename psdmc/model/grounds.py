@@ -264,7 +264,8 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
         f"the mass matrix is not positive definite in {v['failing']} of {v['poses']} poses: there is no forward dynamics"
     ),
     "unchecked": lambda v: (
-        "the file lacks inertias: a wrong unit, or all signs turned, would show in friction only"
+        "the file lacks inertias to compare with, so psdmc cannot see a wrong unit of the effort or turned signs: "
+        "check that the friction is positive and plausible"
     ),
     "negative_constants": lambda v: (
         f"the torque constant is negative at joint(s) {_each(v, '{joint}')}: current counts against the joint's sense"

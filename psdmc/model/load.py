@@ -145,4 +145,8 @@ def _damaged(source: Path, why: str) -> InputError:
 
 
 def _foreign(source: Path) -> InputError:
-    return InputError(f"{source}: not a psdmc model file", "psdmc derive ROBOT -o MODEL.npz makes one")
+    if source.suffix in ROBOT_FILES:
+        hint = f"this is a robot file: psdmc derive {source.name} -o {source.stem}.npz makes a model of it"
+    else:
+        hint = "psdmc derive ROBOT -o MODEL.npz makes one"
+    return InputError(f"{source}: not a psdmc model file", hint)

@@ -157,5 +157,6 @@ def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
             )
         raise InputError(
             f"link '{link}' cannot carry this load: the model assumes some of its parameters zero",
-            "derive the model again without those assumptions",
+            f"derive again with the link's inertia in the robot file, with --unknown {shlex.quote(link)}, or without "
+            "--assume-zero",
         )

@@ -6,7 +6,7 @@ from psdmc.errors import InputError
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism
 
-AXES = "take a model without such joints: derive it without --floating, or hold them with --lock JOINT=0"
+AXES = "hold this joint: derive the model with --lock JOINT=0"
 
 
 def require_derivable(chain: Mechanism) -> None:
@@ -26,5 +26,5 @@ def require_axes(chain: Mechanism, what: str) -> None:
         raise InputError(
             f"{shown(chain.name)}: {what} is of joints of one coordinate each, and joint {shown(wide.name)}"
             f" {wide.type.verb}",
-            AXES,
+            "derive the model without --floating" if chain.has_free_root else AXES,
         )

@@ -54,7 +54,8 @@ def judged_bodies(
 
     InputError where `unknown` names a link that does not move.
     """
-    bare = [all(robot.inertials[link] is None for link in body) for body in bodies]
+    children = [joint.child for joint in route.movable]
+    bare = [robot.inertials[link] is None and not x.any() for link, x in zip(children, merged, strict=True)]
     is_unknown = _unknown(bodies, bare, unknown, robot.inertials, source)
     notes: tuple[str, ...] = ()
     if any(bare) and not any(is_unknown) and not any(x.any() for x in merged):

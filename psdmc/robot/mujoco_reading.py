@@ -34,6 +34,9 @@ COMPILER = {
 }
 """Settings by which MuJoCo keeps the file's numbers; bodies without a joint are merged into those that they hang on."""
 
+UNSURE = "MuJoCo needs all inertial parameters, and some are unknown or assumed zero"
+"""Why a robot is not compared."""
+
 REASON = 160
 """Characters of MuJoCo's own message that an error repeats."""
 
@@ -102,7 +105,7 @@ def _own_file(loaded: LoadedRobot) -> Element | None:
 def _file_torques(mujoco: Any, loaded: LoadedRobot, own: Element, states: States) -> Array:
     """The torques of the file's own bodies and joints; joints that are not the robot's are where it locks them."""
     if loaded.options.assume_zero or np.isnan(loaded.mechanism.parameters).any():
-        raise NotCompared("MuJoCo cannot be told of parameters assumed zero")
+        raise NotCompared(UNSURE)
     model = _compiled(mujoco, tostring(own, encoding="unicode"), loaded)
     kinds, chain = mujoco.mjtJoint, loaded.mechanism
     free = _free_joint(chain)
@@ -205,7 +208,7 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     if loaded.source_format != "urdf":
         raise NotCompared("MuJoCo reads no DH tables")
     if has_assumptions(loaded):
-        raise NotCompared("MuJoCo cannot be told of parameters assumed zero")
+        raise NotCompared(UNSURE)
     root = parse_xml(loaded.source_text, loaded.source_name, "robot")
     if any(element.get("quat_xyzw") is not None for element in root.iter("origin")):
         raise NotCompared("MuJoCo reads no quat_xyzw")

@@ -191,7 +191,7 @@ def _reversed_limits(root: Element) -> Iterator[str]:
         if lower > upper and kind in MOVABLE and URDF_TYPES[kind].about_z and kind != "continuous":
             name = limits.shown(joint.get("name", ""))
             said = f"<limit> lower {lower:g} is above upper {upper:g}"
-            yield f"{WARNING}joint {name}: {said}: taken as no position limit"
+            yield f"{WARNING}joint {name}: {said}, so psdmc uses neither: exchange them"
 
 
 def _inertial(link: Element) -> UrdfInertial | None:

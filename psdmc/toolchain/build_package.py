@@ -65,9 +65,8 @@ def _check_files(root: Path, edited: bool) -> None:
     model."""
     found = edited_files(root)
     if found is None:
-        raise InputError(
-            f"{root}: no emitted package (no manifest.json of psdmc's)", "make one with psdmc emit-c"
-        )
+        fault = "no emitted package (no manifest.json of psdmc's)" if root.is_dir() else "no such folder"
+        raise InputError(f"{root}: {fault}", "make a package with psdmc emit-c")
     if found and not edited:
         raise InputError(
             f"{root}: not as emit-c wrote it: {', '.join(found[:3])}{' ...' if len(found) > 3 else ''}",

@@ -227,13 +227,14 @@ def _in_order(axes: RobotAxes, function: Signature, quantity: Quantity, given: A
         )
     for word, name in zip(quantity.axes, dimensions(quantity), strict=True):
         if name not in given.dims:
+            other = next((str(each) for each in given.dims if each not in dimensions(quantity)), "dimension")
             raise InputError(
                 f"{what} has dimensions {given.dims}, expected one called {name!r}",
-                f"rename the one that runs along it: {quantity.name}.rename(old={name!r})",
+                f"rename its dimension: {quantity.name}.rename({{{other!r}: {name!r}}})",
             )
         if name in given.coords and given.coords[name].dtype.kind in "UOT" and axes.names.get(word):
             labels = given.coords[name].values.tolist()
-            order = order_of(f"{what} has along dimension {name!r}", labels, axes.names[word])
+            order = order_of(f"{what}'s dimension {name!r} has the names", labels, axes.names[word])
             given = given if order is None else given.isel({name: order})
         (length,) = axes.sizes.shape([word])
         if given.sizes[name] != length:

@@ -81,7 +81,9 @@ def test_what_a_second_emission_removes_and_renames_is_said(tmp_path: Path) -> N
 def test_no_function_is_not_the_default_set(given: str, tmp_path: Path) -> None:
     done = typed("emit-c", saved(tmp_path), "--functions", given, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.startswith("error: no function is named\nhint: psdmc generates inverse_dynamics, ")
+    assert done.stderr.startswith(
+        "error: no function is named\nhint: give default, all, or some of inverse_dynamics, "
+    )
     assert not (tmp_path / "arm").exists()
 
 

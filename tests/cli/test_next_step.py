@@ -43,6 +43,17 @@ def test_where_parameters_are_unknown_a_campaign_is_next(tmp_path: Path) -> None
     assert next_words(done.stderr) == ["psdmc", "excite", "unknown.npz", "-o", "unknown_campaign"]
 
 
+def test_what_casadi_does_not_get_is_said(tmp_path: Path) -> None:
+    pytest.importorskip("casadi")
+    replace(bundled_model("two_link"), theta_b=None).save(tmp_path / "unknown.npz")
+    words = ("--functions", "gravity,regressor", "--with", "casadi")
+
+    done = typed("emit-c", "unknown.npz", *words, cwd=tmp_path)
+
+    assert done.returncode == 0
+    assert "argument: gravity_theta; CasADi's files do not have them\n" in done.stdout
+
+
 def test_a_xacro_files_model_is_called_as_its_robot(tmp_path: Path) -> None:
     pytest.importorskip("xacro")
     body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'

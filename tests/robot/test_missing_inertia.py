@@ -75,6 +75,14 @@ def test_a_link_whose_inertial_is_zero_is_massless_without_a_warning() -> None:
     assert np.isnan(load_urdf(*arm(INERTIAL, ZERO), unknown=("link2",)).chain.parameters[1, :10]).all()
 
 
+def test_a_frame_with_an_inertial_of_zeros_does_not_hide_a_link_without_one() -> None:
+    parts = arm(INERTIAL, "")
+    chain = load_urdf(*parts, link("tip", ZERO), joint("end", "link2", "tip", kind="fixed")).chain
+
+    assert chain.massless == ("link2",)
+    assert "--unknown link2" in chain.notes[0]
+
+
 def test_a_file_of_zeros_is_no_file_without_inertia() -> None:
     """What the file states is known."""
     chain = load_urdf(*arm(ZERO, "")).chain

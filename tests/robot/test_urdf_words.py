@@ -271,7 +271,7 @@ def test_limits_the_wrong_way_round_are_none_with_a_warning() -> None:
     right = load(robot_of('<limit effort="7" velocity="5"/>'))
 
     assert robot.mechanism.notes == (
-        "warning: joint 'j': <limit> lower 2 is above upper 1: taken as no position limit",
+        "warning: joint 'j': <limit> lower 2 is above upper 1, so psdmc uses neither: exchange them",
     )
     (limits,) = [joint.limits for joint in robot.mechanism.joints]
     assert (limits.lower, limits.upper) == (-math.inf, math.inf)

@@ -136,7 +136,7 @@ class TestNamedDimensions:
     def test_other_joints_are_refused_by_name(self, xr, robot: CompiledRobot) -> None:
         q = xr.DataArray(np.zeros(4), dims="joint", coords={"joint": ["J1", "J2", "J3", "wrist"]})
         with pytest.raises(
-            InputError, match="q has along dimension 'joint' 'J1', 'J2', 'J3', 'wrist'"
+            InputError, match="q's dimension 'joint' has the names 'J1', 'J2', 'J3', 'wrist'"
         ) as caught:
             robot.gravity(q)
         assert "the robot has no 'wrist', and 'J4' is missing" in caught.value.message

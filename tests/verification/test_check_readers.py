@@ -265,7 +265,7 @@ def test_mujoco_reads_the_file_too() -> None:
         ),
         (
             lambda: load_robot_text(oblique_urdf(), "urdf", assume_zero=("c:mx",)),
-            "not compared: MuJoCo cannot be told of parameters assumed zero",
+            "not compared: MuJoCo needs all inertial parameters",
         ),
     ],
 )

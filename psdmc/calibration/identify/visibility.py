@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.wording import listed
 from psdmc.model.calibrated import IDENTIFIED, SHOWN, WEAK, Remark
 
 TOGETHER_WORDS = "only in combination with "
@@ -125,5 +126,5 @@ def weak_notes(step: str, names: Sequence[str], found: Visibility) -> tuple[str,
     seen = sum(words.code == IDENTIFIED.code for words in found.words)
     return (
         f"{step}: {seen} of {len(names)} unknowns identified; {len(weak)} weakly visible (standard deviation above "
-        f"half of the value): {', '.join(weak)}",
+        f"half of the value): {listed(weak)}",
     )

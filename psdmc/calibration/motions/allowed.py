@@ -211,5 +211,5 @@ def require_limits(joints: Sequence[Joint]) -> None:
     if lacking:
         raise InputError(
             f"joint(s) without limits to move within: {', '.join(lacking)}",
-            "add them to the robot file; an acceleration for all such joints can be given with --acceleration",
+            "add them to the robot file, or give them with --speed JOINT=V and --acceleration A",
         )

@@ -122,7 +122,8 @@ def casadi_view(robot: str, real: str, every: Sequence[KernelView], wide: bool) 
     kernels = {kernel.name: kernel for kernel in every if not kernel.theta}
     if not kernels:
         raise InputError(
-            "CasADi gets functions with baked parameters, and this model's are unknown", "calibrate it first"
+            "CasADi needs the base parameters, and this model's are unknown",
+            "calibrate the model first, or leave out --with casadi",
         )
     patterns = _Patterns()
     others = {} if wide else kernels
