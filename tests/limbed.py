@@ -30,6 +30,10 @@ DERIVATIVES = (
     "inverse_dynamics_derivatives",
     "inverse_dynamics_vjp",
     "inverse_dynamics_jvp",
+    "forward_dynamics_derivatives",
+    "forward_dynamics_vjp",
+    "forward_dynamics_jvp",
+    "mass_matrix_inverse",
 )
 """Functions whose limbs run in lanes."""
 
@@ -85,5 +89,7 @@ def forced(name: str, function: str, seed: int = 1) -> Kernel:
     start = next(search.starts(search.geometry.feet[0]))
     straight = trace_dynamics(recipe, start, search.robot)
     traced = trace_limbs(recipe, start, search.robot, possible_groups(start.reframed.frames)[0])
-    limbs = LimbProgram(traced.groups, staged(shortened(traced.program), traced.groups))
+    limbs = LimbProgram(
+        traced.groups, staged(shortened(traced.program), traced.groups), products=traced.products
+    )
     return Kernel(recipe.signature, False, straight, straight, "factored", limbs=limbs)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.arrow import Matrix, any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
+from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
-from psdmc.program.signature import QD, QDD, TAU, Q, Signature, jacobian_of
+from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_of
+from psdmc.program.thin_products import Thin
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -27,6 +30,8 @@ def trace(g: Ingredients) -> Outputs:
     M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd. Both blocks
     are multiplied by M^-1 behind the trace; that by qd comes first, so that its entries need not wait.
     """
+    if any_limbs(g.frames):
+        return _in_limbs(g)
     at_rest = _torque_derivatives(g, g.still)
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
@@ -42,6 +47,45 @@ def trace(g: Ingredients) -> Outputs:
         "dqdd_dtau": by_tau,
         "pivot": factors.pivots,
     }
+
+
+def _in_limbs(g: Ingredients) -> Outputs:
+    """The same by thin factors, without a product of n x n matrices."""
+    at_rest = _torque_derivatives(g, g.still)
+    arrow = eliminated(g.frames, at_rest.by_qdd)
+    load = [tau - own for tau, own in zip(g.inputs["tau"], at_rest.gravity, strict=True)]
+    accelerations = arrow.solved(load, at_rest.by_qd, [0.5 * rate for rate in g.inputs["qd"]])
+    moving = _torque_derivatives(g, accelerations)
+    blocks: list[Matrix] = [moving.by_q, at_rest.by_qd]
+    if has_free_root(g.frames):
+        known = known_derivatives(g.frames, g.inputs["q"], g.inputs["qd"], g.base_acceleration)
+        thin = [
+            _with_block(arrow.thin(_without_columns(matrix, count)), block, count - 3)
+            for matrix, block, count in zip(blocks, known, (KNOWN_BY_Q, KNOWN_BY_QD), strict=True)
+        ]
+    else:
+        thin = [arrow.thin(matrix) for matrix in blocks]
+    return {
+        "qdd": accelerations,
+        "dqdd_dq": thin[0],
+        "dqdd_dqd": thin[1],
+        "dqdd_dtau": arrow.thin_inverse,
+        "pivot": arrow.pivots,
+        THIN: arrow.thin_factors,
+    }
+
+
+def _without_columns(matrix: Matrix, count: int) -> list[list[Scalar]]:
+    """The matrix, with zeros in its first columns."""
+    return [[0.0] * count + list(row[count:]) for row in matrix]
+
+
+def _with_block(matrix: Matrix, block: Matrix, column: int) -> list[list[Scalar]]:
+    """The matrix, with a block in its first rows."""
+    found = [list(row) for row in matrix]
+    for row, values in zip(found, block, strict=False):
+        row[column : column + len(values)] = values
+    return found
 
 
 def multiplied(g: Ingredients) -> Outputs:
@@ -89,6 +133,7 @@ RECIPE = Recipe(
         summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
         factorises=(MASS_MATRIX,),
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
+        thin=(Thin("dqdd_dq", KNOWN_BY_Q), Thin("dqdd_dqd", KNOWN_BY_QD), Thin("dqdd_dtau")),
     ),
     "derivatives of forward dynamics",
     trace,
@@ -96,5 +141,6 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     benched=True,
 )

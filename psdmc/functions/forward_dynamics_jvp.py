@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.solve import solve
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along, solved, torque_slopes
@@ -22,7 +21,7 @@ def trace(g: Ingredients) -> Outputs:
     """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration."""
     qdd, factors = accelerations(g, g.inputs["tau"])
     load = [given - own for given, own in zip(g.inputs[DTAU.name], torque_slopes(g, qdd), strict=True)]
-    return {"qdd": qdd, "dqdd": solve(factors, load), "pivot": factors.pivots}
+    return {"qdd": qdd, "dqdd": factors.solved(load), "pivot": factors.pivots}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -55,4 +54,5 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
 )

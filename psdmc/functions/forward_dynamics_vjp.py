@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.solve import solve
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import (
@@ -30,7 +29,7 @@ def trace(g: Ingredients) -> Outputs:
     """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration. With M
     weights = cotangent, the gradient is that of weights . (tau - tau_id)."""
     qdd, factors = accelerations(g, g.inputs["tau"])
-    weights = solve(factors, g.inputs[COTANGENT.name])
+    weights = factors.solved(g.inputs[COTANGENT.name])
     by_q, by_qd = torque_gradients(g, qdd, weights)
     return {
         "qdd": qdd,
@@ -76,5 +75,6 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     benched=True,
 )

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc import reproducible
+from psdmc.dynamics.arrow import any_limbs, eliminated
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.solve import factorize, inverse
-from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.dynamics.solve import inverse
+from psdmc.program.signature import THIN, Q, Quantity, Signature
+from psdmc.program.thin_products import Thin
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -21,8 +23,10 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
-    return {"Minv": inverse(factors), "pivot": factors.pivots}
+    arrow = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
+    if any_limbs(g.frames):
+        return {"Minv": arrow.thin_inverse, "pivot": arrow.pivots, THIN: arrow.thin_factors}
+    return {"Minv": inverse(arrow.factors), "pivot": arrow.pivots}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -54,6 +58,7 @@ RECIPE = Recipe(
         theta=True,
         summary="Compute the inverse of the joint-space mass matrix M(q).",
         factorises=(MASS_MATRIX,),
+        thin=(Thin("Minv"),),
     ),
     "inverse of the mass matrix",
     trace,
@@ -61,5 +66,6 @@ RECIPE = Recipe(
     "computeMinverse",
     pinocchio,
     starts="inverse_dynamics",
+    in_limbs=True,
     matters=("fold_double_angle",),
 )

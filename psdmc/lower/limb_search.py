@@ -32,6 +32,7 @@ from psdmc.program.limb_stages import staged
 from psdmc.program.passes.free_registers import free_registers
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
+from psdmc.program.thin_products import AT_ONCE
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.limbs import Limbs
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
@@ -53,7 +54,10 @@ LIKELY = 1.1
 
 def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
     """Cost of one call with vectors of that many lanes, in the same weights as a straight line's."""
-    return weight_of_stages(limbs.groups, stage_costs(limbs), lanes, costs)
+    found = weight_of_stages(limbs.groups, stage_costs(limbs), lanes, costs)
+    if limbs.products is None:
+        return found
+    return found + for_lanes(costs).weight(limbs.products.cost) * max(1.0, AT_ONCE / lanes)
 
 
 def weight_of_stages(
@@ -110,6 +114,8 @@ class LimbSearch:
     def lowered(self, found: LimbArrangement, straight: Program) -> LimbProgram | None:
         """The function so arranged; None where no width makes it worth while against the straight line."""
         limbs = self._ordered(self._traced(found.arrangement, found.groups))
+        if limbs.products is not None and limbs.products.narrowest < AT_ONCE:
+            return None
         limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
         paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]
         return limbs.with_least(paying[0]) if paying else None
@@ -185,10 +191,11 @@ class LimbSearch:
         return LimbProgram(
             traced.groups,
             tuple(Stage(s.group, program) for s, program in zip(stages, in_order, strict=True)),
+            products=traced.products,
         )
 
     def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:
-        """Choose articulated bodies if limbs hang on a body: elimination in a mass matrix does not show what it sums."""
+        """Choose articulated bodies if limbs hang on a body. Elimination in a mass matrix has not been compared (0154)."""
         hang = any(start.reframed.frames[limbs[0][0]].parent != BASE for limbs in groups)
         if not self.recipe.accelerates or not hang:
             return start

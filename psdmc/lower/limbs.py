@@ -8,6 +8,7 @@ from functools import partial
 from itertools import accumulate, product
 
 from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.free_root import has_free_root
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
@@ -17,7 +18,8 @@ from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
 from psdmc.program.limb_sums import LimbSums
 from psdmc.program.program import Program, Slot
-from psdmc.program.signature import Quantity
+from psdmc.program.signature import THIN, Quantity
+from psdmc.program.thin_products import Shares, ThinProducts
 from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
 from psdmc.robot.limbs import Limbs
@@ -25,10 +27,11 @@ from psdmc.robot.limbs import Limbs
 
 @dataclass(frozen=True, slots=True)
 class TracedLimbs:
-    """A PROGRAM of core and limbs, as psdmc.program.limb_stages cuts it, and its groups."""
+    """A PROGRAM of core and limbs, as psdmc.program.limb_stages cuts it, its groups, and products behind it."""
 
     program: Program
     groups: tuple[LimbGroup, ...]
+    products: ThinProducts | None = None
 
 
 def trace_limbs(
@@ -71,7 +74,13 @@ class _Trace:
     def __init__(
         self, recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
     ) -> None:
-        self.recipe, self.arrangement, self.robot = recipe, arrangement, robot
+        self.signature = recipe.signature.of_limbs if groups else recipe.signature
+        self.recipe, self.arrangement, self.robot = (
+            replace(recipe, signature=self.signature),
+            arrangement,
+            robot,
+        )
+        self.products: ThinProducts | None = None
         self.tracer = Tracer()
         self.groups = [_Group(number, len(limbs)) for number, limbs in enumerate(groups)]
         self.sums = LimbSums(self.tracer, [len(limbs) for limbs in groups])
@@ -129,7 +138,8 @@ class _Trace:
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
         """Return the stored outputs by slots of the core and of limbs. Zeros are not stored."""
-        for quantity in self.recipe.signature.stored:
+        self.products = self._products(found)
+        for quantity in self.signature.stored:
             entries = [
                 [(place.group, own) for place in self.places for own in self._entries(place, axis)]
                 for axis in quantity.axes
@@ -150,6 +160,8 @@ class _Trace:
             Slot(quantity.name, self._flat(quantity, [own[limb if len(own) > 1 else 0] for _, own in which]))
             for limb in range(count)
         )
+        if self.products is not None:
+            slots = tuple(self.products.place(slot, THIN) for slot in slots)
         if not numbers:
             yield slots[0], value
             return
@@ -160,6 +172,32 @@ class _Trace:
         group.outputs.append((slot, slots))
         if is_new:
             yield slot, value
+
+    def _products(self, found: Mapping[Slot, Scalar]) -> ThinProducts | None:
+        """What is multiplied behind the stages; None where nothing is, as the robot has no core."""
+        entries = [(place, own) for place in self.places for own in self._entries(place, "nv")]
+        core = [k for k, (place, _) in enumerate(entries) if place.group is None]
+        if not self.groups or not self.signature.thin or not core:
+            return None
+        groups = []
+        for group in self.groups:
+            rows = [k for k, (place, _) in enumerate(entries) if place.group == group.number]
+            used = [
+                number
+                for number, column in enumerate(core)
+                if any(found[Slot(THIN, row * len(entries) + column)] != 0.0 for row in rows)
+            ]
+            whole = tuple(entries[row][1][limb] for limb in range(group.count) for row in rows)
+            groups.append(Shares(f"{group.vectors.name}_shares", whole, tuple(used)))
+        own = tuple(entries[k][1][0] for k in core)
+        thin, is_free = self.signature.thin, has_free_root(self.reframed.frames)
+        return ThinProducts(
+            tuple(each.name for each in thin),
+            tuple(each.known if is_free else 0 for each in thin),
+            self.first["nv"][-1],
+            own,
+            tuple(groups),
+        )
 
     def _flat(self, quantity: Quantity, indices: Sequence[int]) -> int:
         flat = 0
@@ -192,7 +230,7 @@ class _Trace:
             replace(group.vectors, constants=tuple(self.tracer.lane_constants.get(group.number, ())))
             for group in self.groups
         )
-        return TracedLimbs(program, groups)
+        return TracedLimbs(program, groups, self.products)
 
 
 def _sum_of(partial: Slot) -> Slot:

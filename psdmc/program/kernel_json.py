@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from psdmc.errors import InternalError
@@ -14,8 +15,9 @@ from psdmc.program.operations import BY_WORD
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight
 from psdmc.program.signature import Signature
+from psdmc.program.thin_products import Shares, ThinProducts
 
-FORMAT = 5
+FORMAT = 6
 """Version of the text's form."""
 
 
@@ -112,7 +114,8 @@ def _limbs_to_plain(limbs: LimbProgram) -> dict[str, Any]:
         [group.number, group.count, group.inputs, group.constants, group.outputs] for group in limbs.groups
     ]
     stages = [[stage.group, _program_to_plain(stage.program)] for stage in limbs.stages]
-    return {"groups": groups, "stages": stages, "least": limbs.least}
+    products = None if limbs.products is None else asdict(limbs.products)
+    return {"groups": groups, "stages": stages, "least": limbs.least, "products": products}
 
 
 def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
@@ -127,7 +130,16 @@ def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
         for number, count, inputs, constants, outputs in plain["groups"]
     )
     stages = tuple(Stage(group, _program_from_plain(program)) for group, program in plain["stages"])
-    return LimbProgram(groups, stages, plain["least"])
+    return LimbProgram(groups, stages, plain["least"], _products_from_plain(plain["products"]))
+
+
+def _products_from_plain(plain: Any) -> ThinProducts | None:
+    if plain is None:
+        return None
+    groups = tuple(Shares(g["vector"], tuple(g["rows"]), tuple(g["carriers"])) for g in plain["groups"])
+    return ThinProducts(
+        tuple(plain["outputs"]), tuple(plain["known"]), plain["n"], tuple(plain["core"]), groups
+    )
 
 
 def _spread(plain: Any) -> tuple[Spread, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from psdmc.program.program import Program, Slot
 from psdmc.program.replay import Value, replayed
+from psdmc.program.thin_products import ThinProducts
 from psdmc.program.trace import Tracer, constants_of, group_name
 
 Spread = tuple[Slot, tuple[Slot, ...]]
@@ -86,12 +87,14 @@ class Stage:
 class LimbProgram:
     """Stages in their order.
 
-    least  lanes of the narrowest vector with which this is cheaper than the function's straight line
+    least     lanes of the narrowest vector with which this is cheaper than the function's straight line
+    products  done behind them; None: none are
     """
 
     groups: tuple[LimbGroup, ...]
     stages: tuple[Stage, ...]
     least: int = 2
+    products: ThinProducts | None = None
 
     def with_least(self, least: int) -> LimbProgram:
         return replace(self, least=least)
@@ -122,7 +125,12 @@ def unpacked(limbs: LimbProgram) -> Program:
             found.append(values)
         core |= _sums(group, stage.program, found)
         outputs += _spread(group, stage.program, found)
-    return tracer.finish(outputs)
+    if limbs.products is None:
+        return tracer.finish(outputs)
+    known = dict(outputs)
+    whole = dict(limbs.products.multiplied(known))
+    kept = [each for each in outputs if each[0] not in whole and each[0].vector not in limbs.products.sizes]
+    return tracer.finish([*kept, *whole.items()])
 
 
 def _given(group: LimbGroup, limb: int, tracer: Tracer) -> dict[Slot, Value]:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from psdmc.program.lanes import Lanes
 from psdmc.program.limb_program import LimbGroup
 from psdmc.program.program import Op, Slot
-from psdmc.program.trace import Constant, Symbol, Tracer, arguments_of, constants_of
+from psdmc.program.trace import Constant, Symbol, Tracer, arguments_of, constants_of, group_name
 
 CORE = -1
 """In the place of a group's number, for what is the same for all limbs."""
@@ -61,3 +61,14 @@ class LimbSums:
         found = self.tracer.symbol(Slot(self._names[group], number))
         self.summed[found.index] = value.index
         return -found if value.negative else found
+
+    def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
+        """Inputs that differ between limbs where values do."""
+        return [self._stand_in(vector, k, value) for k, value in enumerate(values)]
+
+    def _stand_in(self, vector: str, number: int, value: Symbol | Constant) -> Symbol:
+        group = self.group_of(value.index) if isinstance(value, Symbol) else CORE
+        if group != CORE:
+            vector = f"{group_name(group)}_{vector}"
+            self.add_input(vector, group)
+        return self.tracer.symbol(Slot(vector, number))

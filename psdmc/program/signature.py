@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +13,7 @@ from psdmc.errors import InternalError
 from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
 from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
+from psdmc.program.thin_products import Thin
 
 WORDS = ("n", "nq", "nv", "nx", "l", "frames", "nonzeros")
 """Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames; and, of
@@ -134,6 +135,7 @@ class Signature:
     factorises  symmetric matrices, in the order of their pivots' numbers. The pivots are computed beside the outputs: if one
               is not positive the function fails, its outputs are NaN and it returns which; none: it cannot fail
     products  how outputs that a trace does not give follow from what it gives
+    thin      outputs (nv, nv) that a trace with limbs gives as factors, besides THIN, and no product (thin_products.py)
     normalizes  whether quaternions that it reads may have any length but zero
     summary   a sentence on what it computes, for Python and the table of docs/functions.md
     calls     name of a function of states that its C calls stage by stage, instead of a body of its own
@@ -148,6 +150,7 @@ class Signature:
     theta: bool
     factorises: tuple[SymmetricMatrix, ...] = ()
     products: tuple[Product, ...] = ()
+    thin: tuple[Thin, ...] = ()
     calls: str | None = None
     normalizes: bool = False
     summary: str = ""
@@ -191,6 +194,14 @@ class Signature:
         right = {product.output: product.right for product in self.products}
         return frozenset(right.get(quantity.name, quantity.name) for quantity in self.stored)
 
+    @property
+    def of_limbs(self) -> Signature:
+        """What traces with limbs give."""
+        if not self.thin:
+            return self
+        factors = Quantity(THIN, ("nv", "nv"), unit="1", powers=(1, -1))
+        return replace(self, products=(), outputs=(*self.outputs, factors))
+
     def label(self, output: Quantity, theta: bool = False) -> str:
         """The name for one output's values: the function's, followed by the output's where there are several."""
         kernel = self.name + ("_theta" if theta else "")
@@ -212,6 +223,9 @@ def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
 
 PIVOTS = "pivot"
 """What the pivots and signs of a function's matrices are called in its traces."""
+
+THIN = "thin"
+"""What the factors are called that all of a function's thin products have in common."""
 
 Q = Quantity(
     "q",

@@ -65,6 +65,9 @@ class SumsOverLimbs(Protocol):
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
         """The sum over a group's limbs of a scalar that is one for each of them."""
 
+    def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
+        """Inputs that differ between limbs where values do."""
+
 
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
@@ -85,7 +88,9 @@ class Tracer:
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
         """Inputs that stand for values until these are put in their place (replay.py)."""
-        return self.symbols(vector, len(values))
+        if self.limb_sums is None:
+            return self.symbols(vector, len(values))
+        return self.limb_sums.stand_ins(vector, values)
 
     def symbol(self, slot: Slot) -> Symbol:
         """One input."""

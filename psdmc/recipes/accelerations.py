@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from psdmc.dynamics.arrow import Arrow, eliminated
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import Factors, factorize, solve
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.recipes.recipe import Ingredients
 from psdmc.recipes.torques import torques
@@ -24,15 +24,15 @@ MASS_MATRIX = SymmetricMatrix(
 """M(q), which functions solve or invert."""
 
 
-def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Factors]:
+def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Arrow]:
     """n accelerations M^-1 (tau - h), and the factors of M.
 
     The mass matrix is factorized before the bias is found: its divisions depend on each other, and the processor
     computes the recursion meanwhile.
     """
-    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
+    factors = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
-    return solve(factors, [given - h for given, h in zip(tau, bias, strict=True)]), factors
+    return factors.solved([given - h for given, h in zip(tau, bias, strict=True)]), factors
 
 
 def accelerations_and_pivots(

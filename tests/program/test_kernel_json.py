@@ -12,8 +12,10 @@ from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.lower.reframe import unmoved
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
+from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.text import parse
+from psdmc.program.thin_products import Shares, ThinProducts
 
 GRAVITY = parse("""
     a = load q[0]
@@ -36,6 +38,14 @@ def kernels() -> dict[str, Kernel]:
 
 def test_what_stands_before_products_comes_back():
     made = Kernel(SIGNATURES["gravity"], False, GRAVITY, GRAVITY, "factored", GRAVITY)
+    assert kernels_from_json(kernels_to_json({"gravity": made}), SIGNATURES) == {"gravity": made}
+
+
+def test_limbs_and_the_products_behind_them_come_back():
+    group = LimbGroup(0, 2, ((Slot("group0_q", 0), (Slot("q", 0), Slot("q", 1))),), ((1.0, 2.0),), ())
+    products = ThinProducts(("g",), (0,), 2, (0,), (Shares("group0_shares", (1,), (0,)),))
+    limbs = LimbProgram((group,), (Stage(None, parse("a = load q[0]\nout g_core[0] = a")),), 4, products)
+    made = Kernel(SIGNATURES["gravity"], False, GRAVITY, GRAVITY, "factored", limbs=limbs)
     assert kernels_from_json(kernels_to_json({"gravity": made}), SIGNATURES) == {"gravity": made}
 
 
@@ -71,7 +81,7 @@ def test_constants_come_back_bit_for_bit(value: float):
     "change",
     [
         lambda text: text[: len(text) // 2],
-        lambda text: text.replace('"format":5', '"format":4'),
+        lambda text: text.replace('"format":6', '"format":5'),
         lambda text: text.replace('"mul"', '"hypot"'),
         lambda text: text.replace('"gravity"', '"weight"'),
         lambda text: text.replace('["mul",2,1]', '["mul",2,9]'),

@@ -11,6 +11,7 @@ from psdmc.program.limb_program import LimbGroup, LimbProgram, unpacked
 from psdmc.program.limb_stages import staged
 from psdmc.program.program import Slot
 from psdmc.program.text import parse, show
+from psdmc.program.thin_products import Shares, ThinProducts
 
 TWO = LimbGroup(
     number=0,
@@ -75,3 +76,40 @@ def test_what_is_no_function_of_core_and_limbs_is_refused(text: str, fault: str)
     other = LimbGroup(1, 2, ((Slot("group1_q", 0), (Slot("q", 3), Slot("q", 4))),), (), ())
     with pytest.raises(InternalError, match=fault):
         staged(parse(text), [TWO, other])
+
+
+def test_products_behind_limbs_are_written_out_entry_by_entry():
+    """Two limbs of one rate on one rate: x = -V E in the core's row, y - T x in a limb's; one column is known."""
+    group = LimbGroup(
+        number=0,
+        count=2,
+        inputs=((Slot("group0_q", 0), (Slot("q", 1), Slot("q", 2))),),
+        constants=(),
+        outputs=(
+            (Slot("group0_output", 0), (Slot("shares", 0), Slot("shares", 1))),
+            (Slot("group0_output", 1), (Slot("M_core", 1), Slot("M_core", 2))),
+            (Slot("group0_output", 2), (Slot("M", 4), Slot("M", 8))),
+        ),
+    )
+    whole = parse("""
+        v = load q[0]
+        leg = load group0_q[0]
+        e = sin leg
+        y = cos leg
+        out core_inverse[0] = v
+        out M[0] = v
+        out group0_output[0] = leg
+        out group0_output[1] = e
+        out group0_output[2] = y
+    """)
+    products = ThinProducts(("M",), (1,), 3, (0,), (Shares("shares", (1, 2), (0,)),))
+    limbs = LimbProgram((group,), staged(whole, [group]), products=products)
+    v, a, b = q = np.array([0.7, 0.3, -0.4])
+
+    found = interpret(unpacked(limbs), {"q": q}, {"M": 9})["M"].reshape(3, 3)
+
+    x = -v * np.sin(q[1:])
+    np.testing.assert_allclose(found[0], [v, *x], rtol=1e-15)
+    np.testing.assert_allclose(found[1:, 0], 0.0)
+    np.testing.assert_allclose(found[1:, 1:], np.diag(np.cos(q[1:])) - np.outer([a, b], x), rtol=1e-15)
+    assert (products.cost.mul, products.cost.add) == (3, 2)

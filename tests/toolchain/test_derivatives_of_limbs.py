@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from direct import Direct, shared_library
-from limbed import SHAPES, limbed
+from limbed import DERIVATIVES, SHAPES, limbed
 from lowered import lowered
 from random_trees import RandomTree
 from slow_cases import slow_but_for
@@ -25,12 +25,7 @@ from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import Placement
 from psdmc.robot.reference import Reference
 
-FUNCTIONS = (
-    "gravity_derivatives",
-    "inverse_dynamics_derivatives",
-    "inverse_dynamics_vjp",
-    "inverse_dynamics_jvp",
-)
+INVERSE, FORWARD = DERIVATIVES[:4], DERIVATIVES[4:]
 COUNT = 11
 """States: no whole number of vectors."""
 
@@ -64,26 +59,29 @@ TREES: dict[str, Callable[[], RandomTree]] = {
 EQUAL, UNEQUAL = "four legs of a floating body", "legs of three, two and one joint"
 WRIST = "three fingers on a wrist"
 CASES = [
-    *((name, "float64", "gcc") for name in TREES),
-    *((name, "float32", "gcc") for name in (EQUAL, WRIST)),
-    *((name, "float64", "clang") for name in (EQUAL, UNEQUAL)),
+    *((name, INVERSE, "float64", "gcc") for name in (EQUAL, UNEQUAL, "almost equal legs")),
+    *((name, INVERSE, "float32", "gcc") for name in (EQUAL, WRIST)),
+    *((name, INVERSE, "float64", "clang") for name in (EQUAL, UNEQUAL)),
+    *((name, FORWARD, "float64", "gcc") for name in TREES),
+    (UNEQUAL, FORWARD, "float64", "clang"),
 ]
 QUICK = [
-    (EQUAL, "float64", "gcc"),
-    (WRIST, "float32", "gcc"),
+    (EQUAL, FORWARD, "float64", "gcc"),
+    (WRIST, INVERSE, "float32", "gcc"),
 ]
 
 
-@pytest.mark.parametrize(("name", "real", "compiler"), slow_but_for(QUICK, CASES, spread=True))
+@pytest.mark.parametrize(("name", "functions", "real", "compiler"), slow_but_for(QUICK, CASES, spread=True))
 def test_derivatives_are_pinocchios_in_every_layout(
-    name: str, real: str, compiler: str, tmp_path: Path
+    name: str, functions: tuple[str, ...], real: str, compiler: str, tmp_path: Path
 ) -> None:
+    """Those of forward dynamics without parameters at run time: that variant has no limbs in lanes."""
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler}")
     tree = TREES[name]()
     model = derive_model(tree.mechanism(), expand=False)
-    kernels = lowered(model, "factored", FUNCTIONS)
-    assert any(kernels[function].limbs for function in FUNCTIONS)
+    kernels = lowered(model, "factored", functions, theta_variants=functions is INVERSE)
+    assert any(kernels[function].limbs for function in functions)
     package = package_view(package_info(model), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
     compiled = Direct(package, shared_library(package, tmp_path, ["-O0", "-march=native"], compiler))
     sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
@@ -93,9 +91,10 @@ def test_derivatives_are_pinocchios_in_every_layout(
     oracle = Reference(tree.model, "tip")
     theta_b = np.asarray(model.theta_b, real)
 
-    for function in FUNCTIONS:
+    variants = {"": []} | ({"_theta": [theta_b]} if functions is INVERSE else {})
+    for function in functions:
         expected = RECIPES[function].pinocchio(oracle, {k: v.astype(float) for k, v in given.items()})
-        for way, found in _every_layout(compiled, package, function, given, sizes, theta_b):
+        for way, found in _every_layout(compiled, package, function, given, sizes, variants):
             for block, values in expected.items():
                 error = np.abs(found[block].reshape(values.shape) - values).max()
                 assert error <= EXACT[real] * np.abs(values).max(), (function, way, block)
@@ -103,8 +102,9 @@ def test_derivatives_are_pinocchios_in_every_layout(
 
 def _states(tree: RandomTree, sizes: Sizes, real: str) -> dict[str, np.ndarray]:
     q, qd, qdd = states_of(tree.mechanism(), np.random.default_rng(9), COUNT)
-    along = np.random.default_rng(10).uniform(-1.0, 1.0, (4, COUNT, sizes.nv))
-    given = {"q": q, "qd": qd, "qdd": qdd} | dict(zip(("cotangent", "dq", "dqd", "dqdd"), along, strict=True))
+    along = np.random.default_rng(10).uniform(-1.0, 1.0, (6, COUNT, sizes.nv))
+    names = ("cotangent", "dq", "dqd", "dqdd", "dtau", "tau")
+    given = {"q": q, "qd": qd, "qdd": qdd} | dict(zip(names, along, strict=True))
     return {name: np.ascontiguousarray(rows, real) for name, rows in given.items()}
 
 
@@ -114,20 +114,20 @@ def _every_layout(
     function: str,
     given: dict[str, np.ndarray],
     sizes: Sizes,
-    theta_b: np.ndarray,
+    variants: dict[str, list[np.ndarray]],
 ) -> list[tuple[str, dict[str, np.ndarray]]]:
     """What one state after the other, rows and lanes give, baked and with theta_b."""
     signature = RECIPES[function].signature
     inputs = [given[quantity.name] for quantity in signature.inputs]
     found = []
-    for variant, theta in (("", []), ("_theta", [theta_b])):
-        one, rows = ({q.name: _empty(sizes.size(q), theta_b) for q in signature.outputs} for _ in range(2))
+    for variant, theta in variants.items():
+        one, rows = ({q.name: _empty(sizes.size(q), inputs[0]) for q in signature.outputs} for _ in range(2))
         for k in range(COUNT):
             state = [array[k].copy() for array in inputs]
             compiled(f"{function}{variant}", *state, *theta, *(values[k] for values in one.values()))
         compiled(f"{function}{variant}_batch", COUNT, *inputs, *theta, *rows.values())
         found += [(f"one state{variant}", one), (f"rows{variant}", rows)]
-    lanes = {q.name: _in_lanes(_empty(sizes.size(q), theta_b), package.lanes) for q in signature.outputs}
+    lanes = {q.name: _in_lanes(_empty(sizes.size(q), inputs[0]), package.lanes) for q in signature.outputs}
     laid = [_in_lanes(array, package.lanes) for array in inputs]
     compiled(f"{function}_batch_soa", COUNT, *laid, *lanes.values())
     by_lane = {

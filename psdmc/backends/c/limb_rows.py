@@ -86,8 +86,10 @@ def stores(limbs: LimbProgram, sizes: Mapping[str, int]) -> Iterator[Stored]:
     """Stores of what limbs put out, and of zeros, in an order in which they have to be done; `sizes` are those of outputs.
 
     Keeps: what the core's stages have stored. A store may write over neighbours that a later one puts right.
+    Leaves out: what products store.
     """
     own = {slot for stage in limbs.stages for slot, _ in stage.program.outputs}
+    own |= limbs.products.written if limbs.products else set()
     for vector, size in sizes.items():
         cores = {slot.index for slot in own if slot.vector == vector}
         yield from _Vector(vector, size, cores, limbs.groups).stores()

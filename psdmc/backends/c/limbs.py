@@ -14,6 +14,7 @@ from psdmc.backends.c.lines import Body
 from psdmc.backends.options import EmitOptions
 from psdmc.program.cost import Cost, cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
+from psdmc.program.thin_products import INVERSE, ThinProducts
 from psdmc.target.vectors import VectorUnit
 
 NARROWEST = 16
@@ -183,6 +184,66 @@ class StageView:
 
 
 @dataclass(frozen=True, slots=True)
+class SharesView:
+    """A group's part of thin products: the vector of T, where its rows begin in an output, and their product with x."""
+
+    vector: str
+    width: int
+    places: tuple[int, ...]
+    product: str
+
+
+@dataclass(frozen=True, slots=True)
+class ThinView:
+    """Products behind limbs.
+
+    arrays   names and lengths of what stages store for them
+    rights   names of E, and
+    known    first columns that are stored already, output by output
+    n        columns
+    places   where the core's rows begin in an output, and
+    begins   in E
+    rows     of the core, as C
+    """
+
+    arrays: tuple[tuple[str, int], ...]
+    outputs: tuple[str, ...]
+    rights: tuple[str, ...]
+    known: tuple[int, ...]
+    n: int
+    places: tuple[int, ...]
+    begins: tuple[int, ...]
+    rows: tuple[str, ...]
+    groups: tuple[SharesView, ...]
+
+
+def _thin_view(products: ThinProducts) -> ThinView:
+    n, wide = products.n, len(products.core)
+    return ThinView(
+        tuple(products.sizes.items()),
+        products.outputs,
+        tuple(map(products.right, products.outputs)),
+        products.known,
+        n,
+        tuple(row * n for row in products.core),
+        tuple(row * n for row in range(wide)),
+        tuple(
+            " + ".join(f"{INVERSE}[{row * wide + k}] * right_{k}" for k in range(wide)) for row in range(wide)
+        ),
+        tuple(
+            SharesView(
+                group.vector,
+                len(group.carriers),
+                tuple(row * n for row in group.rows),
+                " + ".join(f"share[{k}] * new_{number}" for k, number in enumerate(group.carriers)),
+            )
+            for group in products.groups
+            if group.carriers
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class LimbsView:
     """A kernel's body for one state with limbs in lanes.
 
@@ -190,6 +251,7 @@ class LimbsView:
     unused  inputs that it never reads
     core    reals of the core that other stages read
     stores  what puts out what limbs have computed, and zeros
+    products  done behind that; None: none are
     """
 
     file: str
@@ -199,6 +261,7 @@ class LimbsView:
     groups: tuple[GroupView, ...]
     stages: tuple[StageView, ...]
     stores: tuple[StoreView, ...]
+    products: ThinView | None
     cost: Cost
 
     @property
@@ -229,7 +292,8 @@ def limbs_view(
         core=_length(limbs.stages, CORE),
         groups=tuple(_group(group, limbs.stages, suffix) for group in limbs.groups),
         stages=stages,
-        stores=store_views(limbs, sizes),
+        stores=store_views(limbs, sizes | (limbs.products.sizes if limbs.products else {})),
+        products=_thin_view(limbs.products) if limbs.products else None,
         cost=_whole_cost(limbs),
     )
 
@@ -274,4 +338,5 @@ def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
 
 def _whole_cost(limbs: LimbProgram) -> Cost:
     costs = [cost(stage.program) for stage in limbs.stages]
+    costs += [limbs.products.cost] if limbs.products else []
     return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))

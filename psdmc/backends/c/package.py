@@ -207,6 +207,11 @@ class PackageView:
         return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels)
 
     @property
+    def has_thin_products(self) -> bool:
+        """Whether products follow some kernel's limbs."""
+        return any(kernel.limbs and kernel.limbs.products for kernel in self.kernels)
+
+    @property
     def has_clears(self) -> bool:
         """Whether some body clears runs of zeros."""
         return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)

@@ -1,0 +1,220 @@
+"""Symmetric matrices of limbs on a core, where one limb of each group stands for all of them: block elimination.
+
+Rows of two limbs have no common entries. With a limb's rows l, and c those of the core,
+
+    Q = M_ll^-1        T = Q M_lc        V = (M_cc - sum over all limbs of M_cl T)^-1
+
+solve M x = y by x_c = V (y_c - sum T^T y_l) and x_l = Q y_l - T x_c. Nothing else is summed over limbs. The pivots are those
+of an elimination row by row from the last one up (solve.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from psdmc.dynamics.frames import BASE, Frame
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, inverse, solve
+
+Matrix = Sequence[Sequence[Scalar]]
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """A limb of a group, after its elimination.
+
+    rates     its rows
+    carriers  rows of the core that have entries in common with it
+    total     the sum over the group's limbs of a scalar that each of them has
+    factors   of its block
+    shares    T: a row per rate, a column per carrier
+    """
+
+    rates: tuple[int, ...]
+    carriers: tuple[int, ...]
+    total: Callable[[Scalar], Scalar]
+    factors: Factors
+    shares: Matrix
+
+    def reduced(self, right: Sequence[Scalar]) -> list[Scalar]:
+        """y_c - T^T y_l and Q y_l, of a right side that is this limb's in all rows."""
+        own, found = [right[k] for k in self.rates], list(right)
+        for k, column in zip(self.carriers, zip(*self.shares, strict=True), strict=True):
+            found[k] = found[k] - inner_product(column, own)
+        for k, value in zip(self.rates, solve(self.factors, own), strict=True):
+            found[k] = value
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """A matrix of limbs on a core, after elimination.
+
+    core     rows of the core
+    limbs    one of each group
+    factors  of the inverse of V
+    pivots   of all rows
+    """
+
+    core: tuple[int, ...]
+    limbs: tuple[Limb, ...]
+    factors: Factors
+    pivots: tuple[Scalar, ...]
+
+    def solved(
+        self, right: Sequence[Scalar], matrix: Matrix | None = None, vector: Sequence[Scalar] = ()
+    ) -> list[Scalar]:
+        """x of M x = right, or of M x = right - matrix vector, where no two limbs have common entries in the matrix."""
+        found = self._reduced(right) if matrix is None else self._reduced_by(right, matrix, vector)
+        above = [found[k] for k in self.core]
+        for k, value in zip(self.core, solve(self.factors, above), strict=True):
+            found[k] = value
+        for limb in self.limbs:
+            given = [found[k] for k in limb.carriers]
+            for k, shares in zip(limb.rates, limb.shares, strict=True):
+                found[k] = found[k] - inner_product(shares, given)
+        return found
+
+    def _reduced(self, right: Sequence[Scalar]) -> list[Scalar]:
+        """y_c - sum T^T y_l and Q y_l, of a right side that is the core's in the rows of the core."""
+        return self._summed(list(right), [limb.reduced(self._alone(limb, right)) for limb in self.limbs])
+
+    def _reduced_by(self, right: Sequence[Scalar], matrix: Matrix, vector: Sequence[Scalar]) -> list[Scalar]:
+        """The same of right - matrix vector. What a limb's columns give to the core is summed together with T^T y_l."""
+        found, reduced = list(right), []
+        for k in self.core:
+            found[k] = found[k] - _product(matrix[k], vector, self.core)
+        for limb in self.limbs:
+            own = self._alone(limb, right)
+            for k in limb.rates:
+                own[k] = own[k] - _product(matrix[k], vector, (*self.core, *limb.rates))
+            for k in self.core:
+                own[k] = -_product(matrix[k], vector, limb.rates)
+            reduced.append(limb.reduced(own))
+        return self._summed(found, reduced)
+
+    def _alone(self, limb: Limb, right: Sequence[Scalar]) -> list[Scalar]:
+        """A right side that is zero in all rows but a limb's."""
+        return [value if k in limb.rates else 0.0 for k, value in enumerate(right)]
+
+    def _summed(self, found: list[Scalar], reduced: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+        """The core's rows with the sums of what limbs add to them, and limbs' own rows."""
+        for limb, own in zip(self.limbs, reduced, strict=True):
+            for k in self.core:
+                found[k] = found[k] + limb.total(own[k])
+            for k in limb.rates:
+                found[k] = own[k]
+        return found
+
+    def thin(self, matrix: Matrix) -> list[list[Scalar]]:
+        """The factors of - M^-1 D, if no two limbs have common entries in D: E in the rows of the core, Y in those of limbs.
+
+        - M^-1 D is x = - V E in the rows of the core, and Y - T x in those of a limb, Y being zero in other limbs' columns.
+        """
+        columns = [list(column) for column in zip(*matrix, strict=True)]
+        found = columns[:]
+        for k in self.core:
+            found[k] = self._reduced(columns[k])
+        for limb in self.limbs:
+            for k in limb.rates:
+                found[k] = limb.reduced(columns[k])
+        rows = [list(row) for row in zip(*found, strict=True)]
+        return [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
+
+    @property
+    def thin_inverse(self) -> list[list[Scalar]]:
+        """The factors of M^-1 itself."""
+        n = len(self.pivots)
+        return self.thin([[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)])
+
+    @property
+    def thin_factors(self) -> list[list[Scalar]]:
+        """V in the rows of the core, T in those of limbs, both in the columns of the core."""
+        n = len(self.pivots)
+        found: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+        for k, row in zip(self.core, inverse(self.factors), strict=True):
+            for j, value in zip(self.core, row, strict=True):
+                found[k][j] = value
+        for limb in self.limbs:
+            for k, shares in zip(limb.rates, limb.shares, strict=True):
+                for j, value in zip(limb.carriers, shares, strict=True):
+                    found[k][j] = value
+        return found
+
+
+def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
+    """A symmetric matrix over the rates of these frames, factorized limb by limb. Raises SingularMatrix if a pivot is a
+    constant not above 0."""
+    core, groups = limbs_of(frames)
+    rest = {(i, j): matrix[i][j] for i in core for j in core if j <= i}
+    pivots: list[Scalar] = [0.0] * len(matrix)
+    limbs = [_eliminated(rates, total, core, matrix) for rates, total in groups]
+    for limb in limbs:
+        for i, row in zip(limb.carriers, _lower(limb, matrix), strict=True):
+            for j, value in zip(limb.carriers, row, strict=False):
+                rest[i, j] = rest[i, j] - limb.total(value)
+        for k, pivot in zip(limb.rates, limb.factors.pivots, strict=True):
+            pivots[k] = pivot
+    factors = _factorized(core, [[rest[max(i, j), min(i, j)] for j in core] for i in core])
+    for k, pivot in zip(core, factors.pivots, strict=True):
+        pivots[k] = pivot
+    return Arrow(core, tuple(limbs), factors, tuple(pivots))
+
+
+def _lower(limb: Limb, matrix: Matrix) -> list[list[Scalar]]:
+    """M_cl T of one limb, its lower triangle."""
+    columns = list(zip(*limb.shares, strict=True))
+    return [
+        [inner_product([matrix[i][k] for k in limb.rates], column) for column in columns[: number + 1]]
+        for number, i in enumerate(limb.carriers)
+    ]
+
+
+def _eliminated(
+    rates: tuple[int, ...], total: Callable[[Scalar], Scalar], core: Sequence[int], matrix: Matrix
+) -> Limb:
+    factors = _factorized(rates, [[matrix[i][j] for j in rates] for i in rates])
+    carriers = tuple(c for c in core if any(not _is_zero(matrix[k][c]) for k in rates))
+    columns = [solve(factors, [matrix[k][c] for k in rates]) for c in carriers]
+    shares = [[column[k] for column in columns] for k in range(len(rates))]
+    return Limb(rates, carriers, total, factors, shares)
+
+
+def _factorized(rates: Sequence[int], block: Matrix) -> Factors:
+    try:
+        return factorize(block)
+    except SingularMatrix as singular:
+        raise SingularMatrix(rates[singular.row]) from None
+
+
+def _product(row: Sequence[Scalar], vector: Sequence[Scalar], where: Sequence[int]) -> Scalar:
+    """A part of a row times a vector."""
+    return inner_product([row[k] for k in where], [vector[k] for k in where])
+
+
+def _is_zero(value: Scalar) -> bool:
+    return isinstance(value, float) and value == 0.0
+
+
+def any_limbs(frames: Sequence[Frame]) -> bool:
+    """Whether some frame stands for those of several limbs at once."""
+    return any(frame.limbs is not None for frame in frames)
+
+
+def limbs_of(
+    frames: Sequence[Frame],
+) -> tuple[tuple[int, ...], list[tuple[tuple[int, ...], Callable[[Scalar], Scalar]]]]:
+    """The rates of the core, and of one limb of each group its rates and the sum over the group's limbs."""
+    roots: list[int] = []
+    for i, frame in enumerate(frames):
+        above = BASE if frame.parent == BASE else roots[frame.parent]
+        roots.append(i if frame.limbs is not None else above)
+    owners = [root for root, frame in zip(roots, frames, strict=True) if frame.follows is None]
+    first = first_rates(frames)
+    own: dict[int, list[int]] = {}
+    for number, root in enumerate(owners):
+        own.setdefault(root, []).extend(range(first[number], first[number + 1]))
+    core = tuple(own.pop(BASE, ()))
+    return core, [(tuple(rates), frames[root].limbs) for root, rates in own.items()]  # type: ignore[misc]

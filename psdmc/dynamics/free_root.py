@@ -1,0 +1,40 @@
+"""Derivatives of forward dynamics that need no dynamics: those by the motion of a free joint that carries the whole robot.
+
+Its place, its orientation and its linear rate v enter the equations of motion through one vector alone, along its own axes:
+a = dv/dt + w x v + R^T up, with up = minus gravity. At equal torques, a and all other accelerations stay what they are if
+these change. Then dv/dt changes by minus the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.frames import BASE, Frame, from_previous, joint_turn, outward
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector
+from psdmc.dynamics.slices import positions, rates
+from psdmc.robot.joints.joint_type import SLIDES, TURNS
+
+KNOWN_BY_Q, KNOWN_BY_QD = 6, 3
+"""Columns of a free root, which comes first, that are known without dynamics."""
+
+
+def has_free_root(frames: Sequence[Frame]) -> bool:
+    """Whether a joint that leaves every motion, with rates along its own axes, carries the whole robot."""
+    return frames[0].joint.twists == (*SLIDES, *TURNS) and all(frame.parent != BASE for frame in frames[1:])
+
+
+def known_derivatives(
+    frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], up: Vector
+) -> tuple[Matrix, Matrix]:
+    """The derivatives of the root's linear accelerations by its orientation and by its linear rates, 3 x 3 each. Those by
+    its position, and all derivatives of other accelerations by these three, are zero."""
+    root = frames[0]
+    turned = outward(joint_turn(root, positions(frames, q)[0]), from_previous(root, up))
+    own = rates(frames, qd)[0]
+    return _minus_cross(turned), _minus_cross(own[3:])
+
+
+def _minus_cross(v: Sequence[Scalar]) -> Matrix:
+    """The matrix of - v x."""
+    x, y, z = v
+    return ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
