@@ -52,7 +52,8 @@ class DynamicsModel(Answers):
     mechanism    the robot: joints, link frames, gravity, limits, and standard parameters (11 per link)
     certificate  (nv,) largest difference between the torques of the model and of the Newton-Euler algorithm at random
                  states, divided by the largest torque; one number per entry of tau
-    provenance   plain JSON values: text, hash and format of the robot file, options, snapped angles, tolerances
+    provenance   plain JSON values: text, hash and format of the robot file, options, tolerances, and angles that
+                 psdmc made exact
     calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
     """
 
