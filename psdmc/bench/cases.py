@@ -99,7 +99,7 @@ def legged_cases(
         if name not in LEGGED:
             raise InputError(f"there is no legged robot {name!r}", f"choose from {', '.join(LEGGED)}")
         progress(f"{name}: deriving")
-        found = derive_fresh(load_robot(_robot_data() / LEGGED[name], floating=True).chain)
+        found = derive_fresh(load_robot(robot_data() / LEGGED[name], floating=True).chain)
         yield Case(name, found.model, "inertias of its file", found.seconds, found.peak_bytes, functions)
 
 
@@ -150,10 +150,10 @@ def _known(name: str) -> Mechanism:
     if name in BUNDLED:
         return bundled_chain(name)
     path, options = POPULAR[name]
-    return load_robot(_robot_data() / path, **options).chain
+    return load_robot(robot_data() / path, **options).chain
 
 
-def _robot_data() -> Path:
+def robot_data() -> Path:
     """The folder in which the example-robot-data wheel keeps its robots."""
     try:
         wheel = distribution("example-robot-data")

@@ -6,14 +6,16 @@ from __future__ import annotations
 from shutil import which
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from psdmc.bench.build import native_flags
 from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import LONGEST_INPUT, Case, generic_chain, robot_as_numbers
-from psdmc.bench.cases import TREES, standard_chains
+from psdmc.bench.cases import LEGGED, TREES, legged_cases, robot_data, standard_chains
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
 from psdmc.bench.rivals import mujoco_c, psdmc_c
+from psdmc.bench.legged import THEIRS
 from psdmc.bench.rivals.pinocchio_cpp import SYMBOLS, outputs_of, ways_of
 from psdmc.bench.run import Settings, checked, run
 from psdmc.bench.states import States
@@ -181,3 +183,15 @@ def test_psdmc_alone_is_measured_where_joints_follow_others() -> None:
     assert left_out.rival == "MuJoCo"
     assert "'rudder' follows another" in left_out.reason
     assert result.wrong == ()
+
+
+def test_legged_robots_have_their_files_inertias_and_functions_that_pinocchio_has() -> None:
+    functions = tuple(THEIRS)
+    (case,) = legged_cases(functions, ["solo12"])
+
+    assert set(THEIRS.values()) <= set(SYMBOLS)
+    assert case.functions == functions
+    oracle = pin.buildModelFromUrdf(str(robot_data() / LEGGED["solo12"]), pin.JointModelFreeFlyer())
+    assert case.chain.parameters[:, 0].sum() == pytest.approx(pin.computeTotalMass(oracle), rel=1e-12)
+    with pytest.raises(InputError, match="no legged robot 'solo13'"):
+        next(legged_cases(functions, ["solo13"]))

@@ -33,6 +33,7 @@ NAMES_SEVERAL = {
     "calibration/verdict/record.py": "steps of a calibration, and what the verdict compares",
     "model/dynamics_model.py": "methods with documentation of their own: what E and P are defined by",
     "model_functions.py": "what is computed from E and P where a model has them",
+    "bench/legged.py": "the rows of the table of legged robots, and what rivals compute in their place",
     "report/bench_markdown.py": "the columns of README's table",
 }
 """Files that name more than one function, and why they must."""
