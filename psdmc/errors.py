@@ -54,7 +54,7 @@ class DerivationError(PsdmcError):
 
 
 class ToolchainError(PsdmcError):
-    """psdmc raises this error if a compiler, another program, a disk or a folder of this machine fails.
+    """psdmc raises this error if the cause lies in the machine: a program is missing or fails, or a disk is full.
 
     If a psdmc command fails with a ToolchainError, its exit status is 4.
     """
