@@ -79,7 +79,7 @@ def derive(
     snap           largest difference, rad. If an angle of the file, such as 1.5708, differs from an exact right angle by at
                    most `snap`, psdmc uses the exact angle; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
-    progress       function that psdmc calls with the name of each stage, such as print
+    progress       function, such as print, that psdmc calls with the name of each stage
     frames         names of links. Their frames become the named frames, for poses, Jacobians, wrenches and loads; if empty:
                    the tip, or the end of each branch
     tool           x, y, z (m) and roll, pitch, yaw (rad) of a frame, relative to the tip; psdmc adds this frame as 'tool'
@@ -162,7 +162,7 @@ def emit_c(
     name       name of the robot in C, with which all symbols begin; None: the name of the model
     force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
                deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
-    progress   function that psdmc calls with the name of each stage, such as print
+    progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change theta_b for a load
     adapters   programs for which psdmc adds code to the package, such as "casadi"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"

@@ -52,14 +52,14 @@ def identify_payload(
 ) -> PayloadFound:
     """Find the mass, centre of mass and inertia of a rigid load from logs. Returns an object with the values and a verdict.
 
-    model             model of the robot without the load. If the model is not calibrated, psdmc assumes that theta_b is
-                      exact, and finds the friction from the logs
+    model             model of the robot without the load. If the model is not calibrated, psdmc assumes that its base
+                      parameters are exact, and finds the friction from the logs
     logs              paths of logs that were recorded with the load, or the path of a log description (TOML)
     frame             named frame in which psdmc gives the centre of mass and inertia; None: the tip frame
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the model
     regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
-    progress          function that psdmc calls with the name of each stage, such as print
+    progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if psdmc cannot use a log, if no joint moves in the logs, or if the model's theta_b is unknown.
     """

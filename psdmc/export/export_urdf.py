@@ -67,7 +67,7 @@ def export_urdf(
     path      URDF file to write
     mjcf      True: also write an MJCF with the suffix .xml; False: write no MJCF; None: write one only if the model has
               drive inertias. psdmc replaces an existing .xml file only if psdmc wrote it
-    progress  function that psdmc calls with the name of each stage, such as print
+    progress  function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if theta_b is unknown, or if psdmc cannot write a file. Raises NoSuchLinks, a kind of InputError, if
     no physically possible masses and inertias give theta_b.

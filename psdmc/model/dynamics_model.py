@@ -44,7 +44,7 @@ class DynamicsModel(Answers):
 
     A model has the same methods as a compiled robot (the result of `psdmc.compile`), such as `forward_dynamics`, but it
     computes them in NumPy. In arguments and results, q has the shape (..., nq), and rates, accelerations and torques have
-    the shape (..., nv). All numbers are in SI units. The axes (...) count states.
+    the shape (..., nv). All numbers are in SI units. The dots stand for batch axes, if any.
 
     expansion    the matrices E and P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
@@ -298,7 +298,7 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
-            q          (..., nq) joint positions, rad or m; the axes (...) count states
+            q          (..., nq) joint positions, rad or m; ... are batch axes, if any
             qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
             theta_b    (l,) base parameters that replace the model's; optional
             out        array into which psdmc writes the result; optional
@@ -312,7 +312,7 @@ class DynamicsModel(Answers):
         """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
         theta_b    (l,) base parameters of the robot, SI units
-        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
         """
         theta = real_array("theta_b", theta_b)
@@ -330,7 +330,7 @@ class DynamicsModel(Answers):
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
         """Compute the regressor Y, (..., nv, l), with which the torques of inverse dynamics are tau = Y theta_b.
 
-        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
         out        array into which psdmc writes the result; optional
         """
@@ -341,7 +341,7 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled. Units are kg m^2, kg m or kg.
 
-        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         theta_b    (l,) base parameters that replace the model's; optional
         out        array into which psdmc writes the result; optional
         """
@@ -352,7 +352,7 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the sum h(q, qd), (..., nv), of the Coriolis, centrifugal and gravity torques, in N m or N.
 
-        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd         (..., nv) joint rates, rad/s or m/s
         theta_b    (l,) base parameters that replace the model's; optional
         out        array into which psdmc writes the result; optional
@@ -362,7 +362,7 @@ class DynamicsModel(Answers):
     def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None) -> Array:
         """Compute the gravity torques g(q), (..., nv), which keep the robot at rest: N m, or N for sliding joints.
 
-        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         theta_b    (l,) base parameters that replace the model's; optional
         out        array into which psdmc writes the result; optional
         """

@@ -33,7 +33,7 @@ COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
 
 _ENTRY = {
     each: f"{each.name}; entry j is for "
-    f"{'q[j] (with a ball joint or floating base: the change of q along joint rate j)' if each is Q else f'{each.name}[j]'}"
+    f"{'q[j] (with a ball joint or floating base: for a small motion along qd[j])' if each is Q else f'{each.name}[j]'}"
     for each in (Q, QD, QDD, TAU)
 }
 """What an entry per joint rate belongs to."""

@@ -23,7 +23,7 @@ class CompiledRobot(CompiledFunctions):
     """A compiled robot has one method for each generated function. The methods take and return NumPy arrays.
 
     `psdmc.compile` makes compiled robots. One call computes one state or many. Joint positions q have the shape (..., nq).
-    Rates, accelerations and torques have the shape (..., nv). All numbers are in SI units. The axes (...) count states and
+    Rates, accelerations and torques have the shape (..., nv). All numbers are in SI units. Batch axes (...)
     broadcast as in NumPy. Results have the NumPy type that the attribute `dtype` names. A method with several results
     returns a named tuple. During a call for many states, other Python threads can run.
 

@@ -78,7 +78,7 @@ def documentation(function: Signature) -> str:
 
 
 _SIZES = {
-    "...": "axes that count states; the arrays of one state do not have them",
+    "...": "batch axes, with one entry per state; a single state has none",
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
     "nx": "2 nv: the first nv are for q (small changes along each joint rate), the last nv for qd",
