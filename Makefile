@@ -84,7 +84,7 @@ $(LOWEST)/ready: pyproject.toml constraints/lowest.txt
 	@touch $@
 
 test-lowest: $(LOWEST)/ready ## run the fast tests with the oldest dependencies that pyproject.toml allows
-	$(LOWEST)/bin/python -m pytest -q -m 'not slow' $(LOWEST_TESTS)
+	$(LOWEST)/bin/python -m pytest -q -n $(JOBS) --dist worksteal -m 'not slow' $(LOWEST_TESTS)
 
 test-pages: $(READY) ## open bench, calibration and site pages in Chromium at three widths, light and dark; screenshots in generated/pages
 	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[pages]'
