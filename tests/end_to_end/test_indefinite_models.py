@@ -71,6 +71,6 @@ def test_unknown_parameters_are_said(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert status("emit-c", tmp_path / "unknown.npz", "-o", tmp_path / "c") == 0
 
     said = capsys.readouterr().out
-    assert "note: the base parameters are unknown: inverse_dynamics, forward_dynamics" in said
+    assert "so functions take theta_b as an argument: inverse_dynamics_theta, forward_dynamics_theta" in said
     assert status("check", tmp_path / "unknown.npz") == 0
     assert "mass matrix: not tested" in capsys.readouterr().out
