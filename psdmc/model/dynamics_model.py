@@ -193,9 +193,9 @@ class DynamicsModel(Answers):
     def representative(self) -> Array:
         """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
-        Many vectors of standard parameters have the same theta_b, and R gives one of them. In this vector x, the pivot of
-        each base parameter (see `pivots`) has the value of the base parameter, and all other standard parameters are zero.
-        B @ R is the identity, with the model's matrix B, (l, 11n).
+        Many vectors of standard parameters have the same theta_b, and R gives one of them. Each base parameter has a
+        pivot, one of the standard parameters (see `pivots`). In x, each pivot has the value of its base parameter, and
+        all other standard parameters are zero. B @ R is the identity, with the model's matrix B, (l, 11n).
 
         There is one exception. If the model was derived with an assumption such as `assume_zero`, a standard parameter
         can be a fixed multiple of a pivot. In x, this standard parameter is then the same multiple of the pivot's value.
@@ -350,7 +350,7 @@ class DynamicsModel(Answers):
     def nonlinear_effects(
         self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """Compute the sum h(q, qd), (..., nv), of the Coriolis, centrifugal and gravity torques, in N m or N.
+        """Compute h(q, qd), the sum of Coriolis, centrifugal and gravity torques: (..., nv), in N m or N.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd         (..., nv) joint rates, rad/s or m/s

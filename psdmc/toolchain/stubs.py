@@ -81,7 +81,7 @@ _SIZES = {
     "...": "batch axes, with one entry per state; a single state has none",
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
-    "nx": "2 nv: the first nv are for q (small changes along each joint rate), the last nv for qd",
+    "nx": "2 nv: the first nv are for q (ball joint or floating base: for small motions along qd), the last nv for qd",
     "l": "number of base parameters",
     "frames": "number of named frames",
     "nonzeros": "number of matrix entries that can differ from zero",
