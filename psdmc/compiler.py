@@ -173,7 +173,7 @@ def emit_c(
     InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
 
     Forward dynamics and some other functions need the inverse of the mass matrix. If the mass matrix is not positive
-    definite at some pose within the joint limits, these functions also raise InputError. Leave them out of `functions`.
+    definite at some pose within the joint limits, InputError says so if `functions` names one. Leave these functions out.
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)

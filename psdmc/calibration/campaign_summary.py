@@ -66,6 +66,6 @@ def _found(plan: Plan) -> str:
     best, count = found.random_conditions[0], len(found.random_conditions)
     of_random = "" if not plan.is_cleared else ", which were not asked to hit nothing"
     return (
-        f"{start}, {best:.3g} for the best of {count} random motions{of_random}; compared with that motion, it bounds the"
-        f" standard deviations of the parameters {found.deviation_gain:.2f} times lower"
+        f"{start}, {best:.3g} for the best of {count} random motions{of_random}; the bound on the parameters' standard"
+        f" deviations is {found.deviation_gain:.2f} times lower than for that random motion"
     )

@@ -57,7 +57,7 @@ RECIPE = Recipe(
                 "dv_dq",
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for q[j] (with a ball joint or floating base: for a small motion along qd[j])",
+                "column j for q[j] (with a ball joint or floating base: for a small motion at the rate qd[j] alone)",
                 unit="1/s",
                 powers=(0, 1, -1),
             ),

@@ -31,9 +31,11 @@ COTANGENT = Quantity(
 
 COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
 
+OF_Q = "q[j] (with a ball joint or floating base: for a small motion at the rate qd[j] alone)"
+"""What an entry of a derivative by q belongs to."""
+
 _ENTRY = {
-    each: f"{each.name}; entry j is for "
-    f"{'q[j] (with a ball joint or floating base: for a small motion along qd[j])' if each is Q else f'{each.name}[j]'}"
+    each: f"{each.name}; entry j is for {OF_Q if each is Q else f'{each.name}[j]'}"
     for each in (Q, QD, QDD, TAU)
 }
 """What an entry per joint rate belongs to."""

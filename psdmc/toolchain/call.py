@@ -33,7 +33,7 @@ class CompiledRobot(CompiledFunctions):
     out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
              the shape and dtype of the result, and may be an input array
 
-    If the robot has a floating base, "base frame" means the world frame.
+    Some descriptions name the base frame. For a robot with a floating base, this is the world frame.
 
     In addition to the arithmetic, a call takes about 0.3 us if all input arrays are contiguous and have the robot's dtype
     and equal axes (...). With other input arrays, or if Python's C headers are not installed, it takes about 10 us.

@@ -227,7 +227,9 @@ def _in_order(axes: RobotAxes, function: Signature, quantity: Quantity, given: A
         )
     for word, name in zip(quantity.axes, dimensions(quantity), strict=True):
         if name not in given.dims:
-            other = next((str(each) for each in given.dims if each not in dimensions(quantity)), "dimension")
+            other = next(
+                (str(each) for each in reversed(given.dims) if each not in dimensions(quantity)), "dimension"
+            )
             raise InputError(
                 f"{what} has dimensions {given.dims}, expected one called {name!r}",
                 f"rename its dimension: {quantity.name}.rename({{{other!r}: {name!r}}})",
