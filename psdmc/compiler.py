@@ -75,9 +75,10 @@ def derive(
     gravity        (3,) m/s^2 along the axes of the file's root frame; None: the gravity in the file, or (0, 0, -9.81)
     drive_inertia  True: the drive inertias of the joints are parameters of the model. Instead of True, you can give the
                    values of the drive inertias, one per joint, kg m^2 (kg for a sliding joint)
-    assume_zero    link parameters that psdmc assumes to be zero, such as "link5:mx" or "link5:Ixz@com": a list or one name
-    snap           largest difference, rad. If an angle of the file, such as 1.5708, differs from an exact right angle by at
-                   most `snap`, psdmc uses the exact angle; 0: never
+    assume_zero    link parameters that psdmc assumes to be zero: a list or one name, such as "link5:mx" (first moment) or
+                   "link5:Ixz@com" (inertia about the centre of mass)
+    snap           tolerance for right angles, rad. If an angle of the file, such as 1.5708, differs from a right angle by at
+                   most `snap`, psdmc uses the exact right angle; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
     progress       function, such as print, that psdmc calls with the name of each stage
     frames         names of links. Their frames become the named frames, for poses, Jacobians, wrenches and loads; if empty:

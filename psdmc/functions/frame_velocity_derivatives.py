@@ -63,7 +63,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the derivatives by q of the velocity of each named frame, along the axes of the base frame.",
+        summary="Compute the derivatives by q of each named frame's velocity, which is expressed in the base frame.",
     ),
     "derivatives of frame velocities",
     trace,

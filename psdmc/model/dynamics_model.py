@@ -209,7 +209,10 @@ class DynamicsModel(Answers):
         )
 
     def expanded(self) -> Expansion:
-        """Return the model's torques as sums of monomials: E holds the exponents, P the coefficients.
+        """Return an object with the matrices E and P, with which each torque is a sum of monomials.
+
+        Monomials are products of powers of q, sin q, cos q, the rates and the accelerations. E holds the exponents of the
+        monomials, and P their coefficients.
 
         Raises InputError if the model was derived with `expand=False`, without E and P.
         """
