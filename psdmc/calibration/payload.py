@@ -50,10 +50,12 @@ def identify_payload(
     regressor: Regressor | None = None,
     progress: Progress = silent,
 ) -> PayloadFound:
-    """Find the mass, centre of mass and inertia of a rigid load from logs. Returns an object with the values and a verdict.
+    """Find the mass, centre of mass and inertia of a rigid load from logs.
 
-    model             model of the robot without the load. If the model is not calibrated, psdmc assumes that its base
-                      parameters are exact, and finds the friction from the logs
+    Returns an object with the values and a verdict, which says whether they can be used.
+
+    model             model of the robot without the load. Its base parameters are not changed. If the model is not
+                      calibrated, psdmc finds the friction from the logs, too
     logs              paths of logs that were recorded with the load, or the path of a log description (TOML)
     frame             named frame in which psdmc gives the centre of mass and inertia; None: the tip frame
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration

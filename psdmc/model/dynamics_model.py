@@ -169,8 +169,8 @@ class DynamicsModel(Answers):
     def pivots(self) -> tuple[int, ...]:
         """Return, for each of the l base parameters, the index of its pivot among the 11n standard parameters.
 
-        The pivot of a base parameter is the first standard parameter that this base parameter contains with factor one and
-        that no other base parameter contains.
+        Each base parameter is a sum of standard parameters with factors. Its pivot is the first standard parameter that
+        has the factor one in this sum and is in no other base parameter.
         """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
@@ -212,7 +212,7 @@ class DynamicsModel(Answers):
         """Return an object with the matrices E and P, with which each torque is a sum of monomials.
 
         Monomials are products of powers of q, sin q, cos q, the rates and the accelerations. E holds the exponents of the
-        monomials, and P their coefficients.
+        monomials. P times the base parameters gives their coefficients in each torque.
 
         Raises InputError if the model was derived with `expand=False`, without E and P.
         """
