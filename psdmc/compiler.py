@@ -173,8 +173,9 @@ def emit_c(
     Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises
     InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
 
-    Forward dynamics and some other functions need the inverse of the mass matrix. If the mass matrix is not positive
-    definite at some pose within the joint limits, InputError says so if `functions` names one. Leave these functions out.
+    Forward dynamics, a default function, and some other functions need the inverse of the mass matrix. If the mass matrix
+    is not positive definite at some pose within the joint limits, psdmc raises InputError instead of generating these
+    functions. In this case, let `functions` name only functions that do not need the inverse, such as "gravity".
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
