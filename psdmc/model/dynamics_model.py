@@ -306,8 +306,9 @@ class DynamicsModel(Answers):
             theta_b    (l,) base parameters that replace the model's; optional
             out        array into which psdmc writes the result; optional
 
-        psdmc computes tau[i] = y(state) @ P[i] @ theta_b in NumPy, or uses the Newton-Euler algorithm if the model has no E
-        and P. A robot from `psdmc.compile` is hundreds of times faster.
+        This method uses NumPy; a robot from `psdmc.compile` is hundreds of times faster. The torque of joint i is
+        y @ P[i] @ theta_b, with the values y of the model's monomials at q, qd and qdd. If the model was derived with
+        `expand=False`, it has no monomials, and the method uses the Newton-Euler algorithm.
         """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
