@@ -263,7 +263,7 @@ class DynamicsModel(Answers):
         return found
 
     def standard_parameters(self) -> Array:
-        """Return `equivalent_parameters()`. This name is from psdmc 0.1, and its use gives a DeprecationWarning."""
+        """Do the same as `equivalent_parameters`, and give a DeprecationWarning: use `equivalent_parameters` instead."""
         warnings.warn(RENAMED, DeprecationWarning, stacklevel=2)
         return self.equivalent_parameters()
 
