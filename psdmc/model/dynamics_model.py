@@ -239,7 +239,7 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """Return the base parameters theta_b, (l,), computed with zero for each unknown mass and inertia.
+        """Return the base parameters theta_b, (l,), with zero for each mass and inertia that the robot file lacks.
 
         The result is None if no mass and no inertia is known.
         """
@@ -283,7 +283,7 @@ class DynamicsModel(Answers):
 
         Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
 
-        Raises InputError if a number is not finite, or is larger than robot files allow, or if a mass is negative. Raises
+        Raises InputError if a mass is negative, or if a number is not finite or exceeds the limits for robot files. Raises
         InputError also if an inertia is not symmetric, or belongs to a link without mass. If the model was derived with
         the assumption that a parameter is zero (option `assume_zero`), another value also raises InputError.
         """
