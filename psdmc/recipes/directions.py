@@ -31,7 +31,7 @@ COTANGENT = Quantity(
 
 COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
 
-OF_Q = "q[j] (with a ball joint or floating base: for a small motion at the rate qd[j] alone)"
+OF_Q = "q[j] (with a ball joint or floating base: a tangent vector with the components of qd)"
 """What an entry of a derivative by q belongs to."""
 
 _ENTRY = {
