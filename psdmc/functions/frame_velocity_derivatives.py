@@ -57,8 +57,8 @@ RECIPE = Recipe(
                 "dv_dq",
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for q[j] (with a ball joint or floating base: for a motion of which only the rate qd[j] is not "
-                "zero)",
+                "column j for q[j] (with a ball joint or floating base: for v[j] of a small displacement "
+                "integrate(q, v))",
                 unit="1/s",
                 powers=(0, 1, -1),
             ),

@@ -245,7 +245,7 @@ TAU = Quantity(
 
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
-    of_q = "q[j] (with a ball joint or floating base: for a motion of which only the rate qd[j] is not zero)"
+    of_q = "q[j] (with a ball joint or floating base: for v[j] of a small displacement integrate(q, v))"
     entry = of_q if by == "q" else f"{by}[j]"
     known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}
     above, below = known.get(output, TAU), known[by]
