@@ -1,6 +1,6 @@
 """python -m psdmc.bench.legged [NAME ...] [--rounds N] [--json FILE]: derivatives and matrices of legged robots.
 
-The robots have the inertias of their files. One state a call; psdmc's batches of 64 states beside it.
+The robots have the inertias of their files. One state a call, and psdmc's batches beside it.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import reprlib
+import shlex
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -145,8 +146,8 @@ def _damaged(source: Path, why: str) -> InputError:
 
 
 def _foreign(source: Path) -> InputError:
-    if source.suffix in ROBOT_FILES:
-        hint = f"this is a robot file: psdmc derive {source.name} -o {source.stem}.npz makes a model of it"
-    else:
-        hint = "psdmc derive ROBOT -o MODEL.npz makes one"
+    robot, model = "ROBOT", "MODEL.npz"
+    if source.suffix.lower() in ROBOT_FILES:
+        robot, model = (shlex.quote(str(path)) for path in (source, source.with_suffix(".npz")))
+    hint = f"psdmc derive {robot} -o {model} makes one"
     return InputError(f"{source}: not a psdmc model file", hint)

@@ -7,7 +7,7 @@ stages which `limb_stages.staged` would give.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from psdmc.errors import InternalError
 from psdmc.program.cost import Cost, cost, counted
@@ -33,6 +33,13 @@ class StageCost:
     cost: Cost
     shared: int
     sums: int
+
+
+def whole_cost(limbs: LimbProgram) -> Cost:
+    """Of all stages and of the products behind them, a limb's operations once."""
+    costs = [cost(stage.program) for stage in limbs.stages]
+    costs += [limbs.products.cost] if limbs.products else []
+    return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))
 
 
 def stage_costs(limbs: LimbProgram) -> Iterator[StageCost]:

@@ -26,5 +26,5 @@ def require_axes(chain: Mechanism, what: str) -> None:
         raise InputError(
             f"{shown(chain.name)}: {what} is of joints of one coordinate each, and joint {shown(wide.name)}"
             f" {wide.type.verb}",
-            "derive the model without --floating" if chain.has_free_root else AXES,
+            "derive the model without a floating base" if chain.has_free_root else AXES,
         )

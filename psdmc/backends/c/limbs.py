@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.c_expr import literal
@@ -12,7 +12,8 @@ from psdmc.backends.c.limb_rows import FOUR
 from psdmc.backends.c.limb_stores import StoreView, store_views
 from psdmc.backends.c.lines import Body
 from psdmc.backends.options import EmitOptions
-from psdmc.program.cost import Cost, cost
+from psdmc.program.cost import Cost
+from psdmc.program.limb_cost import whole_cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
 from psdmc.program.thin_products import INVERSE, ThinProducts
 from psdmc.target.vectors import VectorUnit
@@ -198,12 +199,14 @@ class ThinView:
     """Products behind limbs.
 
     arrays   names and lengths of what stages store for them
-    rights   names of E, and
+    outputs  names of the matrices that are multiplied, and
+    rights   of their E, and
     known    first columns that are stored already, output by output
     n        columns
     places   where the core's rows begin in an output, and
     begins   in E
     rows     of the core, as C
+    groups   rows of limbs, group by group
     """
 
     arrays: tuple[tuple[str, int], ...]
@@ -294,7 +297,7 @@ def limbs_view(
         stages=stages,
         stores=store_views(limbs, sizes | (limbs.products.sizes if limbs.products else {})),
         products=_thin_view(limbs.products) if limbs.products else None,
-        cost=_whole_cost(limbs),
+        cost=whole_cost(limbs),
     )
 
 
@@ -334,9 +337,3 @@ def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
     for slot, _ in stage.program.outputs:
         if slot.vector == group.partial:
             yield f"{group.sum}[{slot.index}] = limbs{group.count}_sum({slot})"
-
-
-def _whole_cost(limbs: LimbProgram) -> Cost:
-    costs = [cost(stage.program) for stage in limbs.stages]
-    costs += [limbs.products.cost] if limbs.products else []
-    return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))

@@ -21,7 +21,7 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
-from psdmc.program.limb_cost import stage_costs
+from psdmc.program.limb_cost import whole_cost
 from psdmc.program.signature import Signature, Sizes
 from psdmc.recipes.recipe import Polynomials
 from psdmc.toolchain.compiler_command import find_compiler, run
@@ -93,14 +93,11 @@ def _ways(
     sections = _sections(kernel.function, case.sizes)
     size = sum(sections)
     weights = case.model.theta_b if RECIPES[name].times_theta else None
-    stages = (
-        [cost(kernel.single)] if kernel.limbs is None else [each.cost for each in stage_costs(kernel.limbs)]
-    )
-    single = sum(each.mul for each in stages), sum(each.add + each.div for each in stages)
+    single = cost(kernel.single) if kernel.limbs is None else whole_cost(kernel.limbs)
     batch = cost(kernel.batch)
     one = Contestant(
         rival, name, library, name, size,
-        weights=weights, operations=single, code_bytes=code,
+        weights=weights, operations=(single.mul, single.add + single.div), code_bytes=code,
     )  # fmt: skip
     many = (batch.mul, batch.add + batch.div)
     rows = Contestant(
