@@ -23,6 +23,9 @@ from psdmc.progress import on_standard_error
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement, serial_parents
 
+JOINTS = (2, 3, 4, 5, 6, 7, 8)
+SEED = 8
+
 
 def main() -> int:
     """Run the benchmark as the command line says; the exit status."""
@@ -53,14 +56,6 @@ def _measure(options: argparse.Namespace) -> int:
     if options.json:
         write_whole(options.json, result.to_json())
     return 1 if result.wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
-
-
-JOINTS = (2, 3, 4, 5, 6, 7, 8)
-SEED = 8
 
 
 def scaling_cases(
@@ -95,3 +90,7 @@ def eight_joints(lbr: Mechanism) -> Mechanism:
         coordinates=(),
         tip_body=len(joints) - 1,
     )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -139,10 +139,6 @@ def _shown(value: float | None) -> str:
     return "-" if value is None else f"{value:g}"
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 SCHEMA = 1
 LARGEST_BASELINE = 16 << 20
 """Bytes of a baseline: that of all robots has 0.1 MB."""
@@ -219,3 +215,7 @@ def _add_instructions(table: dict[str, dict[str, float]], case: Case) -> None:
     for one in contestants:
         value = found[str(one.library), one.symbol]
         table[one.function][f"instructions {one.layout}"] = round(value, 2)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
