@@ -39,8 +39,8 @@ RECIPE = Recipe(
     Signature(
         "tangent_map",
         226,
-        "T with v = T dq, the displacement v that a small change dq of the entries of q makes, quaternions of any length being "
-        "divided by it: derivatives by q's entries are derivatives along the tangent times T",
+        "T with v = T dq, the displacement that a small change dq of q makes; q may have quaternions of any length, and T "
+        "is zero along them; derivatives along the tangent times T are derivatives by the entries of q",
         (Q,),
         (
             Quantity(

@@ -35,7 +35,9 @@ def test_it_is_the_way_between_positions_made_of_length_one(length: float) -> No
     found = robot.tangent_map(q)
     step = 1e-5 * length
     for k, way in enumerate(step * np.eye(own.model.nq)):
-        slope = pin.difference(model, pin.normalize(model, q - way), pin.normalize(model, q + way)) / (2 * step)
+        slope = pin.difference(model, pin.normalize(model, q - way), pin.normalize(model, q + way)) / (
+            2 * step
+        )
         np.testing.assert_allclose(found[:, k], slope, rtol=0.0, atol=1e-8 / min(length, 1.0))
     along = np.zeros(own.model.nq)
     along[unit] = q[unit]

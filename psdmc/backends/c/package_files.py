@@ -25,7 +25,7 @@ def package_files(package: PackageView) -> dict[str, str]:
             files[f"test/{name}.h"] = render(f"{name}.h.jinja", package=package)
     for adapter in package.adapters:
         files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](
-            package.robot, package.real, package.kernels, package.info.nq > package.info.nv
+            package.robot, package.real, package.kernels, package.info
         )
     files = {path: licensed(path, text) for path, text in files.items()}
     files["manifest.json"] = _manifest(package, files)
