@@ -372,7 +372,7 @@ def test_the_command_says_what_casadi_does_on_a_floating_base(tmp_path: Path) ->
     save(free_model(), tmp_path / "free.npz")
     done = typed("emit-c", "free.npz", "--functions", "gravity,neutral", "--with", "casadi", cwd=tmp_path)
     assert (
-        "note: CasADi functions normalise the q of a floating base and differentiate by each of its entries; "
+        "note: CasADi functions normalize the q of a floating base and differentiate by each of its entries; "
         "without derivatives: neutral\n" in done.stdout
     )
     assert (tmp_path / "free" / "src" / "gravity_derivatives.c").exists()
@@ -495,7 +495,7 @@ def test_casadi_calls_the_functions_of_hyq(tmp_path: Path) -> None:
     assert typed("derive", urdf, "--floating", "-o", "hyq.npz", cwd=tmp_path).returncode == 0
     done = typed("emit-c", "hyq.npz", "-o", "hyq", "--name", "hyq", "--with", "casadi", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "note: CasADi functions normalise the q of a floating base" in done.stdout
+    assert "note: CasADi functions normalize the q of a floating base" in done.stdout
 
     call = built("hyq", tmp_path / "hyq")
     oracle = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
@@ -531,7 +531,7 @@ def test_remarks_of_robots_with_and_without_long_coordinates() -> None:
     assert remarks(sliding, ["casadi"], ["gravity"]) == ()
     assert remarks(spherical, [], ["gravity"]) == ()
     assert remarks(spherical, ["casadi", "casadi_theta"], ["gravity"]) == (
-        "CasADi functions normalise the q of joint 'joint1' and differentiate by each of its entries",
+        "CasADi functions normalize the q of joint 'joint1' and differentiate by each of its entries",
     )
 
 

@@ -153,7 +153,7 @@ def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
     whose = "a floating base" if robot.has_free_root else f"joint {wide.name!r}"
     without = [name for name in functions if not _has_blocks(name)]
     rest = f"; without derivatives: {', '.join(without)}" if without else ""
-    return f"CasADi functions normalise the q of {whose} and differentiate by each of its entries{rest}"
+    return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"
 
 
 def casadi_view(
