@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from psdmc.backends.c.adapters import casadi
-from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.info import PackageInfo
+from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
-ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView], PackageInfo], str]] = {
-    "casadi": casadi.source,
-    "casadi_theta": casadi.source_by_theta,
+ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
+    "casadi": casadi.files,
+    "casadi_theta": casadi.files_by_theta,
 }
-"""By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
-package's real type, its kernels and the facts about the robot. The file includes the library's sources and becomes a
-shared library of its own, lib<robot>_<name>."""
+"""By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
 NEEDS = {"casadi": casadi.needed, "casadi_theta": casadi.needed_by_theta}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""

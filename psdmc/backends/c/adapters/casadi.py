@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from math import prod
 
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
+from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
 from psdmc.backends.info import PackageInfo
 from psdmc.errors import InputError
@@ -135,14 +136,21 @@ def _has_blocks(name: str) -> bool:
     return all(f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
-def source(robot: str, real: str, kernels: Sequence[KernelView], info: PackageInfo) -> str:
-    """The adapter's C file; InputError where CasADi cannot call the package."""
-    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels, info))
+def files(package: PackageView) -> dict[str, str]:
+    """The adapter's C file; InputError where CasADi cannot call the package. It includes the library's sources and becomes
+    a shared library of its own."""
+    return _files(package, theta=False)
 
 
-def source_by_theta(robot: str, real: str, kernels: Sequence[KernelView], info: PackageInfo) -> str:
-    """The C file of functions that take theta_b as their last input."""
-    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels, info, theta=True))
+def files_by_theta(package: PackageView) -> dict[str, str]:
+    """The C file of functions that take theta_b as their last input, likewise."""
+    return _files(package, theta=True)
+
+
+def _files(package: PackageView, theta: bool) -> dict[str, str]:
+    view = casadi_view(package, theta)
+    path = f"{view.library}/{view.robot}_{view.library}.c"
+    return {path: render("adapters/casadi.c.jinja", view=view)}
 
 
 def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
@@ -156,16 +164,14 @@ def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
     return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"
 
 
-def casadi_view(
-    robot: str, real: str, every: Sequence[KernelView], info: PackageInfo, theta: bool = False
-) -> CasadiView:
-    """What CasADi's adapter prints of these kernels, `theta`: of those that take theta_b. InputError for float, and where
+def casadi_view(package: PackageView, theta: bool = False) -> CasadiView:
+    """What CasADi's adapter prints of a package, `theta`: of its functions that take theta_b. InputError for float, and if
     theta_b is unknown and not taken."""
-    if real != "double":
+    info = package.info
+    if package.real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
-    kernels = {
-        kernel.function.name: kernel for kernel in every if kernel.theta == (theta and kernel.function.theta)
-    }
+    chosen = (kernel for kernel in package.kernels if kernel.theta == (theta and kernel.function.theta))
+    kernels = {kernel.function.name: kernel for kernel in chosen}
     if not kernels:
         raise InputError(
             "CasADi needs the base parameters, and this model's are unknown",
@@ -176,7 +182,7 @@ def casadi_view(
     tangent = kernels[MAP].outputs[0] if info.units else None
     longest = (vector.size for kernel in kernels.values() for vector in kernel.inputs)
     return CasadiView(
-        robot=robot,
+        robot=package.robot,
         library="casadi_theta" if theta else "casadi",
         externals=externals,
         patterns=made.patterns.all,
