@@ -48,7 +48,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output in CasADi's order; `at` is its place among the called function's outputs, in reals."""
+    """An input or output in CasADi's order; `at` is its place in the work vector, in reals."""
 
     name: str
     pattern: str
@@ -255,11 +255,8 @@ class _Externals:
         if any(output.axes == Q.axes for output in kernel.function.outputs):
             return
         other = self.kernels.get(name + DERIVATIVES)
-        if (
-            other is not None
-            and _has_blocks(name)
-            and (not kernel.theta or RECIPES[name].polynomials in LINEAR)
-        ):
+        is_known = not kernel.theta or RECIPES[name].polynomials in LINEAR
+        if other is not None and is_known and _has_blocks(name):
             yield self._jacobian(kernel, other)
         gradient = self.kernels.get(name + GRADIENT + PARAMETERS * kernel.theta)
         if gradient is not None and len(kernel.outputs) == 1:
@@ -301,11 +298,8 @@ class _Externals:
     def _reverse(self, kernel: KernelView, gradient: KernelView) -> External:
         """The function that takes one cotangent to the gradients by all inputs. CasADi adds them up."""
         (output,), inputs = kernel.outputs, self._inputs_and_outputs(kernel)
-        call, seed = (
-            _Call(kernel, gradient, self),
-            Argument(f"adj_{output.name}", self.patterns.of(output.shape)),
-        )
-        shown = []
+        call, shown = _Call(kernel, gradient, self), []
+        seed = Argument(f"adj_{output.name}", self.patterns.of(output.shape))
         for k, name in enumerate([*(vector.name for vector in kernel.inputs), *[THETA] * kernel.theta]):
             found = next(one for one in gradient.outputs if one.name == f"grad_{name}")
             at, shape = call.at(found.name), found.shape
@@ -341,9 +335,8 @@ class _Call:
 
     def is_wide(self, k: int) -> bool:
         """Whether an input of the function is a position with quaternions."""
-        return bool(self.of.info.units) and [q.axes for q in self.kernel.function.inputs][k : k + 1] == [
-            Q.axes
-        ]
+        inputs = self.kernel.function.inputs
+        return bool(self.of.info.units) and k < len(inputs) and inputs[k].axes == Q.axes
 
     def read(self, k: int) -> str:
         """C of an input, positions as the called function reads them."""
