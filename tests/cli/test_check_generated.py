@@ -45,6 +45,13 @@ def test_a_package_as_psdmc_writes_it_is_up_to_date(package: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "arm: up to date\n", "")
 
 
+def test_the_hook_of_pre_commit_is_this_command(package: Path) -> None:
+    text = (Path(__file__).parents[2] / ".pre-commit-hooks.yaml").read_text()
+    (entry,) = (line.partition("entry: ")[2] for line in text.splitlines() if "entry:" in line)
+
+    assert typed(*entry.split()[1:], "arm.npz", "-o", "arm", cwd=package.parent).stdout == "arm: up to date\n"
+
+
 def test_it_lists_each_file_that_differs(package: Path) -> None:
     with (package / "src" / "gravity.c").open("a") as stream:
         stream.write("/* mine */\n")
