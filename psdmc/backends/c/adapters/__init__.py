@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from psdmc.backends.c.adapters import casadi
-from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.adapters import casadi, wheel
+from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
-ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView], bool], str]] = {"casadi": casadi.source}
-"""By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
-package's real type, its kernels and whether q is longer than the rates. The file includes the library's sources and
-becomes a shared library of its own, lib<robot>_<name>."""
+ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
+    "casadi": casadi.files,
+    "wheel": wheel.files,
+}
+"""By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
 NEEDS = {"casadi": casadi.needed}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
@@ -33,11 +34,11 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
     """The functions, followed by those that the adapters need besides."""
     found = dict.fromkeys(functions)
     for adapter in adapters:
-        found |= dict.fromkeys(NEEDS[adapter](functions, wide))
+        found |= dict.fromkeys(NEEDS[adapter](functions, wide) if adapter in NEEDS else ())
     return list(found)
 
 
 def lacking(robot: Mechanism, adapters: Sequence[str]) -> tuple[str, ...]:
     """What these adapters cannot have of a robot, one clause each."""
-    found = (LACKS[adapter](robot) for adapter in chosen(adapters))
+    found = (LACKS[adapter](robot) for adapter in chosen(adapters) if adapter in LACKS)
     return tuple(reason for reason in found if reason is not None)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from math import prod
 
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
+from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
@@ -99,9 +100,12 @@ def _has_blocks(name: str) -> bool:
     return all(f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
-def source(robot: str, real: str, kernels: Sequence[KernelView], wide: bool) -> str:
-    """The adapter's C file; InputError where CasADi cannot call the package."""
-    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels, wide))
+def files(package: PackageView) -> dict[str, str]:
+    """The adapter's C file; InputError where CasADi cannot call the package. It includes the library's sources and becomes
+    a shared library of its own."""
+    robot, wide = package.robot, package.info.nq > package.info.nv
+    view = casadi_view(robot, package.real, package.kernels, wide)
+    return {f"casadi/{robot}_casadi.c": render("adapters/casadi.c.jinja", view=view)}
 
 
 def lacking(robot: Mechanism) -> str | None:
