@@ -55,9 +55,11 @@ class PackageView:
     adapters: tuple[str, ...] = ()
 
     @property
-    def adapter_libraries(self) -> tuple[str, ...]:
-        """Adapters whose C file becomes a shared library of its own, lib<robot>_<name>, in the package's build."""
-        return tuple(name for name in self.adapters if name == "casadi")
+    def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
+        """Adapters whose C file becomes a shared library of its own, lib<robot>_<name>, and the sources compiled into it
+        besides: CasADi's file includes them, under other names."""
+        sources = {"casadi": (), "fmu": self.sources}
+        return {name: sources[name] for name in self.adapters if name in sources}
 
     @property
     def n(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from psdmc.backends.c.adapters import casadi, wheel
+from psdmc.backends.c.adapters import casadi, fmu, wheel
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
@@ -12,10 +12,11 @@ from psdmc.robot.mechanism import Mechanism
 ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
     "casadi": casadi.files,
     "wheel": wheel.files,
+    "fmu": fmu.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
-NEEDS = {"casadi": casadi.needed}
+NEEDS = {"casadi": casadi.needed, "fmu": fmu.needed}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
 LACKS = {"casadi": casadi.lacking}
