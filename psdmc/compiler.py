@@ -167,7 +167,7 @@ def emit_c(
                deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
     progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change theta_b for a load
-    adapters   programs for which psdmc adds code to the package, such as "casadi"
+    adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
     friction   True: add the function that computes friction torques, for a model that was calibrated from logs
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
@@ -224,11 +224,19 @@ def compare_emitted(
     model, recorded = model_of(model), recorded_options(directory)
     for option, value in (given or {}).items():
         if option in ("functions", "with"):
-            value = chosen(_names(value)) if option == "with" else _functions_of(model, value, recorded["with"])
+            value = (
+                chosen(_names(value)) if option == "with" else _functions_of(model, value, recorded["with"])
+            )
         had = recorded.get(option)
         if value == had:
             continue
-        was = "without it" if had in (None, False, ()) else "with others" if isinstance(had, tuple) else f"with {had}"
+        was = (
+            "without it"
+            if had in (None, False, ())
+            else "with others"
+            if isinstance(had, tuple)
+            else f"with {had}"
+        )
         raise InputError(
             f"{directory}: --{option} contradicts {MANIFEST}: psdmc emitted the package {was}",
             f"type psdmc emit --backend {had} --check"

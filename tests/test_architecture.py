@@ -321,6 +321,7 @@ MACHINE = re.compile(
 
 MAY_NAME_MACHINES = {
     "adapters/casadi.c.jinja": "a comment: how to compile the file by hand",
+    "adapters/fmu_pack.py.jinja": "the names that FMI has for platforms",
     "report/bench_method.html.jinja": "how instructions are counted, for readers",
     "trig/preamble.jinja": "constraints of inline assembly: how GCC is told that a value is in a register",
 }
@@ -405,5 +406,9 @@ def test_a_module_that_runs_runs_at_its_end():
     """What stands behind the call of main() would not be defined yet."""
     for _, path in modules():
         body = ast.parse(path.read_text(encoding="utf-8")).body
-        runs = [k for k, node in enumerate(body) if isinstance(node, ast.If) and "__main__" in ast.unparse(node.test)]
+        runs = [
+            k
+            for k, node in enumerate(body)
+            if isinstance(node, ast.If) and "__main__" in ast.unparse(node.test)
+        ]
         assert runs in ([], [len(body) - 1]), path.relative_to(PACKAGE)

@@ -52,7 +52,11 @@ def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
         )
     files, functions, options = (content.get(key) for key in ("files", "functions", "options"))
     files, options = (each if isinstance(each, dict) else {} for each in (files, options))
-    named = [each.get("name") for each in functions if isinstance(each, dict)] if isinstance(functions, list) else []
+    named = (
+        [each.get("name") for each in functions if isinstance(each, dict)]
+        if isinstance(functions, list)
+        else []
+    )
     texts = {
         "backend": content.get("backend", BACK_ENDS[0]),
         "name": content.get("name"),
@@ -83,7 +87,9 @@ def differences(directory: str | os.PathLike[str], files: Mapping[str, str]) -> 
         added = tuple(path for path in gone if digest_of(root, path) is not None)
     reasons = []
     if before.get("psdmc_version") != after["psdmc_version"]:
-        reasons.append(f"psdmc {before.get('psdmc_version')} wrote the package, and this is {after['psdmc_version']}")
+        reasons.append(
+            f"psdmc {before.get('psdmc_version')} wrote the package, and this is {after['psdmc_version']}"
+        )
     if before.get("model_hash") != after["model_hash"]:
         reasons.append("the package was emitted from another model")
     return Differences(

@@ -305,7 +305,9 @@ def emit(
     ] = False,
     adapters: Annotated[
         list[str] | None,
-        typer.Option("--with", metavar="NAME,...", help="also write a library for another program: casadi"),
+        typer.Option(
+            "--with", metavar="NAME,...", help="also write files for another program: casadi, wheel, fmu"
+        ),
     ] = None,
     target: Annotated[
         str,
@@ -317,7 +319,9 @@ def emit(
     ] = NATIVE.name,
     check: Annotated[
         bool,
-        typer.Option("--check", help="write nothing; say if the package in DIR is up to date (exit status 5: no)"),
+        typer.Option(
+            "--check", help="write nothing; say if the package in DIR is up to date (exit status 5: no)"
+        ),
     ] = False,
 ) -> None:
     """Write a model's package in a language of choice: sources, build files, self-test."""
@@ -390,7 +394,9 @@ def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
     given = {key: context.params[key] for key in sorted(typed - {"model", "output", "check"})}
     given |= {} if "backend" in context.params else {"backend": BACK_ENDS[0]}
     if given.pop("force", False):
-        raise InputError("--check writes nothing, and --force is about what is overwritten", "leave out --force")
+        raise InputError(
+            "--check writes nothing, and --force is about what is overwritten", "leave out --force"
+        )
     lists = {"adapters": "with", "functions": "functions"}
     given |= {word: names(given.pop(key)) for key, word in lists.items() if key in given}
     with steps() as progress:

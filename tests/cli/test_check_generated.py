@@ -81,7 +81,9 @@ def test_it_says_if_the_model_or_psdmc_is_another(package: Path) -> None:
     replace(model, theta_b=2 * np.asarray(model.theta_b)).save(package.parent / "arm.npz")
     text = (package / MANIFEST).read_text()
     version = json.loads(text)["psdmc_version"]
-    (package / MANIFEST).write_text(text.replace(f'"psdmc_version": "{version}"', '"psdmc_version": "0.0\\u001b[2J"'))
+    (package / MANIFEST).write_text(
+        text.replace(f'"psdmc_version": "{version}"', '"psdmc_version": "0.0\\u001b[2J"')
+    )
 
     done = checked(package)
 
@@ -99,7 +101,10 @@ def test_it_says_if_the_model_or_psdmc_is_another(package: Path) -> None:
         ("--functions jacobian,gravity --trig libm --lowering auto --name two_link", "up to date"),
         ("--real float32", "--real contradicts manifest.json: psdmc emitted the package with float64"),
         ("--trig inline", "--trig contradicts manifest.json: psdmc emitted the package with libm"),
-        ("--functions gravity", "--functions contradicts manifest.json: psdmc emitted the package with others"),
+        (
+            "--functions gravity",
+            "--functions contradicts manifest.json: psdmc emitted the package with others",
+        ),
         ("--with casadi", "--with contradicts manifest.json: psdmc emitted the package without it"),
         ("--payload", "--payload contradicts manifest.json: psdmc emitted the package without it"),
         ("--force", "--check writes nothing"),
@@ -125,7 +130,9 @@ def test_options_must_be_the_recorded_ones(package: Path, words: str, expected: 
         ({"generator": "another"}, "not a package"),
     ],
 )
-def test_a_forged_manifest_is_refused_in_one_line(package: Path, change: dict[str, object], expected: str) -> None:
+def test_a_forged_manifest_is_refused_in_one_line(
+    package: Path, change: dict[str, object], expected: str
+) -> None:
     content = json.loads((package / MANIFEST).read_text())
     (package / MANIFEST).write_text(json.dumps(content | change))
 

@@ -24,7 +24,14 @@ from psdmc.toolchain.compiler_command import find_compiler
 
 pytestmark = pytest.mark.skipif(find_spec("pip") is None, reason="pip is not installed")
 
-FUNCTIONS = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "gravity", "forward_kinematics", "neutral"]
+FUNCTIONS = [
+    "inverse_dynamics",
+    "forward_dynamics",
+    "mass_matrix",
+    "gravity",
+    "forward_kinematics",
+    "neutral",
+]
 
 
 def bare_environment(folder: Path) -> Path:
@@ -41,9 +48,22 @@ def bare_environment(folder: Path) -> Path:
 def installed(package: Path, folder: Path) -> Path:
     """The Python of a bare environment into which pip put the package's wheel."""
     python = bare_environment(folder / "bare")
-    environment = {**os.environ, "CC": " ".join(find_compiler().command), "CFLAGS": "-O0 -Wall -Wextra -Werror"}
+    environment = {
+        **os.environ,
+        "CC": " ".join(find_compiler().command),
+        "CFLAGS": "-O0 -Wall -Wextra -Werror",
+    }
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
-    built = [*pip, "wheel", "--no-build-isolation", "--no-deps", "--no-index", "-w", folder / "wheels", package]
+    built = [
+        *pip,
+        "wheel",
+        "--no-build-isolation",
+        "--no-deps",
+        "--no-index",
+        "-w",
+        folder / "wheels",
+        package,
+    ]
     done = subprocess.run(built, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     (wheel,) = (folder / "wheels").iterdir()
@@ -56,7 +76,12 @@ def installed(package: Path, folder: Path) -> Path:
 def ran(python: Path, program: str, cwd: Path) -> str:
     """What a program prints there: without a compiler, psdmc or Pinocchio."""
     done = subprocess.run(
-        [python, "-I", "-W", "error", "-c", program], cwd=cwd, env={"PATH": ""}, capture_output=True, text=True, check=False
+        [python, "-I", "-W", "error", "-c", program],
+        cwd=cwd,
+        env={"PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -158,13 +183,15 @@ def test_single_precision_and_unknown_parameters(tmp_path: Path) -> None:
     """A robot of no known inertias takes theta_b in each call; names of files cannot leave their strings."""
     source = ROBOTS / "rounded_arm.urdf"
     model = psdmc.derive(source, unknown="all")
-    emit_c(model, tmp_path / "robot", functions="gravity", adapters="wheel", real="float32", name='a"\\\n"""b')
+    emit_c(
+        model, tmp_path / "robot", functions="gravity", adapters="wheel", real="float32", name='a"\\\n"""b'
+    )
     python = installed(tmp_path / "robot", tmp_path)
     np.save(tmp_path / "theta.npy", bundled_model("rounded_arm").theta_b)
     q = np.array([0.3, -0.4, 0.9, 0.1, 0.5, -0.7])
     text = ran(
         python,
-        "import numpy, a_b\ng = a_b.gravity([0.3, -0.4, 0.9, 0.1, 0.5, -0.7], numpy.load('theta.npy'))\nprint(g.dtype, *map(float, g))",
+        f"import numpy, a_b\ng = a_b.gravity({q.tolist()}, numpy.load('theta.npy'))\nprint(g.dtype, *map(float, g))",
         tmp_path,
     )
     name, *values = text.split()
@@ -196,7 +223,8 @@ def test_hyq_on_its_floating_base(tmp_path: Path) -> None:
         """
 import numpy, hyq
 at = numpy.load("in.npz")
-numpy.savez("out.npz", tau=hyq.inverse_dynamics(at["q"], at["qd"], at["x"]), qdd=hyq.forward_dynamics(at["q"], at["qd"], at["x"]))
+given = [at[name] for name in ("q", "qd", "x")]
+numpy.savez("out.npz", tau=hyq.inverse_dynamics(*given), qdd=hyq.forward_dynamics(*given))
 try:
     hyq.gravity(2 * at["q"])
 except ValueError as error:
@@ -206,5 +234,8 @@ except ValueError as error:
     )
     assert text == "q[3:7] has a length other than 1\n"
     found = np.load(tmp_path / "out.npz")
-    for name, expected in {"tau": pin.rnea(oracle, data, q, qd, x), "qdd": pin.aba(oracle, data, q, qd, x)}.items():
+    for name, expected in {
+        "tau": pin.rnea(oracle, data, q, qd, x),
+        "qdd": pin.aba(oracle, data, q, qd, x),
+    }.items():
         assert np.abs(found[name] - expected).max() <= 1e-10 * np.abs(expected).max()

@@ -75,7 +75,9 @@ def files(package: PackageView) -> dict[str, str]:
     kernels = {kernel.name: kernel for kernel in package.kernels}
     values = [parameter.value for parameter in info.parameters]
     if package.real != "double":
-        raise InputError("an FMU computes with double, and the package with float", "leave out --real float32")
+        raise InputError(
+            "an FMU computes with double, and the package with float", "leave out --real float32"
+        )
     if info.is_wide:
         raise InputError(
             f"{info.name}: an FMU's states are q and qd, and q of this robot has joints with several coordinates",

@@ -22,7 +22,6 @@ from psdmc.program.signature import Q, Quantity
 FILES = {
     "wheel/{}_wheel.c": "wheel.c",
     "wheel/__init__.py": "wheel.py",
-    "wheel/py.typed": "py.typed",
     "pyproject.toml": "pyproject.toml",
     "setup.py": "setup.py",
 }
@@ -94,9 +93,8 @@ def files(package: PackageView) -> dict[str, str]:
         "frame_names": ", ".join(map(ascii, package.info.frames)),
         "theta_b": [repr(parameter.value) for parameter in package.info.parameters],
     }
-    return {
-        path.format(robot): render(f"adapters/{template}.jinja", **view) for path, template in FILES.items()
-    }
+    made = {path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES.items()}
+    return {**made, "wheel/py.typed": ""}
 
 
 def _kernel(kernel: KernelView, l: int) -> WheelKernel:
@@ -116,7 +114,9 @@ def _kernel(kernel: KernelView, l: int) -> WheelKernel:
 
 def _function(function: FunctionView) -> WheelFunction:
     signature, (first, *_) = function.signature, function.kernels
-    baked, theta = (next((k.name for k in function.kernels if k.theta is wants), None) for wants in (False, True))
+    baked, theta = (
+        next((k.name for k in function.kernels if k.theta is wants), None) for wants in (False, True)
+    )
     shapes = [vector.shape for vector in first.outputs]
     return WheelFunction(
         name=function.name,
