@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot
+from command_line import files_in
 from robots_at_hand import in_wheel
 
 import psdmc
@@ -205,6 +206,23 @@ def test_names_of_python_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match=f"a Python module cannot be called '{name}'"):
         emit_c(bundled_model("two_link"), tmp_path / "c", functions="gravity", adapters="wheel", name=name)
     assert not (tmp_path / "c").exists()
+
+
+def test_files_of_the_user_s_stay_and_files_of_an_adapter_go(tmp_path: Path) -> None:
+    arm, folder = bundled_model("two_link"), tmp_path / "arm"
+    emit_c(arm, folder, functions="gravity")
+    before = files_in(folder)
+    (folder / "setup.py").write_text("mine")
+    with pytest.raises(InputError, match=r"not overwriting setup\.py"):
+        emit_c(arm, folder, functions="gravity", adapters="wheel")
+    assert files_in(folder) == {**before, "setup.py": b"mine"}
+    (folder / "setup.py").unlink()
+
+    emit_c(arm, folder, functions="gravity", adapters=["wheel", "fmu", "casadi"])
+    assert (folder / "fmu" / "pack.py").exists()
+    emit_c(arm, folder, functions="gravity")
+
+    assert files_in(folder) == before
 
 
 @pytest.mark.slow
