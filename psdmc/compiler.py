@@ -22,7 +22,9 @@ from psdmc.backends.c.adapters import chosen, with_needed
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
+from psdmc.backends.own_files import MANIFEST
 from psdmc.backends.protocol import Emission, back_end
+from psdmc.backends.recorded import Differences, differences, recorded_options
 from psdmc.backends.reference_load import reference_load
 from psdmc.backends.reference_states import reference_states
 from psdmc.backends.write import Changes, require_own_folder, write_package
@@ -165,7 +167,7 @@ def emit_c(
                deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
     progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change theta_b for a load
-    adapters   programs for which psdmc adds code to the package, such as "casadi"
+    adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
     friction   True: add the function that computes friction torques, for a model that was calibrated from logs
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
@@ -201,9 +203,63 @@ def emit(
 
     InputError for an option that the back end does not have.
     """
-    language = back_end(backend)
     require_own_folder(directory, force)
-    model = model_of(model)
+    files = _files(model_of(model), backend, lowering, functions, real, name, progress, trig, target, **own)
+    progress("writing")
+    return write_package(directory, files, force)
+
+
+def compare_emitted(
+    model: DynamicsModel | str | Path,
+    directory: str | Path,
+    given: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+) -> Differences:
+    """Compare the package in a folder with the one that `emit` would write with the options that its manifest records.
+
+    given  options of `emit`, by the command line's names, that must agree with the recorded ones
+
+    Writes nothing. InputError where the folder holds no package, or `given` contradicts what it records.
+    """
+    model, recorded = model_of(model), recorded_options(directory)
+    for option, value in (given or {}).items():
+        if option in ("functions", "with"):
+            value = (
+                chosen(_names(value)) if option == "with" else _functions_of(model, value, recorded["with"])
+            )
+        had = recorded.get(option)
+        if value == had:
+            continue
+        was = (
+            "without it"
+            if had in (None, False, ())
+            else "with others"
+            if isinstance(had, tuple)
+            else f"with {had}"
+        )
+        raise InputError(
+            f"{directory}: --{option} contradicts {MANIFEST}: psdmc emitted the package {was}",
+            f"type psdmc emit --backend {had} --check"
+            if option == "backend"
+            else f"leave out --{option}, or emit the package again without --check",
+        )
+    return differences(directory, _files(model, progress=progress, **recorded))
+
+
+def _files(
+    model: DynamicsModel,
+    backend: str,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    real: Real | None,
+    name: str | None,
+    progress: Progress = silent,
+    trig: Trig | None = None,
+    target: str | Target = NATIVE,
+    **own: Any,
+) -> dict[str, str]:
+    """Path -> text of every file of what `emit` writes."""
+    language = back_end(backend)
     options = _options(lowering, real, trig, target)
     chosen_options = {"trig": trig, "target": options.target != NATIVE, **own}
     for option in language.lacks:
@@ -219,10 +275,7 @@ def emit(
         )
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    emission = _emission(model, lowering, functions, options, name, progress, *facts)
-    files = language.files(emission)
-    progress("writing")
-    return write_package(directory, files, force)
+    return language.files(_emission(model, lowering, functions, options, name, progress, *facts))
 
 
 @overload
@@ -386,8 +439,7 @@ def _emission(
     friction: bool = False,
     bodies: bool = False,
 ) -> Emission:
-    wide = model.nq > model.nv
-    names = wanted(with_needed(wanted(functions, model.mechanism), adapters, wide), model.mechanism)
+    names = _functions_of(model, functions, adapters)
     require(model, names)
     costs = options.target.costs
     kernels = lowered_once(
@@ -400,6 +452,14 @@ def _emission(
     if payload:
         references = replace(references, load=reference_load(model))
     return Emission(info, kernels, options, references, tuple(adapters))
+
+
+def _functions_of(
+    model: DynamicsModel, functions: Sequence[str] | str | None, adapters: Sequence[str]
+) -> tuple[str, ...]:
+    """The functions of a package, those that its adapters need included."""
+    named = wanted(functions, model.mechanism)
+    return wanted(with_needed(named, adapters, model.nq > model.nv), model.mechanism)
 
 
 def _options(

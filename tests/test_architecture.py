@@ -323,6 +323,7 @@ MACHINE = re.compile(
 
 MAY_NAME_MACHINES = {
     "adapters/casadi.c.jinja": "a comment: how to compile the file by hand",
+    "adapters/fmu_pack.py.jinja": "the names that FMI has for platforms",
     "report/bench_method.html.jinja": "how instructions are counted, for readers",
     "trig/preamble.jinja": "constraints of inline assembly: how GCC is told that a value is in a register",
 }

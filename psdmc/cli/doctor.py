@@ -30,6 +30,7 @@ OPTIONAL = (
     ("mujoco", "mjcf", "MJCF files; a second reader in psdmc check; a rival in psdmc bench"),
     ("xacro", "xacro", "xacro files"),
     ("casadi", "bench", "emit-c --with casadi, in your own program; a rival in psdmc bench"),
+    ("fmpy", "fmu", "simulation of FMUs that emit-c --with fmu makes"),
     ("cmeel-cppadcodegen", "bench", "a rival in psdmc bench"),
     ("cmeel-eigen", "bench", "headers for the rival Pinocchio in psdmc bench"),
     ("pandas", "notebook", "base_parameters.to_frame() in Python"),

@@ -244,6 +244,7 @@ def check(
 
 
 def emit(
+    context: typer.Context,
     model: ModelFile,
     backend: Annotated[
         str,
@@ -307,7 +308,7 @@ def emit(
         typer.Option(
             "--with",
             metavar="NAME,...",
-            help="also write a library for another program: casadi, casadi_theta",
+            help="also write files for another program: casadi, casadi_theta, wheel, fmu",
         ),
     ] = None,
     target: Annotated[
@@ -318,8 +319,17 @@ def emit(
             autocompletion=lambda: list(PRESETS),
         ),
     ] = NATIVE.name,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="write nothing; say if the package in DIR is up to date (exit status 5: no)"
+        ),
+    ] = False,
 ) -> None:
     """Write a model's package in a language of choice: sources, build files, self-test."""
+    if check:
+        _compare_emitted(model, output or Path(model.stem), context)
+        return
     from psdmc import compiler
     from psdmc.backends.c.adapters import remarks
     from psdmc.backends.protocol import back_end
@@ -374,6 +384,34 @@ def emit(
     for what in beyond_friction(found):
         print(f"note: not in the package, though calibrated: {what}; add its torque to inverse dynamics'")
     say_next_line(language.next(quoted(folder)))
+
+
+def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
+    """Say in which files a package differs from what the options that it records give; exit status 5 if it does."""
+    from psdmc import compiler
+    from psdmc.cli.next_step import one_line
+
+    typed = {key for key in context.params if str(context.get_parameter_source(key)).endswith("COMMANDLINE")}
+    given = {key: context.params[key] for key in sorted(typed - {"model", "output", "check"})}
+    given |= {} if "backend" in context.params else {"backend": BACK_ENDS[0]}
+    if given.pop("force", False):
+        raise InputError(
+            "--check writes nothing, and --force is about what is overwritten", "leave out --force"
+        )
+    lists = {"adapters": "with", "functions": "functions"}
+    given |= {word: names(given.pop(key)) for key, word in lists.items() if key in given}
+    with steps() as progress:
+        found = compiler.compare_emitted(model, folder, given, progress)
+    if not found:
+        print(f"{folder}: up to date")
+        return
+    print(f"{folder}: differs from what psdmc writes for {model}")
+    for kind in ("changed", "missing", "added"):
+        for path in getattr(found, kind):
+            print(f"  {kind:7}  {path}")
+    for reason in found.reasons:
+        print(f"note: {one_line(reason)}")
+    raise typer.Exit(CHECK_FAILED_STATUS)
 
 
 def _without_backend(command: Callable[[], None]) -> Callable[..., None]:

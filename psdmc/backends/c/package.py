@@ -55,6 +55,13 @@ class PackageView:
     adapters: tuple[str, ...] = ()
 
     @property
+    def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
+        """Adapters whose C file becomes a shared library of its own, lib<robot>_<name>, and the sources compiled into it
+        besides: files for CasADi include them, under other names."""
+        sources = {"casadi": (), "casadi_theta": (), "fmu": self.sources}
+        return {name: sources[name] for name in self.adapters if name in sources}
+
+    @property
     def n(self) -> int:
         return self.info.n
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from psdmc.backends.c.adapters import casadi
+from psdmc.backends.c.adapters import casadi, fmu, wheel
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
@@ -12,10 +12,12 @@ from psdmc.robot.mechanism import Mechanism
 ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
     "casadi": casadi.files,
     "casadi_theta": casadi.files_by_theta,
+    "wheel": wheel.files,
+    "fmu": fmu.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
-NEEDS = {"casadi": casadi.needed, "casadi_theta": casadi.needed_by_theta}
+NEEDS = {"casadi": casadi.needed, "casadi_theta": casadi.needed_by_theta, "fmu": fmu.needed}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
 REMARKS = {"casadi": casadi.remark, "casadi_theta": casadi.remark}
@@ -34,11 +36,11 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
     """The functions, followed by those that the adapters need besides."""
     found = dict.fromkeys(functions)
     for adapter in adapters:
-        found |= dict.fromkeys(NEEDS[adapter](functions, wide))
+        found |= dict.fromkeys(NEEDS[adapter](functions, wide) if adapter in NEEDS else ())
     return list(found)
 
 
 def remarks(robot: Mechanism, adapters: Sequence[str], functions: Sequence[str]) -> tuple[str, ...]:
     """What users should know of these adapters' functions of a robot, one clause each."""
-    found = (REMARKS[adapter](robot, functions) for adapter in chosen(adapters))
+    found = (REMARKS[adapter](robot, functions) for adapter in chosen(adapters) if adapter in REMARKS)
     return tuple(dict.fromkeys(reason for reason in found if reason is not None))

@@ -1,0 +1,161 @@
+"""An FMU (FMI 3.0, model exchange and co-simulation): states q and qd, inputs tau, outputs accelerations.
+
+The types of FMI that the C needs are declared in its template, so that the package keeps its licence. Values are one array
+of doubles; a value reference is a place in this array.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.names import c_comment
+from psdmc.backends.c.package import PackageView
+from psdmc.backends.c.render import render
+from psdmc.errors import InputError
+
+DYNAMICS, DIRECTION = "forward_dynamics_theta", "forward_dynamics_jvp_theta"
+
+MORE_OUTPUTS = ("kinetic_energy_theta", "potential_energy_theta", "forward_kinematics")
+"""Kernels whose outputs are the FMU's, too, where the package has them."""
+
+BASE_UNITS = {
+    "rad": 'rad="1"',
+    "rad/s": 'rad="1" s="-1"',
+    "rad/s2": 'rad="1" s="-2"',
+    "m": 'm="1"',
+    "m/s": 'm="1" s="-1"',
+    "m/s2": 'm="1" s="-2"',
+    "N.m": 'kg="1" m="2" s="-2"',
+    "N": 'kg="1" m="1" s="-2"',
+    "J": 'kg="1" m="2" s="-2"',
+}
+
+FILES = {
+    "fmu/{}_fmu.c": "fmu.c",
+    "fmu/modelDescription.xml": "modelDescription.xml",
+    "fmu/buildDescription.xml": "buildDescription.xml",
+    "fmu/pack.py": "fmu_pack.py",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Variables side by side: their name, place of the first one, number, and XML attributes that they share."""
+
+    name: str
+    at: int
+    size: int
+    attributes: str
+
+    @property
+    def end(self) -> int:
+        return self.at + self.size
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A variable of the model description: its value reference, and its attributes as XML text."""
+
+    reference: int
+    attributes: str
+
+
+def needed(functions: Sequence[str], wide: bool) -> list[str]:
+    """An FMU integrates forward dynamics."""
+    return ["forward_dynamics"]
+
+
+def files(package: PackageView) -> dict[str, str]:
+    """Path -> text of the FMU's sources; InputError if an FMU of this package is not possible."""
+    info, robot = package.info, package.robot
+    kernels = {kernel.name: kernel for kernel in package.kernels}
+    values = [parameter.value for parameter in info.parameters]
+    if package.real != "double":
+        raise InputError(
+            "an FMU computes with double, and the package with float", "leave out --real float32"
+        )
+    if info.is_wide:
+        raise InputError(
+            f"{info.name}: an FMU's states are q and qd, and q of this robot has joints with several coordinates",
+            "leave out --with fmu; FMUs of floating bases and ball joints are not supported",
+        )
+    if None in values:
+        raise InputError(
+            f"{info.name}: an FMU needs values of the base parameters, and this model's are unknown",
+            "calibrate the model first, or leave out --with fmu",
+        )
+    more = [kernels[name] for name in MORE_OUTPUTS if name in kernels]
+    blocks = {block.name: block for block in _blocks(package, more)}
+    variables = [one for block in blocks.values() for one in _variables(block, package)]
+    view = {
+        "package": package,
+        "blocks": blocks.values(),
+        "outputs": [block for block in blocks.values() if 'causality="output"' in block.attributes],
+        "derivatives": [blocks["der_q"], blocks["qdd"]],
+        "variables": variables,
+        "units": BASE_UNITS,
+        "token": hashlib.sha256(repr((info.psdmc_version, info.model_hash, variables)).encode()).hexdigest(),
+        "description": _xml(info.name),
+        "more": [(kernel.prototypes["single"].symbol, _arguments(kernel)) for kernel in more],
+        "direction": DIRECTION in kernels and not more,
+    }
+    return {path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES.items()}
+
+
+def _blocks(package: PackageView, more: Sequence[KernelView]) -> Iterator[Block]:
+    """All variables, in the order of their value references."""
+    n, computed = package.dof, 'causality="output" initial="calculated"'
+    state = 'causality="output" initial="exact" start="0"'
+    blocks = [
+        ("time", 1, 'causality="independent" variability="continuous" description="time, s"'),
+        ("q", n, state),
+        ("qd", n, state),
+        ("tau", n, 'causality="input" start="0"'),
+        ("der_q", n, 'causality="local" initial="calculated"'),
+        ("qdd", n, computed),
+        ("theta_b", package.l, 'causality="parameter" variability="tunable"'),
+        ("internal_step", 1, 'causality="parameter" variability="tunable" start="0.001" min="0"'),
+        *((output.name, output.size, computed) for kernel in more for output in kernel.outputs),
+    ]
+    at = 0
+    for name, size, attributes in blocks:
+        yield Block(name, at, size, attributes)
+        at += size
+
+
+def _variables(block: Block, package: PackageView) -> Iterator[Variable]:
+    """A block's variables with what each has of its own: name, what it is, unit, start, what it is the derivative of."""
+    joints, n = package.info.joints, package.dof
+    per_joint = {"q": "", "qd": "/s", "tau": None, "der_q": "/s", "qdd": "/s2"}
+    whole = {"time": "s", "internal_step": "s", "T": "J", "U": "J"}
+    for k in range(block.size):
+        own = {"name": block.name if block.size == 1 and block.name in whole else f"{block.name}[{k}]"}
+        if block.name in per_joint:
+            joint, after = joints[k], per_joint[block.name]
+            own["description"] = f"joint {joint.name}"
+            own["unit"] = joint.effort_unit.replace(" ", ".") if after is None else f"{joint.unit}{after}"
+        if block.name in ("der_q", "qdd"):
+            own["derivative"] = str(1 + k + (n if block.name == "qdd" else 0))
+        if block.name == "theta_b":
+            parameter = package.info.parameters[k]
+            own |= {"description": f"{parameter.equation} [{parameter.unit}]", "start": repr(parameter.value)}
+        if block.name == "internal_step":
+            own["description"] = "largest step of the co-simulation's integrator, s"
+        if whole.get(block.name) == "J":
+            own["unit"] = "J"
+        text = " ".join(f'{key}="{_xml(value)}"' for key, value in own.items())
+        yield Variable(block.at + k, f"{text} {block.attributes}")
+
+
+def _arguments(kernel: KernelView) -> str:
+    names = [vector.name for vector in kernel.inputs] + (["theta_b"] if kernel.theta else [])
+    return ", ".join(f"v + at_{name}" for name in [*names, *(output.name for output in kernel.outputs)])
+
+
+def _xml(text: str) -> str:
+    """Untrusted text as it may stand in an attribute's quotation marks."""
+    return escape(c_comment(text), quote=True)

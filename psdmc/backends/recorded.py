@@ -1,0 +1,100 @@
+"""What a package on disk says that it was emitted with, and in which files it differs from what is emitted now."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from psdmc.atomic import system_errors_at
+from psdmc.backends.c.adapters import ADAPTERS
+from psdmc.backends.manifest import digest
+from psdmc.backends.own_files import MANIFEST, content_of, digest_of, listed
+from psdmc.backends.protocol import BACK_ENDS
+from psdmc.errors import InputError
+from psdmc.target.native import NATIVE
+
+MORE_SOURCES = {name: f"src/{name}.c" for name in ("payload", "friction", "bodies")}
+"""By option, the source file that it adds to a package."""
+
+
+@dataclass(frozen=True, slots=True)
+class Differences:
+    """How a package on disk differs from what psdmc writes now.
+
+    missing, added, changed  paths that the folder lacks, that psdmc no longer writes, and whose bytes differ
+    reasons                  what the manifests say about that, in words
+    """
+
+    missing: tuple[str, ...]
+    added: tuple[str, ...]
+    changed: tuple[str, ...]
+    reasons: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.missing or self.added or self.changed)
+
+
+def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
+    """The options of psdmc.compiler.emit that a package was emitted with, from its manifest, which may be forged.
+
+    InputError if the folder holds no package, or if the manifest lacks an option.
+    """
+    with system_errors_at(directory):
+        content = content_of(directory)
+    if not content:
+        raise InputError(
+            f"{directory}: not a package: {MANIFEST} is missing or is not psdmc's",
+            "name the folder of a package with -o; psdmc emit-c writes one",
+        )
+    files, functions, options = (content.get(key) for key in ("files", "functions", "options"))
+    files, options = (each if isinstance(each, dict) else {} for each in (files, options))
+    named = (
+        [each.get("name") for each in functions if isinstance(each, dict)]
+        if isinstance(functions, list)
+        else []
+    )
+    texts = {
+        "backend": content.get("backend", BACK_ENDS[0]),
+        "name": content.get("name"),
+        "lowering": options.get("lowering"),
+        "real": options.get("real"),
+        "target": options.get("target", NATIVE.name),
+        **({"trig": options["trig"]} if "trig" in options else {}),
+    }
+    wrong = [key for key, value in texts.items() if not isinstance(value, str)]
+    wrong += [] if texts["backend"] in BACK_ENDS else ["back end"]
+    if wrong or not named or not all(isinstance(name, str) for name in named):
+        raise InputError(
+            f"{Path(directory) / MANIFEST}: does not say with which {(*wrong, 'functions')[0]} psdmc emitted the package",
+            "emit the package again without --check",
+        )
+    more = {option: path in files for option, path in MORE_SOURCES.items()}
+    adapters = tuple(name for name in ADAPTERS if any(path.startswith(f"{name}/") for path in files))
+    return {**texts, "functions": tuple(named), **more, "with": adapters}
+
+
+def differences(directory: str | os.PathLike[str], files: Mapping[str, str]) -> Differences:
+    """How the package in a folder differs from `files` (path -> text). Writes nothing."""
+    root = Path(directory)
+    with system_errors_at(root):
+        before, after = content_of(root), json.loads(files[MANIFEST])
+        present = {path: digest_of(root, path) for path in files}
+        gone = [path for path in listed(root / MANIFEST) if path not in files]
+        added = tuple(path for path in gone if digest_of(root, path) is not None)
+    reasons = []
+    if before.get("psdmc_version") != after["psdmc_version"]:
+        reasons.append(
+            f"psdmc {before.get('psdmc_version')} wrote the package, and this is {after['psdmc_version']}"
+        )
+    if before.get("model_hash") != after["model_hash"]:
+        reasons.append("the package was emitted from another model")
+    return Differences(
+        missing=tuple(path for path, found in present.items() if found is None),
+        added=added,
+        changed=tuple(path for path, text in files.items() if present[path] not in (None, digest(text))),
+        reasons=tuple(reasons),
+    )
