@@ -14,6 +14,7 @@ from psdmc.cli.loads import payload
 from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
+from psdmc.cli.viewing import view
 from psdmc.version import psdmc_version
 
 app = typer.Typer(
@@ -45,6 +46,7 @@ COMMANDS = (
     (new, "write a robot file to start from"),
     (derive, "derive a robot's model and save it"),
     (show, "print a model or a robot file"),
+    (view, "draw a robot, its masses and inertias on one page"),
     (check, "compare a model with Pinocchio and MuJoCo"),
     (emit_c, "write a model's C package"),
     (emit, "write a model's package in another language"),
