@@ -66,3 +66,31 @@ def view(
     for note in found.notes:
         print(f"note: {one_line(note)}")
     print(f"{target}: open it in a browser")
+
+
+def figures(
+    model: Annotated[
+        Path, typer.Argument(metavar="CALIBRATED", help="model file that psdmc calibrate wrote (.npz)")
+    ],
+    log: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[LOG]", help="log, log description or campaign: measured and predicted torque are drawn"
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="folder to write; default: CALIBRATED_figures"),
+    ] = None,
+) -> None:
+    """Write figures (PDF, SVG) and tables (LaTeX) of a calibration, for a report or a paper."""
+    from psdmc.model.load import load
+    from psdmc.report.figures import require_own_folder, write_figures
+
+    folder = output or Path(f"{model.stem}_figures")
+    require_own_folder(folder)
+    found = load(model)
+    with steps() as progress:
+        written = write_figures(found, folder, log, progress)
+    for path in written:
+        print(f"{path}: written")

@@ -350,7 +350,13 @@ def scene(view: Viewed) -> dict[str, Any]:
     length = AXIS * size
     layers: list[dict[str, Any]] = [
         {"kind": "segments", "name": "links", "width": 7, "items": _links(chain)},
-        {"kind": "segments", "name": "joint axes", "width": 4, "colour": YELLOW, "items": _axes(chain, length)},
+        {
+            "kind": "segments",
+            "name": "joint axes",
+            "width": 4,
+            "colour": YELLOW,
+            "items": _axes(chain, length),
+        },
         *(
             {"kind": "segments", "name": "named frames", "width": 5, "colour": colour, "items": items}
             for colour, items in zip(AXIS_COLOURS, _frames(chain, length), strict=True)
