@@ -19,6 +19,7 @@ from psdmc.calibration.description.description import is_description
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.sources import plain_sources
+from psdmc.derivation.provenance import provenance
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.slices import neutral
@@ -53,14 +54,13 @@ FLAT = 1e-3
 ROUNDING = 1e-12
 """Share of m |com|^2, which moving an inertia to its centre of mass subtracts, that is rounding."""
 SAME = 1e-9
-"""Share of the largest base parameter by which the file's may differ."""
+"""Share of a robot's mass by which a model without a load may differ from its file."""
 MOST_NAMED = 12
 """Links that a note names."""
 AXIS = 0.08
 """Length of drawn axes, as a share of the robot's size."""
-FILE, CALIBRATION, MODEL = "file", "calibration", "model"
-COLOURS = {FILE: "#3b7dd8", CALIBRATION: "#d97a02", MODEL: "#d97a02"}
-"""MODEL: base parameters that are neither the file's nor a calibration's, such as those with a payload."""
+FILE, CALIBRATED = "file", "calibrated"
+COLOURS = {FILE: "#3b7dd8", CALIBRATED: "#d97a02"}
 NOT_PHYSICAL = "#d81b9a"
 YELLOW = "#e0a000"
 AXIS_COLOURS = ("#d62728", "#2ca02c", "#1f5fd0")
@@ -119,7 +119,7 @@ def body(link: str, joint: int, frame: Placement, x: Array, judged: bool = True)
 class Viewed:
     """What a page shows. F poses of n joint frames.
 
-    layers   bodies by FILE, and CALIBRATION or MODEL
+    layers   bodies by FILE and CALIBRATED
     faults   of links and of what is missing, in words, the gravest first
     notes    further remarks
     poses    (F, n, 12) rotation (rows) and origin (m) of each joint frame in the base frame
@@ -150,25 +150,25 @@ def viewed(
         if not np.isnan(x[:BODY_PARAMETERS]).any() and x[:BODY_PARAMETERS].any()
     ]
     layers, notes = {FILE: own or merged}, []
-    if isinstance(robot, DynamicsModel) and (other := _other_bodies(robot)):
+    if isinstance(robot, DynamicsModel) and robot.calibrated is not None:
         progress("finding physical links")
         try:
             found = physical_links(robot).parameters[:, :BODY_PARAMETERS]
             layers = {
                 FILE: merged,  # base parameters are of what moves together, as one body
-                other: [
+                CALIBRATED: [
                     body(joint.link_name, k, joint.link_frame, found[k], judged=False)
                     for k, joint in enumerate(chain.joints)
                     if found[k][0] > 0.0
                 ],
             }
             notes.append(
-                f"Many masses and inertias have the {other}'s base parameters. The page draws those nearest to the file's, "
+                "Many masses and inertias have the model's base parameters. The page draws those nearest to the file's, "
                 "as psdmc export-urdf writes them."
             )
         except InputError as error:
-            notes.append(f"The {other}'s bodies are not drawn: {error.message}.")
-        if robot.calibrated is not None and robot.calibrated.verdict is not None:
+            notes.append(f"The model's bodies are not drawn: {error.message}.")
+        if robot.calibrated.verdict is not None:
             notes.append(f"Verdict of the calibration: {robot.calibrated.verdict.word}.")
     faults = [f"link {shown(each.link)}: {each.fault}" for each in (own or merged) if each.fault]
     unknown = [j.link_name for j, bad in zip(chain.joints, chain.has_unknown_body, strict=True) if bad]
@@ -178,17 +178,6 @@ def viewed(
     return Viewed(chain, layers, tuple(faults), tuple(notes), poses, times, logs)
 
 
-def _other_bodies(model: DynamicsModel) -> str:
-    """What a model's base parameters are of, where they are not the file's: CALIBRATION or MODEL; "" where they are."""
-    if model.calibrated is not None:
-        return CALIBRATION
-    if model.theta_b is None:
-        return ""
-    by_file = model.B @ model.mechanism.parameters.reshape(-1)  # NaN where it is unknown
-    size = float(np.abs(model.theta_b).max(initial=0.0))
-    return "" if np.abs(by_file - model.theta_b).max(initial=0.0) <= SAME * size else MODEL
-
-
 def _is_judged(chain: Mechanism, k: int) -> bool:
     """Whether no moment of inertia of link k is assumed zero."""
     first = PARAMETERS_PER_LINK * k
@@ -196,31 +185,26 @@ def _is_judged(chain: Mechanism, k: int) -> bool:
 
 
 def _own_links(robot: DynamicsModel | LoadedRobot) -> list[Body]:
-    """Every link of a URDF that moves, none merged; empty for other files, and where a model has kept no source."""
-    if isinstance(robot, LoadedRobot):
-        text, kind, name, options = (
-            robot.source_text,
-            robot.source_format,
-            robot.source_name,
-            robot.options.as_json(),
-        )
-    else:
-        kept = robot.provenance
-        text, kind = str(kept.get("source_text", "")), kept.get("source_format")
-        name, options = str(kept.get("source_name", "robot")), kept.get("options", {})
-    if kind != "urdf" or not text:
+    """Every link of a URDF that moves, none merged; empty for other files, and for models with a load or without source."""
+    kept = provenance(robot) if isinstance(robot, LoadedRobot) else robot.provenance
+    if kept.get("source_format") != "urdf" or not {"source_text", "options"} <= set(kept):
         return []
-    read = locked(read_urdf(text, name), options.get("lock") or {}, name)
+    name, options = str(kept.get("source_name", "robot")), kept["options"]
+    read = locked(read_urdf(kept["source_text"], name), options.get("lock") or {}, name)
     read = on_free_root(read) if options.get("floating") else read
-    joints = {joint.name: joint for joint in read.joints}
-    chain = robot.mechanism
+    joints, chain = {joint.name: joint for joint in read.joints}, robot.mechanism
+    if not set(chain.joint_names) <= set(joints):
+        return []  # edited by hand
     below = bodies_of(read, [joints[joint.name] for joint in chain.joints])
-    return [
+    found = [
         body(link, k, joint.link_frame @ place, body_parameters(read.inertials[link], Placement.identity()))
         for k, (joint, links) in enumerate(zip(chain.joints, below, strict=True))
         for link, place in links.items()
         if read.inertials[link] is not None
     ]
+    masses = chain.parameters[:, 0]
+    has_load = abs(sum(each.mass for each in found) - masses.sum()) > SAME * masses.sum()
+    return [] if has_load else found
 
 
 def _motion(
@@ -338,7 +322,8 @@ def _listed(values: Array) -> str:
 
 def _rounded(values: Array, digits: int) -> list[Any]:
     """Lists of numbers without the last digits, which differ between processors."""
-    return (np.round(values, digits) + 0.0).tolist()
+    found: list[Any] = (np.round(values, digits) + 0.0).tolist()
+    return found
 
 
 def scene(view: Viewed) -> dict[str, Any]:
