@@ -61,12 +61,13 @@ def document(name: str, draw: Callable[[Figure], None], size: tuple[float, float
     """The drawing as NAME.pdf and NAME.svg. The same numbers give the same bytes."""
     found = {}
     with _style(PRINTED):
+        figure = _new_figure(figsize=size)
+        draw(figure)
         for kind, left_out in (
             ("pdf", ("Creator", "Producer", "CreationDate")),
             ("svg", ("Creator", "Date")),
         ):
-            figure, content = _new_figure(figsize=size), io.BytesIO()
-            draw(figure)
+            content = io.BytesIO()
             figure.savefig(content, format=kind, metadata=dict.fromkeys(left_out))
             found[f"{name}.{kind}"] = content.getvalue()
     return found

@@ -123,7 +123,6 @@ def test_frames_and_masses_move_as_pinocchio_s(robot: str, tmp_path: Path):
     segments = {each["name"]: each["items"] for each in drawn["layers"] if each["kind"] == "segments"}
     assert len(segments["joint axes"]) == len(chain)
     for pose in (0, 7, len(rows) - 1):
-        # "push" lies before "turn" in no file: both readers have the file's order
         own = np.concatenate(
             [_of_pinocchio(known, name, q[rows[pose], k]) for k, name in enumerate(chain.joint_names)]
         )
