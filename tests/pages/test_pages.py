@@ -279,3 +279,16 @@ def test_axe_finds_no_serious_fault(browser: Any, pages: dict[str, Path], name: 
     ]
 
     assert serious == []
+
+
+@pytest.mark.skipif("view" not in OWN, reason="plotly is not installed")
+@pytest.mark.parametrize("width", [400, 1280])
+def test_legend_and_texts_of_a_view_have_the_plot_s_size(browser: Any, pages: dict[str, Path], width: int):
+    """The style of other pictures, which scale with the page, would cut them."""
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(pages["view"].as_uri())
+    found = page.evaluate("document.querySelector('#plot .main-svg').getBoundingClientRect().width")
+    expected = page.evaluate("document.getElementById('plot').clientWidth")
+    page.close()
+
+    assert found == pytest.approx(expected, abs=1.0)

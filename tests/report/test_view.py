@@ -23,6 +23,7 @@ from psdmc.report.view import (
     MOST_POSES,
     NOT_PHYSICAL,
     body,
+    embedded,
     page,
     require_own_page,
     scene,
@@ -222,6 +223,15 @@ def test_names_of_a_file_stay_text(tmp_path: Path):
     labels = [item["label"] for layer in drawn["layers"] for item in layer["items"]]
     assert any(label.startswith("&lt;script&gt;alert(&#x27;1&#x27;)") for label in labels)
     assert not any("<script" in label for label in labels)
+
+
+def test_json_in_a_page_ends_no_element():
+    value = {"log": "</script><!--<script>&amp;\u2028.csv"}
+
+    text = embedded(value)
+
+    assert not set("<>&\u2028") & set(text)
+    assert json.loads(text) == value
 
 
 def test_a_page_loads_nothing():
