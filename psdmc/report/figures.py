@@ -97,10 +97,9 @@ def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQua
         kinds = ("a campaign", "plain logs")
         raise InputError(
             f"{path}: {kinds[not has_runs]}, and the model was calibrated from {kinds[not by_runs]}",
-            f"give {kinds[not by_runs].removesuffix('s') if not by_runs else 'the folder of a campaign'}",
+            "give the folder of a campaign" if by_runs else "give a log or a log description",
         )
-    steps = {step.step: step for step in delivered_quality(model, path)}
-    return steps[WHOLE]
+    return next(step for step in delivered_quality(model, path) if step.step == WHOLE)
 
 
 # Figures
@@ -191,10 +190,9 @@ def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -
         both.plot(x, measured, color=MEASURED, linewidth=1.0, label="measured")
         both.plot(x, predicted, color=PREDICTED, linewidth=0.7, linestyle="--", label="predicted")
         left.plot(x, measured - predicted, color=RESIDUAL, linewidth=0.6)
-        quality = step.joints[sample.joint]
-        rmse = quality.held_out.rmse if math.isfinite(quality.held_out.rmse) else quality.fit.rmse
+        rms = math.sqrt(float(np.mean((sample.measured - sample.predicted) ** 2)))
         both.set_title(sample.joint, fontsize=9, loc="left", parse_math=False)
-        left.set_title(f"residual, RMS {rmse:.3g}", fontsize=9, loc="left")
+        left.set_title(f"residual, RMS {rms:.3g}", fontsize=9, loc="left")
         both.set_ylabel(f"torque [{efforts[sample.joint]}]", fontsize=8)
         for axis in (both, left):
             axis.tick_params(labelsize=8)

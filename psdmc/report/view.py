@@ -55,8 +55,6 @@ ROUNDING = 1e-12
 """Share of m |com|^2, which moving an inertia to its centre of mass subtracts, that is rounding."""
 SAME = 1e-9
 """Share of a robot's mass by which a model without a load may differ from its file."""
-MOST_NAMED = 12
-"""Links that a note names."""
 AXIS = 0.08
 """Length of drawn axes, as a share of the robot's size."""
 FILE, CALIBRATED = "file", "calibrated"
@@ -111,8 +109,7 @@ def body(link: str, joint: int, frame: Placement, x: Array, judged: bool = True)
     found = Body(link, joint, mass, at, com, half, (axes * half) @ axes.T, fault)
     if fault or not judged or not found.density > DENSEST:
         return found
-    why = f"its ellipsoid has {found.density:.3g} kg/m^3, more than any metal"
-    return replace(found, fault=why)
+    return replace(found, fault=f"its ellipsoid has {found.density:.3g} kg/m^3, more than any metal")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +135,7 @@ class Viewed:
 def viewed(
     robot: DynamicsModel | LoadedRobot, log: str | Path | None = None, progress: Progress = silent
 ) -> Viewed:
-    """What a page shows of a model or a robot file, at rest or in the motion of logs.
+    """Collect what a page shows of a model or a robot file, at rest or in the motion of logs.
 
     InputError where a log cannot be used, as in calibration.
     """
@@ -173,7 +170,7 @@ def viewed(
     faults = [f"link {shown(each.link)}: {each.fault}" for each in (own or merged) if each.fault]
     unknown = [j.link_name for j, bad in zip(chain.joints, chain.has_unknown_body, strict=True) if bad]
     if unknown or chain.massless:
-        notes.insert(0, f"The file has no inertia of {listed([*unknown, *chain.massless], MOST_NAMED)}.")
+        notes.insert(0, f"The inertia of these links is unknown: {listed([*unknown, *chain.massless])}.")
     poses, times, logs = _motion(chain, log, progress)
     return Viewed(chain, layers, tuple(faults), tuple(notes), poses, times, logs)
 
@@ -289,31 +286,18 @@ def embedded(value: Any) -> str:
 def body_table(view: Viewed) -> str:
     """An HTML table of all bodies, link by link."""
     head = ["Link", "From", "Mass [kg]", "Centre of mass in the link [m]", "Semi-axes [m]", "Density [kg/m³]"]
+    bodies = [(name, each) for name, found in view.layers.items() for each in found]
     rows = [
-        (each.joint, k, each.link, name, each)
-        for name, bodies in view.layers.items()
-        for k, each in enumerate(bodies)
+        [each.link, name, f"{each.mass:.5g}", _listed(each.place), _listed(each.half_axes), _density(each)]
+        for name, each in sorted(bodies, key=lambda row: row[1].joint)
     ]
-    if len(view.layers) > 1:
-        rows.sort(key=lambda row: row[0])
-    return table(
-        head,
-        [
-            [
-                link,
-                name,
-                f"{each.mass:.5g}",
-                _listed(each.place),
-                _listed(each.half_axes),
-                "not physical"
-                if each.fault
-                else "flat"
-                if math.isnan(each.density)
-                else f"{each.density:.4g}",
-            ]
-            for _, _, link, name, each in rows
-        ],
-    )
+    return table(head, rows)
+
+
+def _density(each: Body) -> str:
+    if each.fault:
+        return "not physical"
+    return "flat" if math.isnan(each.density) else f"{each.density:.4g}"
 
 
 def _listed(values: Array) -> str:
@@ -333,19 +317,11 @@ def scene(view: Viewed) -> dict[str, Any]:
     origins = view.poses[0, :, 9:]
     size = float(np.ptp(np.vstack([np.zeros(3), origins, *_ends(view)]), axis=0).max()) or 1.0
     length = AXIS * size
+    lines = [("links", 7, None, _links(chain)), ("joint axes", 4, YELLOW, _axes(chain, length))]
+    lines += [("named frames", 5, AXIS_COLOURS[k], _frames(chain, length, k)) for k in range(3)]
     layers: list[dict[str, Any]] = [
-        {"kind": "segments", "name": "links", "width": 7, "items": _links(chain)},
-        {
-            "kind": "segments",
-            "name": "joint axes",
-            "width": 4,
-            "colour": YELLOW,
-            "items": _axes(chain, length),
-        },
-        *(
-            {"kind": "segments", "name": "named frames", "width": 5, "colour": colour, "items": items}
-            for colour, items in zip(AXIS_COLOURS, _frames(chain, length), strict=True)
-        ),
+        {"kind": "segments", "name": name, "width": width, "colour": colour, "items": items}
+        for name, width, colour, items in lines
     ]
     for name, bodies in view.layers.items():
         for kind, what in (("points", "centres of mass"), ("ellipsoids", "inertia")):
@@ -390,18 +366,12 @@ def _segment(
 def _links(chain: Mechanism) -> list[dict[str, Any]]:
     """From joint to joint, and from the last joints to named frames."""
     here = (0.0, 0.0, 0.0)
-    joints = [
-        _segment((parent, here), (k, here), chain.parent_link(k)) for k, parent in enumerate(chain.parents)
+    joints = [((parent, here), (k, here), chain.parent_link(k)) for k, parent in enumerate(chain.parents)]
+    ends: list[tuple[Any, Any, str]] = [
+        ((f.joint, here), (f.joint, f.placement.translation), chain.joints[f.joint].link_name)
+        for f in chain.frames
     ]
-    ends = [
-        _segment(
-            (frame.joint, here),
-            (frame.joint, frame.placement.translation),
-            chain.joints[frame.joint].link_name,
-        )
-        for frame in chain.frames
-    ]
-    return joints + ends
+    return [_segment(*each) for each in (*ends, *joints)]
 
 
 def _axes(chain: Mechanism, length: float) -> list[dict[str, Any]]:
@@ -412,18 +382,15 @@ def _axes(chain: Mechanism, length: float) -> list[dict[str, Any]]:
     ]
 
 
-def _frames(chain: Mechanism, length: float) -> list[list[dict[str, Any]]]:
-    """The axes x, y and z of the base and of each named frame."""
+def _frames(chain: Mechanism, length: float, k: int) -> list[dict[str, Any]]:
+    """Axis k of the base and of each named frame."""
     placed = [(BASE, Placement.identity(), chain.base_name)]
     placed += [(frame.joint, frame.placement, frame.name) for frame in chain.frames]
     return [
-        [
-            _segment(
-                (joint, place.translation),
-                (joint, place.translation + length * place.rotation[:, k]),
-                f"{name}: {axis}",
-            )
-            for joint, place, name in placed
-        ]
-        for k, axis in enumerate("xyz")
+        _segment(
+            (joint, at.translation),
+            (joint, at.translation + length * at.rotation[:, k]),
+            f"{name}: {'xyz'[k]}",
+        )
+        for joint, at, name in placed
     ]
