@@ -2,7 +2,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
-EXTRAS ?= test,bench,calibrate,xacro,docs
+EXTRAS ?= test,bench,calibrate,view,xacro,docs
 JOBS ?= auto
 RUN := $(VENV)/bin
 READY := $(VENV)/ready

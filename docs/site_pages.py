@@ -40,6 +40,7 @@ MENU = {
     ),
     "How-to guides": (
         "how-to/check",
+        "how-to/view",
         "how-to/own-bodies",
         "how-to/no-inertias",
         "how-to/payload",
@@ -59,6 +60,7 @@ MENU = {
         "how-to/calibration-log",
         "how-to/springs-and-friction",
         "how-to/priors",
+        "how-to/figures",
         "how-to/reproducible-builds",
         "how-to/troubleshooting",
         "how-to/extending",

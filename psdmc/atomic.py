@@ -61,8 +61,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             _settle_folder(target.parent)
 
 
-def write_together(root: Path, files: Mapping[str, str]) -> None:
-    """Write files (path under root -> text) that belong together: all content is on disk before any is renamed,
+def write_together(root: Path, files: Mapping[str, str] | Mapping[str, str | bytes]) -> None:
+    """Write files (path under root -> content) that belong together: all content is on disk before any is renamed,
     in the given order. Errors as write_whole."""
     with system_errors_at(root), contextlib.ExitStack() as all_of_them:
         ready = []

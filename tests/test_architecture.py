@@ -85,7 +85,7 @@ OUTSIDE = {
         "jinja2",
     },
     "export": {"numpy", "mujoco"},
-    "report": {"numpy", "matplotlib", "jinja2"},
+    "report": {"numpy", "matplotlib", "jinja2", "plotly"},
     "compiler": {"numpy"},
     "mujoco": {"numpy"},
     "cli": {"typer", "rich", "numpy"},

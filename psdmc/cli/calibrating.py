@@ -195,6 +195,7 @@ def calibrate(
             print(f"{written}: {what}")
     if not verdict.usable:
         raise typer.Exit(verdict.exit_status)
+    say_next("view", output, *logs[:1])
     say_next("emit-c", output, "-o", output.stem)
 
 

@@ -14,6 +14,7 @@ from psdmc.cli.loads import payload
 from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
+from psdmc.cli.viewing import figures, view
 from psdmc.version import psdmc_version
 
 app = typer.Typer(
@@ -45,6 +46,7 @@ COMMANDS = (
     (new, "write a robot file to start from"),
     (derive, "derive a robot's model and save it"),
     (show, "print a model or a robot file"),
+    (view, "draw a robot, its masses and inertias on one page"),
     (check, "compare a model with Pinocchio and MuJoCo"),
     (emit_c, "write a model's C package"),
     (emit, "write a model's package in another language"),
@@ -53,6 +55,7 @@ COMMANDS = (
     (excite, "plan the motions of a calibration"),
     (simulate, "write a campaign's logs from a virtual robot"),
     (calibrate, "identify a model's parameters from logs"),
+    (figures, "write figures and tables of a calibration"),
     (payload, "identify the mass of a load from logs"),
     (export_urdf, "write a model as a robot file"),
     (cache, "show or clear the compile cache"),

@@ -29,6 +29,7 @@ NEEDED = (
 OPTIONAL = (
     ("mujoco", "mjcf", "MJCF files; a second reader in psdmc check; a rival in psdmc bench"),
     ("xacro", "xacro", "xacro files"),
+    ("plotly", "view", "psdmc view"),
     ("casadi", "bench", "emit-c --with casadi, in your own program; a rival in psdmc bench"),
     ("fmpy", "fmu", "simulation of FMUs that emit-c --with fmu makes"),
     ("cmeel-cppadcodegen", "bench", "a rival in psdmc bench"),

@@ -65,6 +65,10 @@ def show(
         )
         _show_robot(found.mechanism, json)
         if not json:
+            flags = [
+                word for one in (*(arguments or ()), *(xacro_arg or ())) for word in ("--xacro-arg", one)
+            ]
+            say_next("view", model, *_again(root, flags, package or ()))
             say_next("derive", model, *_again(root, [*(arguments or ()), *(xacro_arg or ())], package or ()))
     elif root or arguments or xacro_arg or package:
         raise InputError(f"{model}: a model, which has no further arguments", "they are of robot files")
@@ -119,4 +123,5 @@ def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
     else:
         print_model(found)
     if not json:
+        say_next("view", path)
         say_what_a_model_is_for(path, found)

@@ -51,7 +51,7 @@ def _sample(axis: Axes, sample: Sample) -> None:
         if sample.abscissa.startswith("position")
         else np.arange(len(sample.x))
     )
-    kept = order[_thin(len(order))]
+    kept = order[thinned(len(order))]
     x = sample.x[kept]
     _shade(axis, x, sample.held_out[kept])
     axis.plot(x, sample.measured[kept], color=MEASURED, linewidth=1.2, label="observed")
@@ -64,7 +64,7 @@ def _sample(axis: Axes, sample: Sample) -> None:
     legend_below(axis, 4)
 
 
-def _thin(count: int) -> Array:
+def thinned(count: int) -> Array:
     """Indices of evenly spread points, all of them where they are few. (A contiguous stretch would hide the rest.)"""
     return np.unique(np.linspace(0, count - 1, min(count, POINTS)).astype(int))
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 else:
     Axes = Figure = object
 
-__all__ = ["Axes", "Figure", "legend_below", "svg"]
+__all__ = ["Axes", "Figure", "document", "legend_below", "svg"]
 
 INK = "#010203"
 """Placeholder for the page's own text colour, which replaces it after drawing."""
@@ -50,6 +50,27 @@ def svg(draw: Callable[[Figure], None], size: tuple[float, float], says: str) ->
         metadata: dict[str, Any] = {"Date": None, "Creator": None}
         figure.savefig(text, format="svg", transparent=True, metadata=metadata)
     return _inline(text.getvalue(), says)
+
+
+PRINTED = STYLE | dict.fromkeys((key for key, value in STYLE.items() if value == INK), "black")
+PRINTED |= {"svg.fonttype": "path", "pdf.fonttype": 42}
+"""Pictures that are files: they look the same in each program, and their text can be searched in a PDF."""
+
+
+def document(name: str, draw: Callable[[Figure], None], size: tuple[float, float]) -> dict[str, bytes]:
+    """The drawing as NAME.pdf and NAME.svg. The same numbers give the same bytes."""
+    found = {}
+    with _style(PRINTED):
+        figure = _new_figure(figsize=size)
+        draw(figure)
+        for kind, left_out in (
+            ("pdf", ("Creator", "Producer", "CreationDate")),
+            ("svg", ("Creator", "Date")),
+        ):
+            content = io.BytesIO()
+            figure.savefig(content, format=kind, metadata=dict.fromkeys(left_out))
+            found[f"{name}.{kind}"] = content.getvalue()
+    return found
 
 
 def legend_below(axis: Axes, columns: int, size: int = 8) -> None:

@@ -9,6 +9,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ import pytest
 from made_up_bench import made_up_result
 from made_up_denso import denso, made_up_record, plant
 
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.model.calibrated import (
     JointFigures,
@@ -35,6 +38,8 @@ from psdmc.model.grounds import Ground
 from psdmc.report.bench_page import write_page
 from psdmc.report.calibrate_report import write_report
 from psdmc.report.truth_tables import truth_view
+from psdmc.report.view import viewed, write_view
+from psdmc.robot.load import load_robot
 
 pytest.importorskip("playwright")
 ROOT = Path(__file__).parents[2]
@@ -60,7 +65,7 @@ SITE = (
     if KEPT
     else ()
 )
-OWN = ("bench", "calibration", "virtual")
+OWN = ("bench", "calibration", "virtual", *(("view",) if find_spec("plotly") else ()))
 JOINTS = tuple(f"a_rather_long_joint_name_{k}" for k in range(6))
 
 
@@ -77,8 +82,22 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     write_report(calibration(), folder / "calibration.html")
     virtual = made_up_record()
     write_report(virtual, folder / "virtual.html", truth=truth_view(virtual, denso(), plant(harness=True)))
+    if "view" in OWN:
+        write_log(still_log(), folder / "log.npz")
+        write_view(
+            viewed(load_robot(ROOT / "examples/robots/kr6.toml"), folder / "log.npz"), folder / "view.html"
+        )
     own = {name: folder / f"{name}.html" for name in OWN}
     return own | {f"site_{name.replace('/', '_')}": folder / f"site/{name}.html" for name in SITE}
+
+
+def still_log() -> Log:
+    """KR6 moving slowly."""
+    time = np.arange(500) / 50.0
+    q = 0.5 * np.sin(0.7 * time[:, None] + np.arange(6))
+    return Log(
+        "log", tuple(f"joint_{k}" for k in range(1, 7)), time, q, None, 10.0 * np.cos(q), "motor_torque"
+    )
 
 
 NAMES = (*OWN, *(f"site_{name.replace('/', '_')}" for name in SITE))
@@ -128,7 +147,9 @@ def browser() -> Iterator[Any]:
     if BROWSER is None:
         pytest.skip("no chromium")
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        found = playwright.chromium.launch(
+            executable_path=BROWSER, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
+        )
         yield found
         found.close()
 
@@ -258,3 +279,16 @@ def test_axe_finds_no_serious_fault(browser: Any, pages: dict[str, Path], name: 
     ]
 
     assert serious == []
+
+
+@pytest.mark.skipif("view" not in OWN, reason="plotly is not installed")
+@pytest.mark.parametrize("width", [400, 1280])
+def test_legend_and_texts_of_a_view_have_the_plot_s_size(browser: Any, pages: dict[str, Path], width: int):
+    """The style of other pictures, which scale with the page, would cut them."""
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(pages["view"].as_uri())
+    found = page.evaluate("document.querySelector('#plot .main-svg').getBoundingClientRect().width")
+    expected = page.evaluate("document.getElementById('plot').clientWidth")
+    page.close()
+
+    assert found == pytest.approx(expected, abs=1.0)

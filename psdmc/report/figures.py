@@ -1,0 +1,325 @@
+"""Figures (PDF, SVG) and tables (LaTeX) of a calibration, to be put into a report or a paper. The same file gives the same
+bytes: no dates, fixed identifiers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.atomic import refuse_foreign_folder, write_together
+from psdmc.calibration.campaign_file import is_campaign
+from psdmc.calibration.description.description import is_description
+from psdmc.calibration.verdict.delivered import delivered_quality
+from psdmc.errors import InputError
+from psdmc.friction.joints import rows_of
+from psdmc.friction.law import Array, At, Row, total
+from psdmc.model.calibrated import SHOWN, WHOLE, Calibrated, NumberRow, StepQuality, code_of
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.latex import terms_latex
+from psdmc.progress import Progress, silent
+from psdmc.report.calibrate_plots import MEASURED, PREDICTED, RESIDUAL, thinned
+from psdmc.report.drawing import Figure, document
+from psdmc.robot.limits import shown
+
+MARK = "% written by psdmc figures"
+"""First line of every table."""
+TABLE = "parameters.tex"
+"""The table by which a folder is known as psdmc's."""
+DEVIATIONS = 2.0
+"""Standard deviations that a bar reaches to each side: 95 % of a normal distribution."""
+DIGITS = 2
+"""Of a standard deviation in tables."""
+TIMES_SPEED = 3.0
+"""Largest speed of friction curves, in RMS speeds of the joint's logs."""
+CURVE = 201
+"""Points of each half of a friction curve."""
+LINE, HALF, FULL = 0.22, 2.4, 7.0
+"""inches: height of a parameter's line, height of a joint's picture, width of all."""
+ABREAST = 3
+"""Friction curves in a row."""
+
+
+def write_figures(
+    model: DynamicsModel, folder: str | Path, log: str | Path | None = None, progress: Progress = silent
+) -> list[Path]:
+    """Write figures and tables of a calibrated model into a folder; returns their paths.
+
+    log   measured and predicted torque are drawn too: a log, log description or campaign, as the model was calibrated from
+
+    InputError where the model is not calibrated, the log does not suit it, or the folder holds files that are not psdmc's.
+    """
+    known = model.calibrated
+    if known is None:
+        raise InputError(f"{shown(model.mechanism.name)}: not calibrated", "run `psdmc calibrate` first")
+    require_own_folder(folder)
+    progress("reading the log")
+    torque = None if log is None else _torque(model, known, log)
+    progress("drawing")
+    files: dict[str, str | bytes] = dict(tables(model, known))
+    high = 1.2 * len({row.unit for row in known.parameters}) + LINE * len(known.parameters)
+    pictures = {"parameters": (partial(draw_parameters, known=known), high)}
+    efforts = {joint.name: joint.type.effort_unit for joint in model.mechanism.joints}
+    if curves := friction_curves(known):
+        high = HALF * math.ceil(len(curves) / ABREAST)
+        pictures["friction"] = (partial(draw_friction, curves=curves, efforts=efforts), high)
+    if torque is not None:
+        high = 0.75 * HALF * len(torque.samples)
+        pictures["torque"] = (partial(draw_torque, step=torque, efforts=efforts), high)
+    files["preview.tex"] = preview(tuple(files), tuple(pictures))
+    for name, (draw, high) in pictures.items():
+        files |= document(name, draw, (FULL, high))
+    write_together(Path(folder), files)
+    return [Path(folder) / name for name in files]
+
+
+def require_own_folder(folder: str | Path) -> None:
+    """InputError where a folder holds files, but none of `psdmc figures`."""
+    table = Path(folder) / TABLE
+    try:
+        is_own = table.read_bytes()[: len(MARK)] == MARK.encode()
+    except OSError:
+        is_own = False
+    if not is_own:
+        refuse_foreign_folder(folder, "choose a new or empty folder with -o DIR")
+
+
+def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQuality:
+    """Measured and predicted torque of a log, or of a campaign's fast motion."""
+    path = Path(log)
+    has_runs = is_campaign(path) and not is_description(path)
+    by_runs = known.prediction is not None and not known.prediction.is_linear
+    if has_runs is not by_runs:
+        kinds = ("a campaign", "plain logs")
+        raise InputError(
+            f"{path}: {kinds[not has_runs]}, and the model was calibrated from {kinds[not by_runs]}",
+            "give the folder of a campaign" if by_runs else "give a log or a log description",
+        )
+    return next(step for step in delivered_quality(model, path) if step.step == WHOLE)
+
+
+# Figures
+
+
+def draw_parameters(figure: Figure, known: Calibrated) -> None:
+    """Base parameters with intervals, those of one unit on one axis; the file's values as open circles."""
+    units = list(dict.fromkeys(row.unit for row in known.parameters))
+    groups = [[row for row in known.parameters if row.unit == unit] for unit in units]
+    axes = figure.subplots(len(units), 1, squeeze=False, height_ratios=[len(rows) + 2 for rows in groups])
+    for axis, unit, rows in zip(axes[:, 0], units, groups, strict=True):
+        spread = [row.std for row in rows if 0.0 < row.std < math.inf]
+        axis.set_xscale("symlog", linthresh=float(np.median(spread)) if spread else 1.0)
+        for k, row in enumerate(rows):
+            is_shown = code_of(row.visibility) in SHOWN and math.isfinite(row.std)
+            colour = MEASURED if is_shown else RESIDUAL
+            reach = DEVIATIONS * row.std if math.isfinite(row.std) else None
+            axis.errorbar(row.value, k, xerr=reach, fmt="o", color=colour, markersize=3.5, capsize=2)
+            if row.file is not None:
+                axis.plot(row.file, k, "o", color=PREDICTED, markerfacecolor="none", markersize=6)
+        axis.set_yticks(range(len(rows)), [row.name for row in rows], parse_math=False)
+        axis.invert_yaxis()
+        axis.tick_params(axis="x", labelsize=8)
+        axis.set_xlabel(
+            f"{unit}; bars: ± {DEVIATIONS:g} standard deviations, circles: robot file", parse_math=False
+        )
+
+
+def friction_curves(known: Calibrated) -> dict[str, tuple[Array, Array]]:
+    """By joint: speeds, and friction torque in steady motion, without what depends on position or load."""
+    law = known.prediction
+    if law is None:
+        return {}
+    speeds = {row.joint: row.speed for row in known.verdict.joints} if known.verdict is not None else {}
+    found = {}
+    for joint in known.joint_names:
+        values = {row.name: row.value for row in known.friction if row.joint == joint}
+        rows = [
+            row for row in rows_of(values, law.law, law.laws) if not {"q", "load"} & _reads(row) and row[1]
+        ]
+        rms = speeds.get(joint, math.nan)
+        top = TIMES_SPEED * rms if math.isfinite(rms) and rms > 0.0 else 1.0
+        half = np.linspace(top / CURVE, top, CURVE)
+        v = np.concatenate([-half[::-1], half])
+        if rows and all(np.isfinite(row[1]).all() for row in rows):
+            found[joint] = (v, steady(rows, v, law.sign_speed))
+    return found
+
+
+def _reads(row: Row) -> frozenset[str]:
+    return frozenset() if row[0].law.state is not None else row[0].reads
+
+
+def steady(rows: Sequence[Row], v: Array, sign_speed: float) -> Array:
+    """Friction at constant speeds, none of them zero. A law's state is where it rests, as its rate is linear in it."""
+    sign = np.tanh(v / sign_speed) if sign_speed > 0.0 else np.sign(v)
+    state, z = rows[0][0].law.state, np.zeros_like(v)
+    if state is not None:
+        at_zero = state.rate(rows[0][1], v, z)
+        z = -at_zero / (state.rate(rows[0][1], v, z + 1.0) - at_zero)
+    return np.asarray(total(rows, At(0.0, v, sign, 0.0, z)) + np.zeros_like(v))
+
+
+def draw_friction(
+    figure: Figure, curves: Mapping[str, tuple[Array, Array]], efforts: Mapping[str, str]
+) -> None:
+    """Friction of each joint against its speed; `efforts` are the joints' units of torque or force."""
+    axes = list(figure.subplots(math.ceil(len(curves) / ABREAST), ABREAST, squeeze=False).flat)
+    for axis in axes[len(curves) :]:
+        axis.set_visible(False)
+    for axis, (joint, (v, torque)) in zip(axes, curves.items(), strict=False):
+        half = len(v) // 2
+        for part in (slice(None, half), slice(half, None)):
+            axis.plot(v[part], torque[part], color=MEASURED, linewidth=1.2)
+        axis.axhline(0.0, color=RESIDUAL, linewidth=0.5)
+        axis.set_title(joint, fontsize=9, loc="left", parse_math=False)
+        axis.set_xlabel("speed [m/s]" if efforts[joint] == "N" else "speed [rad/s]", fontsize=8)
+        axis.set_ylabel(f"friction [{efforts[joint]}]", fontsize=8)
+        axis.tick_params(labelsize=8)
+
+
+def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -> None:
+    """Measured and predicted torque of each joint, and beside it what is left."""
+    rows = figure.subplots(len(step.samples), 2, squeeze=False, sharex="row", width_ratios=[2, 1])
+    for (both, left), sample in zip(rows, step.samples, strict=True):
+        kept = thinned(len(sample.x))
+        x, measured, predicted = sample.x[kept], sample.measured[kept], sample.predicted[kept]
+        both.plot(x, measured, color=MEASURED, linewidth=1.0, label="measured")
+        both.plot(x, predicted, color=PREDICTED, linewidth=0.7, linestyle="--", label="predicted")
+        left.plot(x, measured - predicted, color=RESIDUAL, linewidth=0.6)
+        rms = math.sqrt(float(np.mean((sample.measured - sample.predicted) ** 2)))
+        both.set_title(sample.joint, fontsize=9, loc="left", parse_math=False)
+        left.set_title(f"residual, RMS {rms:.3g}", fontsize=9, loc="left")
+        both.set_ylabel(f"torque [{efforts[sample.joint]}]", fontsize=8)
+        for axis in (both, left):
+            axis.tick_params(labelsize=8)
+    for axis in rows[-1]:
+        axis.set_xlabel(step.samples[-1].abscissa, fontsize=8)
+    handles, labels = rows[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+
+
+# Tables
+
+
+def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
+    """Tables as LaTeX by file name. They need the packages booktabs, longtable and siunitx."""
+    equations = [parameter.terms for parameter in model.base_parameters]
+    parameters = [
+        [
+            f"${{\\theta_{{{k}}}}}$",
+            f"${terms_latex(terms)}$",
+            "--" if row.file is None else number(row.file),
+            number(row.value, row.std),
+            unit(row.unit),
+        ]
+        for k, (row, terms) in enumerate(zip(known.parameters, equations, strict=True))
+    ]
+    joints = [
+        [escaped(row.joint), escaped(row.name.replace("_", " ")), _seen(row), unit(row.unit)]
+        for row in (*known.motors, *known.friction, *known.springs)
+    ]
+    accuracy = [
+        [
+            escaped(joint),
+            escaped(step.step),
+            *(number(value) for value in (step.joints[joint].held_out.r2, step.joints[joint].held_out.rmse)),
+        ]
+        for joint in known.joint_names
+        for step in known.steps
+        if joint in step.joints
+    ]
+    head = ["", "Base parameter", "Robot file", "Calibrated", "Unit"]
+    found = {TABLE: tabular(r"lp{0.36\linewidth}rrl", head, parameters, "longtable")}
+    if joints:
+        found["joints.tex"] = tabular("llrl", ["Joint", "Quantity", "Value", "Unit"], joints)
+    if accuracy:
+        found["accuracy.tex"] = tabular(
+            "llrr", ["Joint", "Step", "$R^2$", r"RMSE [\unit{N.m}; \unit{N} of sliding joints]"], accuracy
+        )
+    return found
+
+
+def _seen(row: NumberRow) -> str:
+    """A joint's number; in brackets what the data do not show."""
+    text = number(row.value, row.std)
+    return text if row.seen else f"({text})"
+
+
+def tabular(columns: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "tabular") -> str:
+    """A table; cells are LaTeX. A longtable continues on the next page, and repeats its head."""
+    packages = "booktabs,siunitx" if kind == "tabular" else f"booktabs,{kind},siunitx"
+    lines = [
+        f"{MARK}; needs \\usepackage{{{packages}}}",
+        f"\\begin{{{kind}}}{{{columns}}}",
+        r"\toprule",
+        " & ".join(head) + r" \\",
+        r"\midrule",
+        *([] if kind == "tabular" else [r"\endhead"]),
+        *(" & ".join(row) + r" \\" for row in rows),
+        r"\bottomrule",
+        f"\\end{{{kind}}}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def preview(names: Sequence[str], pictures: Sequence[str]) -> str:
+    """A document that shows all of it."""
+    size = r"width=\linewidth,height=0.95\textheight,keepaspectratio"
+    lines = [
+        MARK,
+        r"\documentclass{article}",
+        r"\usepackage[margin=20mm]{geometry}",
+        r"\usepackage{amsmath,booktabs,graphicx,longtable,siunitx}",
+        r"\begin{document}",
+        r"\footnotesize",
+        *(rf"\begin{{center}}\input{{{name}}}\end{{center}}" for name in names),
+        *(rf"\begin{{center}}\includegraphics[{size}]{{{name}.pdf}}\end{{center}}" for name in pictures),
+        r"\end{document}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def number(value: float, std: float = math.inf) -> str:
+    """A number with its standard deviation, rounded to two digits of that, for siunitx; a dash for none. siunitx rounds to
+    an uncertainty itself, but drops those of a number that is much smaller."""
+    if not math.isfinite(value):
+        return "--"
+    if not 0.0 < std < math.inf:
+        return rf"\num{{{value:.4g}}}"
+    places = max(0, DIGITS - 1 - math.floor(math.log10(std)))
+    return rf"\num{{{round(value, places) + 0.0:.{places}f} +- {std:.{places}f}}}"
+
+
+UNIT = re.compile(r"[A-Za-z0-9.^/ ]+")
+
+
+def unit(text: str) -> str:
+    """A unit as psdmc writes it, for siunitx."""
+    if not text or text == "-":
+        return ""
+    if not UNIT.fullmatch(text):
+        return escaped(text)
+    letters = re.sub(r"\bNms\b", "N.m.s", re.sub(r"\bNm\b", "N.m", re.sub(r"\bNs\b", "N.s", text)))
+    raised = re.sub(r"\^([0-9.]+)", r"^{\1}", letters.strip().replace(" ", "."))
+    return rf"\unit{{{raised}}}"
+
+
+SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    **{letter: f"\\{letter}" for letter in "{}$&#_%"},
+}
+
+
+def escaped(text: str) -> str:
+    """Text of a file as LaTeX shows it; what is neither ASCII nor Latin-1 by its number."""
+    return "".join(
+        SPECIAL.get(c, c) if " " <= c <= "~" or "\xc0" <= c <= "\xff" else f"U+{ord(c):04X}" for c in text
+    )
