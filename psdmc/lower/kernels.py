@@ -63,7 +63,8 @@ def lower(
 ) -> dict[str, Kernel]:
     """Kernels by name, `_theta` variants included where wanted, in the order of psdmc.functions.
 
-    functions  names, or NAME_theta_rows; None takes the default ones; without theta_b only those variants that need none are made
+    functions  names, or NAME_theta_rows; None takes the default ones; without theta_b only those variants that need none are
+               made
     costs      of the target
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
@@ -91,8 +92,9 @@ def lower(
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
-    """The names in the order of psdmc.functions, NAME_theta_rows behind them; None and the word 'default': the default ones, of this robot where one is
-    given; 'all': all of them; a text is one name. What a function calls comes along. InputError for one that is unknown."""
+    """The names in the order of psdmc.functions, with NAME_theta_rows behind them; None and the word 'default': the default
+    ones, of this robot where one is given; 'all': all but NAME_theta_rows; a text is one name. What a function calls comes
+    along. InputError for one that is unknown."""
     default = DEFAULT if robot is None else default_of(robot)
     if functions is None:
         return default

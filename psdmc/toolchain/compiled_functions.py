@@ -247,18 +247,18 @@ class CompiledFunctions(RobotFacts):
 
         function  an entry of `psdmc.functions.SIGNATURES`
         inputs    the inputs of the function, as a list of arrays
-        theta_b   base parameters that replace those in the code, (l,) for all states or (..., l), one set per state; optional
+        theta_b   base parameters that replace those in the code, (l,), or (..., l), one set per state; optional
         out       array into which psdmc writes the result, or a tuple of arrays for several results; optional
         """
         variant = "" if theta_b is None else "_theta"
         if has_rows(function, theta_b):
             variant = THETA_ROWS
             function, inputs, theta_b = with_rows(function), (*inputs, theta_b), None
-        kernel = self._kernel(function.name + variant)
         if any(map(is_foreign, inputs)):
-            return self._foreign(function, kernel, inputs, theta_b, out)
+            return self._foreign(function, self._kernel(function.name + variant), inputs, theta_b, out)
         arrays = states(function, self._axes, inputs, self._dtype)
         lead = common_lead(function, arrays)
+        kernel = self._kernel(function.name + variant)
         rows = self._rows(lead, function, arrays)
         if theta_b is not None:
             rows.append(parameters(function, self._sizes.l, theta_b, self._dtype))
