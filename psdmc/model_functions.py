@@ -84,7 +84,7 @@ def evaluated(
     tails = [axes.sizes.shape(output.axes) for output in signature.outputs]
     by_rows = has_rows(signature, theta_b)
     if by_rows:
-        signature, inputs = with_rows(signature), (*inputs, theta_b)
+        signature, inputs = with_rows(signature), (*inputs, theta_b)  # type: ignore[arg-type]
     if any(map(is_foreign, inputs)):
         refuse_out(signature, out)
         return _tuple(

@@ -253,7 +253,7 @@ class CompiledFunctions(RobotFacts):
         variant = "" if theta_b is None else "_theta"
         if has_rows(function, theta_b):
             variant = THETA_ROWS
-            function, inputs, theta_b = with_rows(function), (*inputs, theta_b), None
+            function, inputs, theta_b = with_rows(function), (*inputs, theta_b), None  # type: ignore[arg-type]
         if any(map(is_foreign, inputs)):
             return self._foreign(function, self._kernel(function.name + variant), inputs, theta_b, out)
         arrays = states(function, self._axes, inputs, self._dtype)

@@ -1,0 +1,417 @@
+"""Sampling: states of a robot within its limits and its functions' values there, as Parquet files.
+
+A folder holds a manifest, which fixes what is sampled, and parts. What a part holds follows from the manifest and its
+number alone, and a part is written whole: a sampling that was interrupted goes on with the parts that are missing. Memory
+does not grow with the number of states.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from psdmc import compiler
+from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at, write_whole
+from psdmc.errors import InputError, ToolchainError
+from psdmc.functions import BY_ROWS, RECIPES, SIGNATURES
+from psdmc.lower.kernels import wanted
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature, Sizes
+from psdmc.program.theta_rows import THETA_ROWS
+from psdmc.progress import Progress, Step, silent
+from psdmc.reading import read_file
+from psdmc.reproducible import times
+from psdmc.robot.limits import listed, shown
+from psdmc.robot.mechanism import Limits, Mechanism
+from psdmc.robot.unit_lengths import units_of
+from psdmc.target.target import Real
+from psdmc.version import psdmc_version
+
+Array = NDArray[Any]
+Draw = Literal["uniform", "sobol"]
+
+SCHEMA = 1
+MANIFEST = "sample.json"
+MOST_MANIFEST = 1 << 24
+"""Bytes of a manifest: one of 200 joints has 50 kB."""
+
+KEY = b"psdmc"
+"""Of the metadata of a part."""
+
+PART_BYTES, PART_STATES = 1 << 26, 1 << 18
+"""Largest part, unless its size is chosen. It is in memory as numbers, as a table and as a file."""
+
+MOST_STATES = 10**12
+
+SOBOL_BITS, MOST_POINTS = 32, 2**32 - 1
+"""Binary digits of a Sobol point, and how many points there are. SciPy 1.17 can skip points of up to 32 digits only."""
+
+LIMITS: Mapping[str, tuple[str, str]] = {
+    Q.name: ("position", "rad or m"),
+    QD.name: ("speed", "rad/s or m/s"),
+    QDD.name: ("acceleration", "rad/s^2 or m/s^2"),
+    TAU.name: ("effort", "N m or N"),
+}
+"""Quantities that are drawn, in this order: the option that gives limits that the robot's file lacks, and their units."""
+
+LEAST = 2.0**-53
+"""Nearest to 0 and 1 that a share is taken where it becomes a normal deviate, which is infinite there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """What is sampled.
+
+    states     number of states
+    functions  names, as `--functions` has them
+    draw       'uniform': independent states; 'sobol': states that fill the limits more evenly, by a scrambled Sobol sequence
+    seed       states differ with it
+    real       precision of states and values
+    spread     0 to 1: masses and inertias of each link, all by one factor from 1 - spread to 1 + spread, are drawn per state
+    given      by the words of LIMITS: plus and minus this is the range of joints whose limit the robot's file lacks
+    rows       states of a part; None: as many as PART_BYTES and PART_STATES allow
+    """
+
+    states: int
+    functions: Sequence[str] = ("inverse_dynamics",)
+    draw: Draw = "uniform"
+    seed: int = 0
+    real: Real = "float64"
+    spread: float = 0.0
+    given: Mapping[str, float] = field(default_factory=dict)
+    rows: int | None = None
+
+    def __post_init__(self) -> None:
+        _range("--states", self.states, 1, MOST_POINTS if self.draw == "sobol" else MOST_STATES)
+        _range("--seed", self.seed, 0, 2**63 - 1)
+        _range("--theta-spread", self.spread, 0.0, 1.0)
+        _range("--part-states", 1 if self.rows is None else self.rows, 1, MOST_STATES)
+        for word, value in self.given.items():
+            _range(f"--{word}", value, 0.0, 1e6)
+        if self.draw not in ("uniform", "sobol"):
+            raise InputError(f"--draw is {self.draw!r}", "choose uniform or sobol")
+        if self.real not in ("float64", "float32"):
+            raise InputError(f"--real is {self.real!r}", "choose float64 or float32")
+
+
+def _range(option: str, value: float, least: float, most: float) -> None:
+    if not least <= value <= most:
+        raise InputError(f"{option} is {value:g}", f"give a number from {least:g} to {most:g}")
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """What a folder holds then: states, parts and their bytes; how many of the parts were there before; and the length of
+    each column."""
+
+    states: int
+    parts: int
+    bytes: int
+    before: int
+    columns: Mapping[str, int]
+
+
+def sample(model: DynamicsModel, folder: Path, what: Sampling, progress: Progress = silent) -> Sampled:
+    """Write the parts that the folder lacks.
+
+    Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit, or if
+    a function reads what cannot be drawn. Raises ToolchainError if the disk is full, or too small for the missing parts.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'") from error
+    plan = _Plan(model, what)
+    manifest = {**plan.manifest, "pyarrow": pyarrow.__version__}
+    _begin(folder, json.loads(json.dumps(manifest)))
+    paths = [folder / f"part-{number:06d}.parquet" for number in range(plan.parts)]
+    missing = [k for k, path in enumerate(paths) if not _is_done(path, plan.described(manifest, k))]
+    _check_room(folder, sum(map(plan.count, missing)) * plan.row_bytes)
+    columns = plan.evaluated(progress) if missing else None
+    for done, k in enumerate(missing, len(paths) - len(missing)):
+        progress(Step(f"part {k + 1} of {plan.parts}", done / plan.parts))
+        assert columns is not None
+        write_whole(paths[k], _file(columns(k), plan.described(manifest, k)))
+    size = sum(path.stat().st_size for path in paths)
+    lengths = {name: math.prod(shape) for name, shape in plan.columns.items()}
+    return Sampled(what.states, plan.parts, size, plan.parts - len(missing), lengths)
+
+
+def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
+    """Write the manifest into a new folder; InputError where there is another one, or files without one."""
+    path, elsewhere = folder / MANIFEST, "give -o another folder"
+    if not path.exists():
+        refuse_foreign_folder(folder, elsewhere)
+        make_folder(folder)
+        write_whole(path, json.dumps(manifest, indent=1) + "\n")
+        return
+    try:
+        found = json.loads(read_file(path, MOST_MANIFEST, elsewhere))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: no manifest of psdmc sample: {error}", elsewhere) from error
+    known = found if isinstance(found, dict) else {}
+    for key, value in manifest.items():
+        if known.get(key) != value:
+            raise InputError(
+                f"{folder}: holds another sampling, whose {key} is {shown(known.get(key))}, not {shown(value)}",
+                "give -o another folder, or the options, model and versions of its sample.json",
+            )
+
+
+def _is_done(path: Path, described: bytes) -> bool:
+    """Whether a file is the part that is so described."""
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        return bool((pyarrow.parquet.read_metadata(path).metadata or {}).get(KEY) == described)
+    except (OSError, pyarrow.ArrowException):
+        return False
+
+
+def _check_room(folder: Path, size: int) -> None:
+    """ToolchainError where the disk has no room for so many bytes."""
+    with system_errors_at(folder):
+        free = shutil.disk_usage(folder).free
+    if size > free:
+        raise ToolchainError(
+            f"{folder}: the missing parts take {size / 1e9:.1f} GB, and the disk has {free / 1e9:.1f} GB free",
+            "make room there, write to another disk, or sample fewer states",
+        )
+
+
+def _file(columns: Mapping[str, Array], described: bytes) -> bytes:
+    """The Parquet file of a part: lists of fixed length, numbers alone as they are. Random numbers do not compress."""
+    import pyarrow
+    import pyarrow.parquet
+
+    arrays = []
+    for values in columns.values():
+        flat = pyarrow.array(values.reshape(-1))
+        row = pyarrow.list_(pyarrow.field("item", flat.type, False), math.prod(values.shape[1:]))
+        arrays.append(flat if values.ndim == 1 else pyarrow.FixedSizeListArray.from_arrays(flat, type=row))
+    fields = [pyarrow.field(name, array.type, False) for name, array in zip(columns, arrays, strict=True)]
+    table = pyarrow.table(arrays, schema=pyarrow.schema(fields, {KEY: described}))
+    stream = pyarrow.BufferOutputStream()
+    pyarrow.parquet.write_table(
+        table, stream, compression="none", use_dictionary=False, write_statistics=False
+    )
+    return bytes(stream.getvalue().to_pybytes())
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """A sampling of one model, checked."""
+
+    model: DynamicsModel
+    what: Sampling
+
+    @cached_property
+    def functions(self) -> tuple[Signature, ...]:
+        """InputError where one is unknown, or reads what is not drawn."""
+        names = [name for name in wanted(self.what.functions, self.model.mechanism) if name not in BY_ROWS]
+        found = tuple(SIGNATURES[name] for name in names)
+        for function in found:
+            strange = [quantity.name for quantity in function.inputs if quantity.name not in LIMITS]
+            if strange:
+                raise InputError(
+                    f"{function.name} reads {strange[0]}, which has no limits to draw it from",
+                    f"sample functions of {', '.join(LIMITS)} alone",
+                )
+        if any(function.theta for function in found):
+            self.model.known_theta_b()
+        return found
+
+    @cached_property
+    def reads(self) -> tuple[Quantity, ...]:
+        """The quantities that are drawn."""
+        read = {quantity.name: quantity for function in self.functions for quantity in function.inputs}
+        return tuple(read[name] for name in LIMITS if name in read)
+
+    @cached_property
+    def columns(self) -> dict[str, tuple[int, ...]]:
+        """Name -> axes of one state, of what is drawn and then of each function's outputs."""
+        model = self.model
+        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+        found = {quantity.name: sizes.shape(quantity.axes) for quantity in self.reads}
+        if self.what.spread:
+            found["theta_b"] = (model.l,)
+        for function in self.functions:
+            packs = RECIPES[function.name].packs
+            kept = len(packs.places(model.mechanism, model.representative)) if packs else 0
+            for output in function.outputs:
+                found[function.label(output)] = replace(sizes, nonzeros=kept).shape(output.axes)
+        return found
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one state."""
+        return (8 if self.what.real == "float64" else 4) * sum(map(math.prod, self.columns.values()))
+
+    @cached_property
+    def rows(self) -> int:
+        """States of a whole part: a power of two, as Sobol's points are evenest."""
+        fit = max(PART_BYTES // self.row_bytes, 1)
+        return self.what.rows or min(1 << (fit.bit_length() - 1), PART_STATES)
+
+    @property
+    def parts(self) -> int:
+        return -(-self.what.states // self.rows)
+
+    def count(self, part: int) -> int:
+        """States of a part."""
+        return min(self.rows, self.what.states - part * self.rows)
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[Array, Array]]:
+        """By quantity the lower and upper bounds of its entries; InputError where a joint has none."""
+        robot, found, lacking = self.model.mechanism, {}, {}
+        for quantity in self.reads:
+            word, _ = LIMITS[quantity.name]
+            bounds, without = _bounds(robot, quantity.name, self.what.given.get(word))
+            found[quantity.name] = bounds[:, 0], bounds[:, 1]
+            if without:
+                lacking[word] = without
+        if lacking:
+            faults = "; ".join(f"{word}: {listed(names, 4)}" for word, names in lacking.items())
+            units = dict(LIMITS.values())
+            options = " and ".join(f"--{word} NUMBER ({units[word]})" for word in lacking)
+            raise InputError(f"{robot.name}: joints without limits of {faults}", f"add {options}")
+        return found
+
+    @cached_property
+    def manifest(self) -> dict[str, Any]:
+        """All that the parts follow from."""
+        model, what = self.model, self.what
+        return {
+            "generator": "psdmc sample",
+            "schema": SCHEMA,
+            "robot": model.mechanism.name,
+            "model": model.content_hash,
+            "states": what.states,
+            "states_per_part": self.rows,
+            "functions": [function.name for function in self.functions],
+            "draw": what.draw,
+            "seed": what.seed,
+            "real": what.real,
+            "theta_spread": what.spread,
+            "ranges": {name: [side.tolist() for side in sides] for name, sides in self.ranges.items()},
+            "columns": self.columns,
+            "q_names": model.mechanism.q_names,
+            "v_names": model.mechanism.v_names,
+            "psdmc": psdmc_version(),
+            "numpy": np.__version__,
+            "scipy": version("scipy"),
+        }
+
+    def described(self, manifest: Mapping[str, Any], part: int) -> bytes:
+        """The metadata of a part."""
+        own = {"part": part, "first_state": part * self.rows, "states_of_part": self.count(part)}
+        return json.dumps({**manifest, **own}).encode()
+
+    def evaluated(self, progress: Progress) -> Callable[[int], dict[str, Array]]:
+        """Compile the functions; the result computes a part's columns by its number."""
+        by_rows = {function.name for function in self.functions if function.theta and self.what.spread}
+        names = [
+            f"{function.name}{THETA_ROWS}" if function.name in by_rows else function.name
+            for function in self.functions
+        ]
+        robot = compiler.compile(self.model, functions=names, real=self.what.real, progress=progress)
+        draw = _shares(self.what, self.rows, sum(len(low) for low, _ in self.ranges.values()) + self.links)
+
+        def columns(part: int) -> dict[str, Array]:
+            found = self.drawn(draw(part)[: self.count(part)])
+            for function in self.functions:
+                theta_b = found["theta_b"] if function.name in by_rows else None
+                outputs = robot.call(function, [found[q.name] for q in function.inputs], theta_b)
+                several = [outputs] if len(function.outputs) == 1 else outputs
+                found |= {function.label(o): a for o, a in zip(function.outputs, several, strict=True)}
+            return found
+
+        return columns
+
+    @property
+    def links(self) -> int:
+        """Factors that are drawn for links."""
+        return len(self.model.mechanism) if self.what.spread else 0
+
+    def drawn(self, shares: Array) -> dict[str, Array]:
+        """States, and theta_b where it is drawn, from shares between 0 and 1."""
+        robot, found = self.model.mechanism, {}
+        for name, (lower, upper) in self.ranges.items():
+            own, shares = shares[:, : len(lower)], shares[:, len(lower) :]
+            values = lower + (upper - lower) * own
+            for start, stop in (
+                units_of(robot.joints[i].type for i in robot.own_joints) if name == Q.name else ()
+            ):
+                normal = ndtri(np.clip(own[:, start:stop], LEAST, 1.0 - LEAST))
+                values[:, start:stop] = normal / np.sqrt(sum(x * x for x in normal.T))[:, None]
+            found[name] = values.astype(self.what.real)
+        if self.what.spread:
+            links = robot.known_parameters
+            effects = [
+                times(block, x)
+                for block, x in zip(np.split(self.model.B, len(robot), axis=1), links, strict=True)
+            ]
+            factors = self.what.spread * (2.0 * shares - 1.0)
+            theta_b = self.model.known_theta_b() + times(factors, np.array(effects))
+            found["theta_b"] = theta_b.astype(self.what.real)
+        return found
+
+
+def _bounds(robot: Mechanism, quantity: str, given: float | None) -> tuple[Array, list[str]]:
+    """(size, 2) the range of each entry, and the names of joints that have none. Entries of quaternions need none."""
+    bounds: list[tuple[float, float]] = []
+    lacking = []
+    for joint in (robot.joints[i] for i in robot.own_joints):
+        low, high = _limits(joint.limits, quantity)
+        if given is not None:
+            low, high = (low if math.isfinite(low) else -given), (high if math.isfinite(high) else given)
+        size = joint.type.nq if quantity == Q.name else joint.type.nv
+        own = [(low, high)] * size
+        if quantity == Q.name:
+            own[joint.type.unit] = [(0.0, 0.0)] * len(own[joint.type.unit])
+        if not all(math.isfinite(bound) for pair in own for bound in pair) or low > high:
+            lacking.append(joint.name)
+        bounds += own
+    return np.array(bounds).reshape(-1, 2), lacking
+
+
+def _limits(limits: Limits, quantity: str) -> tuple[float, float]:
+    if quantity == Q.name:
+        return limits.lower, limits.upper
+    largest = {QD.name: limits.speed, QDD.name: limits.acceleration, TAU.name: limits.effort}[quantity]
+    return -largest, largest
+
+
+def _shares(what: Sampling, rows: int, size: int) -> Callable[[int], Array]:
+    """By a part's number (rows, size) shares between 0 and 1, which follow from the seed and that number."""
+    if what.draw == "uniform":
+        return lambda part: np.random.default_rng([what.seed, part]).random((rows, size))
+    engine = qmc.Sobol(size, bits=SOBOL_BITS, rng=np.random.default_rng(what.seed))
+
+    def sobol(part: int) -> Array:
+        if engine.num_generated > part * rows:
+            engine.reset()
+        if engine.num_generated < part * rows:
+            engine.fast_forward(part * rows - engine.num_generated)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # on parts whose size is no power of two
+            found: Array = engine.random(rows)
+        return found
+
+    return sobol
