@@ -173,7 +173,7 @@ def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
 
 
 def _is_done(path: Path, described: bytes) -> bool:
-    """Whether a file is the part that is so described."""
+    """Check if a file is the part that is so described."""
     import pyarrow
     import pyarrow.parquet
 
@@ -278,7 +278,7 @@ class _Plan:
 
     @cached_property
     def ranges(self) -> dict[str, tuple[Array, Array]]:
-        """By quantity the lower and upper bounds of its entries; InputError where a joint has none."""
+        """Give the lower and upper bounds of each entry by quantity; InputError where a joint has none."""
         robot, found, lacking = self.model.mechanism, {}, {}
         for quantity in self.reads:
             word, _ = LIMITS[quantity.name]
@@ -399,7 +399,7 @@ def _limits(limits: Limits, quantity: str) -> tuple[float, float]:
 
 
 def _shares(what: Sampling, rows: int, size: int) -> Callable[[int], Array]:
-    """By a part's number (rows, size) shares between 0 and 1, which follow from the seed and that number."""
+    """Return a function that draws a part's shares, (rows, size), 0 to 1. They follow from the seed and the part's number."""
     if what.draw == "uniform":
         return lambda part: np.random.default_rng([what.seed, part]).random((rows, size))
     engine = qmc.Sobol(size, bits=SOBOL_BITS, rng=np.random.default_rng(what.seed))

@@ -37,7 +37,8 @@ MAY_IMPORT |= {
     "export": {"robot", "dynamics", "friction", "model", "links"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
-    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
+    "sampling": LEFT_OF_TOOLS | {"lower"},
+    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report", "sampling"},
 }
 
 OUTSIDE = {
@@ -86,6 +87,7 @@ OUTSIDE = {
     "export": {"numpy", "mujoco"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
+    "sampling": {"numpy", "scipy", "pyarrow"},
     "cli": {"typer", "rich", "numpy"},
 }
 

@@ -46,7 +46,7 @@ OPTIONAL = (
     ("rosbags", "calibrate", "logs in ROS bags"),
     ("lz4", "calibrate", "compressed ROS bags"),
     ("backports.zstd", "calibrate", "compressed ROS bags, before Python 3.14"),
-    ("pyarrow", "calibrate", "logs in Parquet files"),
+    ("pyarrow", "sample", "psdmc sample; logs in Parquet files"),
 )
 """Packages, the extra of psdmc that brings each, and the commands or files that need it."""
 

@@ -123,7 +123,7 @@ def common_lead(function: Signature, arrays: Sequence[Array]) -> tuple[int, ...]
 
 
 def has_rows(function: Signature, theta_b: ArrayLike | None) -> bool:
-    """Whether theta_b has axes of states."""
+    """Check if theta_b has axes of states."""
     if theta_b is None or hasattr(theta_b, "ndim"):
         return theta_b is not None and theta_b.ndim > 1
     return real_array(f"{function.name}: theta_b", theta_b).ndim > 1
