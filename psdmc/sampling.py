@@ -399,7 +399,7 @@ def _limits(limits: Limits, quantity: str) -> tuple[float, float]:
 
 
 def _shares(what: Sampling, rows: int, size: int) -> Callable[[int], Array]:
-    """Return a function that draws a part's shares, (rows, size), 0 to 1. They follow from the seed and the part's number."""
+    """Return a function that draws a part's shares, (rows, size), 0 to 1. They follow from seed and part."""
     if what.draw == "uniform":
         return lambda part: np.random.default_rng([what.seed, part]).random((rows, size))
     engine = qmc.Sobol(size, bits=SOBOL_BITS, rng=np.random.default_rng(what.seed))
