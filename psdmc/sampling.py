@@ -7,14 +7,19 @@ does not grow with the number of states.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import shutil
+import threading
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
+from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,6 +34,8 @@ from psdmc.errors import InputError, ToolchainError
 from psdmc.functions import BY_ROWS, RECIPES, SIGNATURES
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import load_bytes
+from psdmc.model.store import file_bytes
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.progress import Progress, Step, silent
@@ -53,6 +60,9 @@ KEY = b"psdmc"
 
 PART_BYTES, PART_STATES = 1 << 26, 1 << 18
 """Largest part, unless its size is chosen. It is in memory as numbers, as a table and as a file."""
+
+AHEAD, CONNECT = 2, "10s"
+"""Parts that each thread of a worker is given at once, and the time that a scheduler has to answer."""
 
 MOST_STATES = 10**12
 
@@ -124,31 +134,107 @@ class Sampled:
     columns: Mapping[str, int]
 
 
-def sample(model: DynamicsModel, folder: Path, what: Sampling, progress: Progress = silent) -> Sampled:
+def sample(
+    model: DynamicsModel,
+    folder: Path,
+    what: Sampling,
+    progress: Progress = silent,
+    scheduler: str | None = None,
+) -> Sampled:
     """Write the parts that the folder lacks.
 
+    scheduler  address of a scheduler of Dask's, whose workers compute the parts; None: this process does
+
     Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit, or if
-    a function reads what cannot be drawn. Raises ToolchainError if the disk is full, or too small for the missing parts.
+    a function reads what cannot be drawn. Raises ToolchainError if the disk is full, or too small for the missing parts, or
+    if the scheduler does not answer.
     """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'") from error
+    if find_spec("pyarrow") is None:
+        raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'")
     plan = _Plan(model, what)
-    manifest = {**plan.manifest, "pyarrow": pyarrow.__version__}
-    _begin(folder, json.loads(json.dumps(manifest)))
+    _begin(folder, plan.manifest)
     paths = [folder / f"part-{number:06d}.parquet" for number in range(plan.parts)]
-    missing = [k for k, path in enumerate(paths) if not _is_done(path, plan.described(manifest, k))]
+    missing = [k for k, path in enumerate(paths) if not _is_done(path, plan.described(k))]
     _check_room(folder, sum(map(plan.count, missing)) * plan.row_bytes)
-    columns = plan.evaluated(progress) if missing else None
-    for done, k in enumerate(missing, len(paths) - len(missing)):
-        progress(Step(f"part {k + 1} of {plan.parts}", done / plan.parts))
-        assert columns is not None
-        write_whole(paths[k], _file(columns(k), plan.described(manifest, k)))
+    before = plan.parts - len(missing)
+    made = _on_workers(plan, missing, scheduler) if scheduler else _here(plan, missing, progress)
+    for done, (part, content) in enumerate(made, before + 1):
+        write_whole(paths[part], content)
+        progress(Step(f"{done} of {plan.parts} parts", done / plan.parts))
     size = sum(path.stat().st_size for path in paths)
     lengths = {name: math.prod(shape) for name, shape in plan.columns.items()}
-    return Sampled(what.states, plan.parts, size, plan.parts - len(missing), lengths)
+    return Sampled(what.states, plan.parts, size, before, lengths)
+
+
+Made = Iterator[tuple[int, bytes]]
+"""Numbers of parts and their files' contents."""
+
+
+def _here(plan: _Plan, missing: Sequence[int], progress: Progress) -> Made:
+    if missing:
+        file = plan.files(progress)
+        progress(Step("sampling", 1.0 - len(missing) / plan.parts))
+        yield from ((part, file(part)) for part in missing)
+
+
+def _on_workers(plan: _Plan, missing: Sequence[int], scheduler: str) -> Made:
+    """Parts from the workers of a scheduler, in the order in which they are ready, few at a time. Dask gives the parts of a
+    worker that dies to others."""
+    try:
+        from distributed import Client, KilledWorker, as_completed
+    except ImportError as error:
+        raise InputError("--scheduler needs Dask's distributed", "pip install 'psdmc[cluster]'") from error
+    try:
+        client: Any = Client(scheduler, timeout=CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise ToolchainError(
+            f"--scheduler {scheduler}: does not answer: {reason}",
+            "start one: dask scheduler, then dask worker",
+        ) from error
+    with client:
+        filed, text = zlib.compress(file_bytes(plan.model)), json.dumps(plan.manifest)
+        running: Any = as_completed([], loop=client.loop)  # type: ignore[no-untyped-call]
+        left = iter(missing)
+
+        def submit(count: int) -> None:
+            for part in islice(left, count):
+                running.add(client.submit(_of_worker, filed, plan.what, text, part, pure=False))
+
+        submit(AHEAD * max(1, sum(client.nthreads().values())))
+        try:
+            for future in running:
+                yield future.result()
+                submit(1)
+        except KilledWorker as error:
+            raise ToolchainError(
+                f"--scheduler {scheduler}: several workers died: {error}",
+                "look into their logs, then type it again",
+            ) from error
+
+
+def _of_worker(filed: bytes, what: Sampling, manifest: str, part: int) -> tuple[int, bytes]:
+    """A part, and its number. InputError where this process has other versions than the one that asks."""
+    key = hashlib.sha256(manifest.encode()).hexdigest()
+    with _ONE_AT_A_TIME:
+        if key not in _WORKING:
+            plan = _Plan(load_bytes(zlib.decompress(filed), Path("(model of psdmc sample)")), what)
+            for name, value in json.loads(manifest).items():
+                if plan.manifest[name] != value:
+                    raise InputError(
+                        f"a worker's {name} is {shown(plan.manifest[name])}, not {shown(value)}",
+                        "install the same versions there",
+                    )
+            _WORKING.clear()
+            _WORKING[key] = plan.files(silent)
+        return part, _WORKING[key](part)
+
+
+_WORKING: dict[str, Callable[[int], bytes]] = {}
+"""What a worker computes parts with, by the manifest's hash: that of the last sampling."""
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Threads of a worker share it."""
 
 
 def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
@@ -295,9 +381,9 @@ class _Plan:
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """All that the parts follow from."""
+        """All that the parts follow from, as JSON has it."""
         model, what = self.model, self.what
-        return {
+        found = {
             "generator": "psdmc sample",
             "schema": SCHEMA,
             "robot": model.mechanism.name,
@@ -316,12 +402,20 @@ class _Plan:
             "psdmc": psdmc_version(),
             "numpy": np.__version__,
             "scipy": version("scipy"),
+            "pyarrow": version("pyarrow"),
         }
+        plain: dict[str, Any] = json.loads(json.dumps(found))
+        return plain
 
-    def described(self, manifest: Mapping[str, Any], part: int) -> bytes:
+    def described(self, part: int) -> bytes:
         """The metadata of a part."""
         own = {"part": part, "first_state": part * self.rows, "states_of_part": self.count(part)}
-        return json.dumps({**manifest, **own}).encode()
+        return json.dumps({**self.manifest, **own}).encode()
+
+    def files(self, progress: Progress) -> Callable[[int], bytes]:
+        """Compile the functions; the result makes a part's file by its number."""
+        columns = self.evaluated(progress)
+        return lambda part: _file(columns(part), self.described(part))
 
     def evaluated(self, progress: Progress) -> Callable[[int], dict[str, Array]]:
         """Compile the functions; the result computes a part's columns by its number."""

@@ -87,7 +87,7 @@ OUTSIDE = {
     "export": {"numpy", "mujoco"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
-    "sampling": {"numpy", "scipy", "pyarrow"},
+    "sampling": {"numpy", "scipy", "pyarrow", "distributed"},
     "cli": {"typer", "rich", "numpy"},
 }
 

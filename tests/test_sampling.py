@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from psdmc import sampling
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError, ToolchainError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import file_bytes
 from psdmc.sampling import Sampled, Sampling
 
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -286,7 +288,7 @@ def test_a_disk_that_is_too_small_is_refused_before_the_work(arm: DynamicsModel,
 def test_without_pyarrow_it_says_what_to_install(
     arm: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setattr(sampling, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="psdmc sample needs pyarrow") as caught:
         sample(arm, tmp_path / "new")
     assert caught.value.hint == "pip install 'psdmc[sample]'"
@@ -345,3 +347,43 @@ def test_a_process_that_is_killed_leaves_the_parts_of_one_that_is_not(
         killed += 1
     assert killed > 3
     assert hashes(tmp_path / "killed") == hashes(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_is_replaced_and_the_parts_are_the_same(
+    arm: DynamicsModel, tmp_path: Path
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    what = Sampling(40_000, draw="sobol", rows=1000)
+    sampling.sample(arm, tmp_path / "whole", what)
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    told: list[str] = []
+    with distributed.LocalCluster(**options, local_directory=tmp_path / "dask") as cluster:
+        with distributed.Client(cluster.scheduler_address) as client:
+            process = next(iter(client.run(os.getpid).values()))
+
+        def kill(step: str) -> None:
+            told.append(step)
+            if len(told) == 5:
+                os.kill(process, signal.SIGKILL)
+
+        found = sampling.sample(arm, tmp_path / "cluster", what, kill, cluster.scheduler_address)
+    assert (found.parts, found.before) == (40, 0)
+    assert sorted(told) == sorted(f"{k} of 40 parts" for k in range(1, 41))
+    assert hashes(tmp_path / "cluster") == hashes(tmp_path / "whole")
+
+
+def test_workers_with_other_versions_are_refused(arm: DynamicsModel) -> None:
+    plan = sampling._Plan(arm, WHAT)
+    other = json.dumps({**plan.manifest, "numpy": "1.0"})
+    with pytest.raises(InputError, match=r"a worker's numpy is '.*', not '1\.0'"):
+        sampling._of_worker(zlib.compress(file_bytes(arm)), WHAT, other, 0)
+
+
+def test_a_scheduler_that_does_not_answer_is_named(
+    arm: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(sampling, "CONNECT", "0.1s")
+    with pytest.raises(ToolchainError, match=r"--scheduler tcp://127\.0\.0\.1:9: does not answer: "):
+        sampling.sample(arm, tmp_path / "new", WHAT, scheduler="tcp://127.0.0.1:9")

@@ -35,7 +35,7 @@ OPTIONAL = (
     ("pandas", "notebook", "base_parameters.to_frame() in Python"),
     ("sympy", "notebook", "torques as SymPy expressions in Python"),
     ("dask", "cluster", "functions of compiled robots over Dask's arrays"),
-    ("distributed", "cluster", "the same on a cluster"),
+    ("distributed", "cluster", "the same on a cluster; psdmc sample --scheduler"),
     ("xarray", "cluster", "functions of compiled robots over named dimensions"),
     ("crocoddyl", "examples", "the example of trajectory optimisation"),
     ("osqp", "examples", "the example of a trotting quadruped: its quadratic programme"),

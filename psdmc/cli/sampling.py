@@ -56,6 +56,12 @@ def sample(
         int | None,
         typer.Option(metavar="NUMBER", help="states of a file", show_default="a file has up to 64 MiB"),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="let the workers of this Dask scheduler compute, such as tcp://host:8786"
+        ),
+    ] = None,
 ) -> None:
     """Compute functions at random states within the robot's limits, and write Parquet files. An interrupted run goes on."""
     from psdmc.model.load import load
@@ -74,7 +80,7 @@ def sample(
         part_states,
     )
     with steps() as progress:
-        found = write(load(model), output, what, progress)
+        found = write(load(model), output, what, progress, scheduler)
     before = f"; {found.before} of them were there" if found.before else ""
     files = "1 part" if found.parts == 1 else f"{found.parts} parts"
     print(f"{output}: {found.states} states in {files}, {found.bytes / 1e6:.1f} MB{before}")
