@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cache
 
 from psdmc.errors import InputError
-from psdmc.functions import SIGNATURES, default_of, recipe_of
+from psdmc.functions import RECIPES, default_of, recipe_of
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
@@ -49,7 +49,7 @@ def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tupl
     """Sentences that name those of `functions` (None: the default ones) that only take theta_b at run time, because the
     model's is unknown. Empty where it is known or no function needs it."""
     asked = wanted(functions, model.mechanism)
-    names = [name for name in asked if name in SIGNATURES and SIGNATURES[name].theta]
+    names = [name for name in asked if name in RECIPES and RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()
     forms = ", ".join(f"{name}_theta" for name in names)

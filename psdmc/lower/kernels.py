@@ -9,7 +9,7 @@ from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
-from psdmc.functions import BY_ROWS, DEFAULT, RECIPES, SIGNATURES, default_of, recipe_of
+from psdmc.functions import BY_ROWS, DEFAULT, RECIPES, default_of, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.dimension_check import check_dimensions
@@ -102,7 +102,7 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
         functions = (functions,)
     groups = {"default": default, "all": tuple(RECIPES)}
     names = [name for word in functions for name in groups.get(word, (word,))]
-    known = SIGNATURES | BY_ROWS
+    known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
     unknown = [name for name in names if name not in known]
     if unknown:
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
