@@ -238,7 +238,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
-    """Write the manifest into a new folder; InputError where there is another one, or files without one."""
+    """Write the manifest into a folder without parts; InputError where there are parts of another one, or other files."""
     path, elsewhere = folder / MANIFEST, "give -o another folder"
     if not path.exists():
         refuse_foreign_folder(folder, elsewhere)
@@ -247,9 +247,13 @@ def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
         return
     try:
         found = json.loads(read_file(path, MOST_MANIFEST, elsewhere))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: no manifest of psdmc sample: {error}", elsewhere) from error
     known = found if isinstance(found, dict) else {}
+    is_own = known.get("generator") == manifest["generator"]
+    if is_own and known != manifest and not any(folder.glob("part-*.parquet")):
+        write_whole(path, json.dumps(manifest, indent=1) + "\n")
+        return
     for key, value in manifest.items():
         if known.get(key) != value:
             raise InputError(

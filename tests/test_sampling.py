@@ -250,9 +250,22 @@ def test_options_without_a_meaning_are_refused(change: dict[str, object]) -> Non
         replace(WHAT, **change)
 
 
+def test_a_sampling_that_wrote_no_part_gives_way_to_another(arm: DynamicsModel, tmp_path: Path) -> None:
+    with pytest.raises(ToolchainError), files_of_at_most(10_000):
+        sample(arm, tmp_path / "new")
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["sample.json"]
+    assert sample(arm, tmp_path / "new", replace(WHAT, seed=1, states=10)).states == 10
+    assert json.loads((tmp_path / "new" / "sample.json").read_text())["seed"] == 1
+
+
 def test_a_folder_with_other_files_is_refused(arm: DynamicsModel, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(InputError, match=r"psdmc did not write the files in this folder: thesis\.tex"):
+        sample(arm, tmp_path)
+    (tmp_path / "sample.json").write_text('{"results": 1}')
+    with pytest.raises(
+        InputError, match="holds another sampling, whose generator is None, not 'psdmc sample'"
+    ):
         sample(arm, tmp_path)
     (tmp_path / "sample.json").write_text("{")
     with pytest.raises(InputError, match=r"sample\.json: no manifest of psdmc sample"):
