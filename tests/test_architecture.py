@@ -37,6 +37,7 @@ MAY_IMPORT |= {
     "export": {"robot", "dynamics", "friction", "model", "links"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
+    "mujoco": {"robot", "model"},
     "sampling": LEFT_OF_TOOLS | {"lower"},
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report", "sampling"},
 }
@@ -87,6 +88,7 @@ OUTSIDE = {
     "export": {"numpy", "mujoco"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
+    "mujoco": {"numpy"},
     "sampling": {"numpy", "scipy", "pyarrow", "distributed"},
     "cli": {"typer", "rich", "numpy"},
 }
