@@ -56,6 +56,7 @@ MENU = {
         "how-to/floating-base",
         "how-to/whole-body",
         "how-to/many-robots",
+        "how-to/sample",
         "how-to/plan-campaign",
         "how-to/calibration-log",
         "how-to/springs-and-friction",

@@ -29,6 +29,7 @@ from psdmc.backends.reference_load import reference_load
 from psdmc.backends.reference_states import reference_states
 from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
+from psdmc.functions import BY_ROWS
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
@@ -261,12 +262,18 @@ def _files(
     """Path -> text of every file of what `emit` writes."""
     language = back_end(backend)
     options = _options(lowering, real, trig, target)
-    chosen_options = {"trig": trig, "target": options.target != NATIVE, **own}
+    by_rows = any(name in BY_ROWS for name in _names(functions or ()))
+    chosen_options = {"trig": trig, "target": options.target != NATIVE, "functions NAME_theta_rows": by_rows}
     for option in language.lacks:
-        if chosen_options.get(option):
+        if {**chosen_options, **own}.get(option):
             raise InputError(
                 f"the back end {backend} has no --{option}", "leave it out, or emit C: psdmc emit-c"
             )
+    if by_rows and not options.target.has_batches:
+        raise InputError(
+            f"target {options.target.name} has no functions for many states, so no NAME_theta_rows",
+            "leave --functions out: default functions take theta_b for one state as NAME_theta",
+        )
     adapters = _names(own.get("with", ()))
     if adapters and not options.target.hosted:
         raise InputError(

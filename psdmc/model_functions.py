@@ -26,16 +26,19 @@ from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism
 from psdmc.robot.unit_lengths import units_of
 from psdmc.toolchain.call_arguments import (
+    THETA_B,
     RobotAxes,
     bound_arguments,
     checked_outputs,
     common_lead,
     finite_states,
+    has_rows,
     indefinite,
     parameters,
     scalar_inputs,
     signature_of,
     states,
+    with_rows,
 )
 from psdmc.toolchain.compiled_functions import results
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
@@ -79,6 +82,9 @@ def evaluated(
     signature = recipe.signature
     axes = _axes(model, recipe)
     tails = [axes.sizes.shape(output.axes) for output in signature.outputs]
+    by_rows = has_rows(signature, theta_b)
+    if by_rows:
+        signature, inputs = with_rows(signature), (*inputs, theta_b)  # type: ignore[arg-type]
     if any(map(is_foreign, inputs)):
         refuse_out(signature, out)
         return _tuple(
@@ -94,7 +100,10 @@ def evaluated(
     }
     if recipe.needs is not None and theta_b is None:
         _admit(model, recipe.name)
-    found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
+    if by_rows:
+        found = _values_by_rows(model, recipe, given, axes.sizes)
+    else:
+        found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
     if signature.raises:
         _refuse_indefinite(signature, axes, lead, found[PIVOTS], given)
     outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]
@@ -125,7 +134,8 @@ def _tuple(signature: Signature, outputs: Sequence[Any]) -> Any:
 
 
 def _on_arrays(model: DynamicsModel, recipe: Recipe, theta_b: ArrayLike | None) -> Callable[..., Any]:
-    return lambda *arrays: evaluated(model, recipe, arrays, theta_b)
+    count = len(recipe.signature.inputs)
+    return lambda *arrays: evaluated(model, recipe, arrays[:count], *(arrays[count:] or [theta_b]))
 
 
 def _admit(model: DynamicsModel, name: str) -> None:
@@ -188,6 +198,20 @@ def _values(
         for output in recipe.signature.outputs:
             filled[output.name][failed] = np.nan
     return filled
+
+
+def _values_by_rows(
+    model: DynamicsModel, recipe: Recipe, given: Mapping[str, Array], sizes: Sizes
+) -> Mapping[str, Array]:
+    """The same, each state with its own theta_b, which is one of the quantities given."""
+    inputs = {name: array for name, array in given.items() if name != THETA_B.name}
+    rows = [
+        _values(model, recipe, theta, {name: array[k : k + 1] for name, array in inputs.items()}, sizes)
+        for k, theta in enumerate(given[THETA_B.name])
+    ]
+    if not rows:
+        return _values(model, recipe, np.zeros(model.l), inputs, sizes)
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 _FROM_MONOMIALS: Mapping[str, Callable[[Expansion, Mechanism, Array, list[Array]], Array]] = {

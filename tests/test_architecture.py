@@ -38,7 +38,8 @@ MAY_IMPORT |= {
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
     "mujoco": {"robot", "model"},
-    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
+    "sampling": LEFT_OF_TOOLS | {"lower"},
+    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report", "sampling"},
 }
 
 OUTSIDE = {
@@ -88,6 +89,7 @@ OUTSIDE = {
     "report": {"numpy", "matplotlib", "jinja2", "plotly"},
     "compiler": {"numpy"},
     "mujoco": {"numpy"},
+    "sampling": {"numpy", "scipy", "pyarrow", "distributed"},
     "cli": {"typer", "rich", "numpy"},
 }
 

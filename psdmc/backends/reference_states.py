@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.backends.reference_load import ReferenceLoad
-from psdmc.functions import DEFAULT, RECIPES
+from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import TAU, Q, Sizes
+from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.reproducible import times
@@ -36,6 +37,9 @@ SEED = 2021
 LOAD = 0.25
 """Share of another physical robot's parameters that the check of run-time parameters adds to the robot's own."""
 
+STEPS = 8.0
+"""By an eighth theta_b grows from state to state where each has its own: multiples of a physical robot are physical."""
+
 WORST_CONDITION = 1e7
 """Condition number of M beyond which a state is no test of forward dynamics."""
 
@@ -45,7 +49,8 @@ class ReferenceStates:
     """k states, and the outputs that belong to them.
 
     given     quantity's name -> (k, its size): q, qd, qdd and what else functions read; tau and tau_theta, the torques of
-              (q, qd, qdd) with the compiled-in parameters and with theta_b
+              (q, qd, qdd) with the compiled-in parameters and with theta_b; thetas and tau_theta_rows, another theta_b at
+              each state and its torques, where functions read them
     expected  Signature.label of an output (a kernel's name, where it has one) -> (k, its size), matrices row by row
     theta_b   (l,) the run-time parameters of the _theta kernels; not the robot's own, so that the test notices a kernel
               that ignores them
@@ -94,7 +99,28 @@ def reference_states(
         expected |= _values(own, robot, given | {TAU.name: tau}, suffix, solvable)
     free = [recipe for recipe in recipes if not recipe.signature.theta]
     expected |= _values(free, robots.get("", robots["_theta"]), given, "", solvable)
+    if any(name in BY_ROWS for name in functions):
+        thetas = theta_b * (1.0 + np.arange(len(given["q"])) / STEPS)[:, None]
+        own = [recipe for recipe in RECIPES.values() if f"{recipe.name}{THETA_ROWS}" in functions]
+        added, values = _by_rows(own, [RobotOnArrays.of(model, theta) for theta in thetas], given, solvable)
+        given |= {THETAS.name: thetas, **added}
+        expected |= values
     return ReferenceStates(given, expected, theta_b)
+
+
+def _by_rows(
+    recipes: Sequence[Recipe], robots: Sequence[RobotOnArrays], given: Mapping[str, Array], solvable: bool
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The torques, and the outputs of the functions' variants by rows, one robot per state."""
+    rows = []
+    for k, robot in enumerate(robots):
+        one = {name: array[k : k + 1] for name, array in given.items()}
+        one[TAU.name] = robot.torques(one["q"], one["qd"], one["qdd"], robot.base_acceleration)
+        values = _values(recipes, robot, one, THETA_ROWS, solvable)
+        rows.append({f"{TAU.name}{THETA_ROWS}": one[TAU.name], **values})
+    whole = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+    label = f"{TAU.name}{THETA_ROWS}"
+    return {label: whole.pop(label)}, whole
 
 
 def _drawn(model: DynamicsModel) -> dict[str, Array]:
@@ -116,7 +142,8 @@ def _values(
             continue
         values = recipe.reference(robot, given)
         for output in recipe.signature.outputs:
-            label = recipe.signature.label(output, theta=bool(suffix))
+            own = by_rows(recipe.signature) if suffix == THETA_ROWS else recipe.signature
+            label = own.label(output, theta=suffix == "_theta")
             found[label] = values[output.name].reshape(len(given["q"]), -1)
     return found
 

@@ -25,6 +25,7 @@ def compared_by_row(output: Quantity) -> bool:
     return bool(output.axes) and output.axes[0] in _ROWS
 
 
-def given_name(vector: str, theta: bool) -> str:
-    """The reference states' name of an input: torques have one with the compiled-in parameters and one with theta_b."""
-    return f"{vector}_theta" if theta and vector == TAU.name else vector
+def given_name(vector: str, variant: str) -> str:
+    """The reference states' name of an input of a kernel: torques depend on its parameters. They have one name with the
+    compiled-in ones (''), one with theta_b (_theta) and one with theta_b by rows (THETA_ROWS)."""
+    return f"{vector}{variant}" if vector == TAU.name else vector

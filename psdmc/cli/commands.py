@@ -12,6 +12,7 @@ from psdmc.cli.campaigning import excite, simulate
 from psdmc.cli.exporting import export_urdf
 from psdmc.cli.loads import payload
 from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
+from psdmc.cli.sampling import sample
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
 from psdmc.cli.viewing import figures, view
@@ -52,6 +53,7 @@ COMMANDS = (
     (emit, "write a model's package in another language"),
     (build, "build a package and run its self-test"),
     (bench, "measure the speed of a model's code and of other programs"),
+    (sample, "compute functions at random states, as Parquet files"),
     (excite, "plan the motions of a calibration"),
     (simulate, "write a campaign's logs from a virtual robot"),
     (calibrate, "identify a model's parameters from logs"),

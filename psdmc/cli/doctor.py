@@ -37,7 +37,7 @@ OPTIONAL = (
     ("pandas", "notebook", "base_parameters.to_frame() in Python"),
     ("sympy", "notebook", "torques as SymPy expressions in Python"),
     ("dask", "cluster", "functions of compiled robots over Dask's arrays"),
-    ("distributed", "cluster", "the same on a cluster"),
+    ("distributed", "cluster", "the same on a cluster; psdmc sample --scheduler"),
     ("xarray", "cluster", "functions of compiled robots over named dimensions"),
     ("crocoddyl", "examples", "the example of trajectory optimisation"),
     ("osqp", "examples", "the example of a trotting quadruped: its quadratic programme"),
@@ -48,7 +48,7 @@ OPTIONAL = (
     ("rosbags", "calibrate", "logs in ROS bags"),
     ("lz4", "calibrate", "compressed ROS bags"),
     ("backports.zstd", "calibrate", "compressed ROS bags, before Python 3.14"),
-    ("pyarrow", "calibrate", "logs in Parquet files"),
+    ("pyarrow", "sample", "psdmc sample; logs in Parquet files"),
 )
 """Packages, the extra of psdmc that brings each, and the commands or files that need it."""
 

@@ -267,7 +267,7 @@ def emit(
     ] = "auto",
     functions: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME,...", help="functions to generate; also default, all"),
+        typer.Option(metavar="NAME,...", help="functions to generate; also default, all, NAME_theta_rows"),
     ] = None,
     real: Annotated[
         str | None,

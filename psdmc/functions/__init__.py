@@ -7,6 +7,7 @@ from pkgutil import iter_modules
 
 from psdmc.errors import InternalError
 from psdmc.program.signature import in_order
+from psdmc.program.theta_rows import THETA_ROWS, by_rows
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import Mechanism
 
@@ -25,6 +26,9 @@ SIGNATURES = {signature.name: signature for signature in in_order([r.signature f
 
 RECIPES = {name: _FOUND[name] for name in SIGNATURES}
 
+BY_ROWS = {f"{each.name}{THETA_ROWS}": by_rows(each) for each in SIGNATURES.values() if each.theta}
+"""By name, the variants that read one theta_b per state, in the same order."""
+
 DEFAULT = tuple(name for name, recipe in RECIPES.items() if recipe.default)
 """Names of the functions that are generated where none are named."""
 
@@ -32,6 +36,11 @@ DEFAULT_WHERE_WIDE = tuple(
     name for name, recipe in RECIPES.items() if recipe.default or recipe.default_where_wide
 )
 """Likewise, of robots some of whose joints have several coordinates."""
+
+
+def recipe_of(name: str) -> Recipe:
+    """The recipe of a function, or of the function that this name is a variant of."""
+    return RECIPES[name.removesuffix(THETA_ROWS)]
 
 
 def default_of(robot: Mechanism) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cache
 
 from psdmc.errors import InputError
-from psdmc.functions import RECIPES, default_of
+from psdmc.functions import RECIPES, default_of, recipe_of
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
@@ -27,7 +27,7 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
     names = wanted(functions, model.mechanism)
     lacking = _lacking(model, names)
     for name, reason in lacking.items():
-        need = RECIPES[name].needs
+        need = recipe_of(name).needs
         others = ",".join(other for other in names if other not in lacking)
         leave = f"; without {name}: --functions {others}" if others else ""
         chain, remedy = model.mechanism, REMEDY[need] if need else ""
@@ -48,7 +48,8 @@ def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
     """Sentences that name those of `functions` (None: the default ones) that only take theta_b at run time, because the
     model's is unknown. Empty where it is known or no function needs it."""
-    names = [name for name in wanted(functions, model.mechanism) if RECIPES[name].signature.theta]
+    asked = wanted(functions, model.mechanism)
+    names = [name for name in asked if name in RECIPES and RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()
     forms = ", ".join(f"{name}_theta" for name in names)
@@ -58,7 +59,7 @@ def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tupl
 def _lacking(model: DynamicsModel, names: Sequence[str]) -> dict[str, str]:
     """Function -> why the model cannot have it."""
     reason = cache(lambda need: _REASONS[need](model))
-    needs = {name: RECIPES[name].needs for name in names}
+    needs = {name: recipe_of(name).needs for name in names}
     found = {name: reason(need) for name, need in needs.items() if need is not None}
     return {name: why for name, why in found.items() if why is not None}
 

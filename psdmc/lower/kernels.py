@@ -9,7 +9,7 @@ from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
-from psdmc.functions import DEFAULT, RECIPES, default_of
+from psdmc.functions import BY_ROWS, DEFAULT, RECIPES, default_of, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.dimension_check import check_dimensions
@@ -29,6 +29,7 @@ from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out
 from psdmc.program.program import Program
 from psdmc.program.signature import Signature
+from psdmc.program.theta_rows import kernel_by_rows
 from psdmc.progress import Step
 from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.robot.derivable import require_derivable
@@ -63,33 +64,38 @@ def lower(
 ) -> dict[str, Kernel]:
     """Kernels by name, `_theta` variants included where wanted, in the order of psdmc.functions.
 
-    functions  names; None takes the default ones; without theta_b only those variants that need none are made
+    functions  names, or NAME_theta_rows; None takes the default ones; without theta_b only those variants that need none are
+               made
     costs      of the target
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
     lowered = _Lowered(model, lowering, costs)
     kernels: dict[str, Kernel] = {}
-    recipes = [RECIPES[name] for name in wanted(functions, model.mechanism)]
-    for number, recipe in enumerate(recipes):
+    names = wanted(functions, model.mechanism)
+    for number, name in enumerate(names):
+        recipe, is_by_rows = recipe_of(name), name in BY_ROWS
         takes_theta = recipe.signature.theta
         lowered.check(recipe)
-        for theta in (False, True) if takes_theta and theta_variants else (False,):
+        variants = (False, True) if takes_theta and theta_variants else (False,)
+        for theta in (True,) if is_by_rows else variants:
             if not theta and model.theta_b is None and takes_theta:
                 continue
-            share = (number + 0.5 * theta) / len(recipes)
+            share = (number + 0.5 * theta) / len(names)
             progress(Step(f"lowering {recipe.name}{'_theta' if theta else ''}", share))
             try:
                 kernel = lowered.kernel(recipe, theta)
             except SingularMatrix as singular:
                 raise _refusal(model, recipe.signature, singular) from singular
+            kernel = kernel_by_rows(kernel) if is_by_rows else kernel
             kernels[kernel.name] = kernel
     return kernels
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
-    """The names in the order of psdmc.functions; None and the word 'default': the default ones, of this robot where one is
-    given; 'all': all of them; a text is one name. What a function calls comes along. InputError for one that is unknown."""
+    """The names in the order of psdmc.functions, with NAME_theta_rows behind them; None and the word 'default': the default
+    ones, of this robot where one is given; 'all': all but NAME_theta_rows; a text is one name. What a function calls comes
+    along. InputError for one that is unknown."""
     default = DEFAULT if robot is None else default_of(robot)
     if functions is None:
         return default
@@ -97,13 +103,14 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
         functions = (functions,)
     groups = {"default": default, "all": tuple(RECIPES)}
     names = [name for word in functions for name in groups.get(word, (word,))]
-    unknown = [name for name in names if name not in RECIPES]
+    known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
+    unknown = [name for name in names if name not in known]
     if unknown:
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
     if not names:
         raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
-    called = {RECIPES[name].signature.calls for name in names}
-    return tuple(name for name in RECIPES if name in names or name in called)
+    called = {known[name].calls for name in names}
+    return tuple(name for name in known if name in names or name in called)
 
 
 def _near(word: str, names: Sequence[str]) -> str:

@@ -303,7 +303,7 @@ class DynamicsModel(Answers):
 
             q          (..., nq) joint positions, rad or m; ... are batch axes, if any
             qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
-            theta_b    (l,) base parameters that replace the model's; optional
+            theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
             out        array into which psdmc writes the result; optional
 
         This method uses NumPy; a robot from `psdmc.compile` is hundreds of times faster. The torque of joint i is
@@ -346,7 +346,7 @@ class DynamicsModel(Answers):
         """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled. Units are kg m^2, kg m or kg.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
-        theta_b    (l,) base parameters that replace the model's; optional
+        theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
         out        array into which psdmc writes the result; optional
         """
         return self._answer("mass_matrix", q, theta_b, out=out)
@@ -358,7 +358,7 @@ class DynamicsModel(Answers):
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd         (..., nv) joint rates, rad/s or m/s
-        theta_b    (l,) base parameters that replace the model's; optional
+        theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
         out        array into which psdmc writes the result; optional
         """
         return self._answer("nonlinear_effects", q, qd, theta_b, out=out)
@@ -367,7 +367,7 @@ class DynamicsModel(Answers):
         """Compute the gravity torques g(q), (..., nv), which keep the robot at rest: N m, or N for sliding joints.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
-        theta_b    (l,) base parameters that replace the model's; optional
+        theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
         out        array into which psdmc writes the result; optional
         """
         return self._answer("gravity", q, theta_b, out=out)

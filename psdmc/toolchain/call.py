@@ -29,7 +29,8 @@ class CompiledRobot(CompiledFunctions):
 
     All methods have the argument `out`, and most have `theta_b`:
 
-    theta_b  (l,) base parameters that replace those in the code; optional
+    theta_b  base parameters that replace those in the code; optional. The shape is (l,) for all states, or (..., l) for one
+             set per state. Batch axes (...) broadcast with those of the other inputs
     out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
              the shape and dtype of the result, and may be an input array
 
@@ -43,7 +44,7 @@ class CompiledRobot(CompiledFunctions):
         """Put a direct call in the place of each method whose kernel this library has."""
         make = direct_calls().make
         for name in compiled.functions if make is not None else ():
-            if not is_direct(SIGNATURES[name], self._units):
+            if name not in SIGNATURES or not is_direct(SIGNATURES[name], self._units):
                 continue
             self.__dict__[name] = make(*self._bound(SIGNATURES[name], compiled))
 

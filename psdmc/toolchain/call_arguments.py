@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations
 from typing import Any
@@ -17,12 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.program.signature import Q, Signature, Sizes
+from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.real_arrays import AxisNames, real_array
 from psdmc.robot.unit_lengths import refuse_other_lengths
 from psdmc.toolchain.stubs import arguments
 
 Array = NDArray[Any]
+
+THETA_B = Quantity("theta_b", ("l",))
+"""Base parameters as an input like others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,8 @@ def states(
         if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
             raise InputError(*other_shape(what, array.shape, tail, quantity.axes, axes))
         arrays.append(array)
+        if quantity is THETA_B:
+            _refuse_no_numbers(what, array)
         if axes.units and quantity.axes == Q.axes and not function.normalizes:
             refuse_other_lengths(what, array, axes.units)
     return arrays
@@ -94,6 +99,8 @@ def other_shape(
     expected = ", ".join(("...", *map(str, tail)))
     frames, joints = axes.names["frames"], axes.names["n"]
     hint = f"the robot has {len(joints)} joints: {', '.join(joints)}"
+    if "l" in words:
+        hint = "give one value per base parameter"
     if "frames" in words:
         hint = f"the frames are {', '.join(frames)}"
     return f"{what} has shape {shape}, expected ({expected})", hint
@@ -113,6 +120,27 @@ def common_lead(function: Signature, arrays: Sequence[Array]) -> tuple[int, ...]
             f"{function.name}: shapes do not broadcast: {shapes}",
             "give arrays of one shape, or shapes that NumPy broadcasts",
         ) from None
+
+
+def has_rows(function: Signature, theta_b: ArrayLike | None) -> bool:
+    """Check if theta_b has axes of states."""
+    if theta_b is None or hasattr(theta_b, "ndim"):
+        return theta_b is not None and theta_b.ndim > 1
+    return real_array(f"{function.name}: theta_b", theta_b).ndim > 1
+
+
+@cache
+def with_rows(function: Signature) -> Signature:
+    """The function with theta_b among its inputs: one per state."""
+    return replace(function, inputs=(*function.inputs, THETA_B))
+
+
+def _refuse_no_numbers(what: str, array: Array) -> None:
+    """InputError that names the first entry that is infinite or NaN."""
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        place = ", ".join(map(str, wrong[0].tolist()))
+        raise InputError(f"{what}[{place}] is {array[tuple(wrong[0])]}", "give finite base parameters")
 
 
 def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.package_files import library_files
 from psdmc.errors import InternalError, ToolchainError
-from psdmc.functions import SIGNATURES
+from psdmc.functions import BY_ROWS, SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
 from psdmc.target.native import NATIVE
@@ -142,7 +142,7 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
     key = cache_key({}, ("kernels", *sources_digests(), *parts))
     try:
         kept = cached(key, build, [KERNELS]) / KERNELS
-        return made or kernels_from_json(kept.read_text(encoding="utf-8"), SIGNATURES)
+        return made or kernels_from_json(kept.read_text(encoding="utf-8"), SIGNATURES | BY_ROWS)
     except (ToolchainError, InternalError, OSError):
         return made or lower()
 

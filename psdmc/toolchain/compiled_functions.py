@@ -17,16 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Signature
+from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.toolchain.call_arguments import (
     RobotAxes,
     checked_outputs,
     common_lead,
     finite_states,
+    has_rows,
     indefinite,
     parameters,
     scalar_inputs,
     states,
     takes_results,
+    with_rows,
 )
 from psdmc.toolchain.interface import Interface, Origin, batch_symbol, single_symbol
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
@@ -244,15 +247,18 @@ class CompiledFunctions(RobotFacts):
 
         function  an entry of `psdmc.functions.SIGNATURES`
         inputs    the inputs of the function, as a list of arrays
-        theta_b   (l,) base parameters that replace those in the code; optional
+        theta_b   base parameters that replace those in the code, (l,), or (..., l), one set per state; optional
         out       array into which psdmc writes the result, or a tuple of arrays for several results; optional
         """
+        variant = "" if theta_b is None else "_theta"
+        if has_rows(function, theta_b):
+            variant = THETA_ROWS
+            function, inputs, theta_b = with_rows(function), (*inputs, theta_b), None  # type: ignore[arg-type]
         if any(map(is_foreign, inputs)):
-            return self._foreign(function, inputs, theta_b, out)
-        name = function.name
-        kernel = self._kernel(name if theta_b is None else f"{name}_theta")
+            return self._foreign(function, self._kernel(function.name + variant), inputs, theta_b, out)
         arrays = states(function, self._axes, inputs, self._dtype)
         lead = common_lead(function, arrays)
+        kernel = self._kernel(function.name + variant)
         rows = self._rows(lead, function, arrays)
         if theta_b is not None:
             rows.append(parameters(function, self._sizes.l, theta_b, self._dtype))
@@ -310,11 +316,15 @@ class CompiledFunctions(RobotFacts):
                 raise error
 
     def _foreign(
-        self, function: Signature, inputs: Sequence[Any], theta_b: ArrayLike | None, out: Any
+        self,
+        function: Signature,
+        kernel: _Kernel,
+        inputs: Sequence[Any],
+        theta_b: ArrayLike | None,
+        out: Any,
     ) -> Any:
         """The outputs as Dask's or xarray's arrays, as the inputs are."""
         refuse_out(function, out)
-        kernel = self._kernel(function.name if theta_b is None else f"{function.name}_theta")
         call = OnArrays(self, function.name, theta_b)
         found = foreign(call, self._axes, function, inputs, kernel.tails, self._dtype)
         return found[0] if len(found) == 1 else results(function)(*found)

@@ -59,7 +59,10 @@ def documentation(function: Signature) -> str:
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
-    theta = "(l,) base parameters to use instead of the model's, SI units; optional if the model's are known"
+    theta = (
+        "(l,) base parameters to use instead of the model's, or (..., l), one set per state. SI units; optional if the "
+        "model's are known"
+    )
     given += [("theta_b", theta)] if function.theta else []
     written = (
         "tuple of arrays into which psdmc writes the results"

@@ -123,7 +123,7 @@ def test_parameters_that_c_cannot_read_take_the_other_way(robot: CompiledRobot) 
     with pytest.raises(InputError, match=r"theta_b has shape \(2,\)"):
         robot.inverse_dynamics(*states, theta[:2])
     with pytest.raises(InputError, match="theta_b"):
-        robot.inverse_dynamics(*states, theta[None])
+        robot.inverse_dynamics(*states, theta[None, :2])
     with pytest.raises(TypeError, match=r"inverse_dynamics\(\)"):
         robot.inverse_dynamics(*states, theta, theta_b=theta)
     with pytest.raises(TypeError, match=r"jacobian\(\)"):

@@ -9,6 +9,7 @@ from psdmc.backends.describe import facts, frame_lines
 from psdmc.backends.info import PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import Signature
+from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Target
 
 
@@ -17,6 +18,10 @@ def description(
 ) -> tuple[str, ...]:
     """The robot's facts, then what arrays and the forms of functions are; untrusted names still unescaped."""
     lines = [*facts(info, options), *_arrays(info), *_forms(options.target)]
+    if any(function.name.endswith(THETA_ROWS) for function in functions):
+        lines += [
+            f"  _theta_rows with one theta_b per state: thetas is an input like q, a state has l = {info.l} reals of it"
+        ]
     if any(len(function.signature.outputs) > 1 for function in functions):
         lines += ["Several outputs of one call must not overlap each other."]
     lines += [line for function in functions for line in _failure(function.signature, options.target)]

@@ -11,6 +11,7 @@ from psdmc.backends.c.prototypes import Prototype
 from psdmc.backends.c.regions import RegionsView
 from psdmc.program.products import LARGE
 from psdmc.program.signature import Signature
+from psdmc.program.theta_rows import THETA_ROWS
 
 LOOPED = 10
 """Pivots from which on one state's are looked at in a loop: each one alone costs 85 bytes of code."""
@@ -66,6 +67,13 @@ class KernelView:
     limbs: LimbsView | None = None
     places: tuple[tuple[int, int], ...] = ()
     regions: RegionsView | None = None
+
+    @property
+    def variant(self) -> str:
+        """Ending of its name that says where its parameters come from: '' if they are compiled in."""
+        if self.name.endswith(THETA_ROWS):
+            return THETA_ROWS
+        return "_theta" if self.theta else ""
 
     @property
     def pivots_in_loop(self) -> bool:

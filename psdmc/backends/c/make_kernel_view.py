@@ -44,7 +44,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
     regions = None
     if kernel.regions is not None:
         single_body = lanes_body = Body((), ())
-        regions = regions_view(kernel.regions, kernel.inputs, robot, kernel.theta, suffix)
+        regions = regions_view(kernel.regions, kernel.inputs, robot, suffix)
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body

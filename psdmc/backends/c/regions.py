@@ -10,6 +10,7 @@ from psdmc.backends.c.c_expr import literal
 from psdmc.backends.c.lines import Body
 from psdmc.program.operations import Op
 from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight
+from psdmc.program.theta_rows import THETAS
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +35,10 @@ class RegionsView:
         return frozenset(op for piece in self.pieces if piece.body for op in piece.body.calls)
 
 
-def regions_view(body: Regions, inputs: Sequence[str], robot: str, theta: bool, suffix: str) -> RegionsView:
+def regions_view(body: Regions, inputs: Sequence[str], robot: str, suffix: str) -> RegionsView:
     """The view of regions that read these inputs.
 
     robot   what the called functions' names start with
-    theta   whether they take theta_b
     suffix  of constants
     """
     constants = tuple(
@@ -46,16 +46,18 @@ def regions_view(body: Regions, inputs: Sequence[str], robot: str, theta: bool, 
         for name, values in body.constants.items()
     )
     arrays = tuple(f"real {name}[{size}]" for name, size in body.arrays.items())
-    writer = _Writer(robot, "_theta" if theta else "", suffix, {*inputs, *body.constants})
+    theta = next((name for name in inputs if name in ("theta_b", THETAS.name)), "")
+    writer = _Writer(robot, theta, suffix, {*inputs, *body.constants})
     return RegionsView((*constants, *arrays), tuple(writer.pieces(body.regions, 1)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Writer:
-    """`fixed`: arrays, and slices of them, that nothing may be stored into."""
+    """`theta`: the parameters that go to the called functions, '' where theirs are compiled in; `fixed`: arrays, and slices
+    of them, that nothing may be stored into."""
 
     robot: str
-    variant: str
+    theta: str
     suffix: str
     fixed: set[str]
 
@@ -90,8 +92,8 @@ class _Writer:
 
     def _call(self, call: Call) -> Iterator[str]:
         given, found = ([_at(*place) for place in places] for places in (call.given, call.found))
-        arguments = ", ".join([*given, *(["theta_b"] if self.variant else []), *found])
-        called = f"{self.robot}_{call.function}{self.variant}({arguments})"
+        arguments = ", ".join([*given, *([self.theta] if self.theta else []), *found])
+        called = f"{self.robot}_{call.function}{'_theta' if self.theta else ''}({arguments})"
         if not call.pivots:
             yield f"{called};"
             return

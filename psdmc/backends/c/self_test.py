@@ -73,7 +73,7 @@ def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, .
     """Inputs of all these kernels, by the reference states' names, each once."""
     return tuple(
         dict.fromkeys(
-            GivenVector(given_name(v.name, kernel.theta), v.size, v.size == n)
+            GivenVector(given_name(v.name, kernel.variant), v.size, v.size == n)
             for kernel in kernels
             for v in kernel.inputs
         )
@@ -95,7 +95,7 @@ def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Coll
     rows = output.shape[0] if compared_by_row(quantity) else 1
     prototypes = kernel.prototypes
     theta = ["theta_b_given"] if kernel.theta else []
-    names = [given_name(vector.name, kernel.theta) for vector in kernel.inputs]
+    names = [given_name(vector.name, kernel.variant) for vector in kernel.inputs]
     each = [f"{given.name}_rows + row * {given.length}" for given in given_vectors([kernel], n)]
     batch, lanes = (
         ["count", *(f"{name}_rows" for name in names)],

@@ -141,7 +141,7 @@ def _inputs(given: Emission) -> Iterator[Constant]:
         return
     kernels = [kernel for function in given.functions for kernel in function.kernels]
     read = {
-        given_name(q.name, kernel.theta): _sizes(kernel, given.info).shape(q.axes)
+        given_name(q.name, "_theta" * kernel.theta): _sizes(kernel, given.info).shape(q.axes)
         for kernel in kernels
         for q in kernel.function.inputs
     }
@@ -155,7 +155,7 @@ def _checks(given: Emission, robot: str) -> Iterator[Check]:
     known = {} if given.references is None else given.references.expected
     for kernel in (kernel for function in given.functions for kernel in function.kernels):
         signature, sizes = kernel.function, _sizes(kernel, given.info)
-        names = [(given_name(q.name, kernel.theta).upper(), q.axes) for q in signature.inputs]
+        names = [(given_name(q.name, "_theta" * kernel.theta).upper(), q.axes) for q in signature.inputs]
         words = [f"{'&' if axes else ''}{name}[k]" for name, axes in names]
         words += ["&THETA_B"] if kernel.theta else []
         call = f"{robot}::{kernel.name}({', '.join(words)}){'.unwrap()' if signature.factorises else ''}"

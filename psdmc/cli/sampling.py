@@ -1,0 +1,98 @@
+"""The command sample: states within a robot's limits, and its functions' values there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psdmc.cli.lists import names
+from psdmc.cli.pipeline import ModelFile
+from psdmc.cli.progress import steps
+from psdmc.errors import InputError
+
+
+def sample(
+    model: ModelFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the parts")],
+    states: Annotated[str, typer.Option(metavar="NUMBER", help="number of states, such as 100000 or 1e8")],
+    functions: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME,...", help="functions to compute", show_default="inverse_dynamics"),
+    ] = None,
+    draw: Annotated[
+        str,
+        typer.Option(
+            help="how states are drawn: uniform, or sobol (more even)",
+            autocompletion=lambda: ["uniform", "sobol"],
+        ),
+    ] = "uniform",
+    seed: Annotated[int, typer.Option(help="number that the states depend on")] = 0,
+    real: Annotated[
+        str,
+        typer.Option(help="precision: float64 or float32", autocompletion=lambda: ["float64", "float32"]),
+    ] = "float64",
+    position: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RAD", help="positions are within plus or minus this, rad or m, if the file has no limit"
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(metavar="RAD/S", help="likewise for rates, rad/s or m/s")
+    ] = None,
+    acceleration: Annotated[
+        float | None, typer.Option(metavar="RAD/S2", help="likewise for accelerations, rad/s^2 or m/s^2")
+    ] = None,
+    effort: Annotated[float | None, typer.Option(metavar="NM", help="likewise for torques, N m or N")] = None,
+    theta_spread: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE", help="vary the mass and inertia of each link by up to this share, per state"
+        ),
+    ] = 0.0,
+    part_states: Annotated[
+        int | None,
+        typer.Option(metavar="NUMBER", help="states of a file", show_default="a file has up to 64 MiB"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="let the workers of this Dask scheduler compute, such as tcp://host:8786"
+        ),
+    ] = None,
+) -> None:
+    """Compute functions at random states within the robot's limits, and write Parquet files. An interrupted run goes on."""
+    from psdmc.model.load import load
+    from psdmc.sampling import Sampling
+    from psdmc.sampling import sample as write
+
+    limits = {"position": position, "speed": speed, "acceleration": acceleration, "effort": effort}
+    what = Sampling(
+        _count(states),
+        names(functions) or ("inverse_dynamics",),
+        draw,  # type: ignore[arg-type]
+        seed,
+        real,  # type: ignore[arg-type]
+        theta_spread,
+        {word: value for word, value in limits.items() if value is not None},
+        part_states,
+    )
+    with steps() as progress:
+        found = write(load(model), output, what, progress, scheduler)
+    before = f"; {found.before} of them were there" if found.before else ""
+    files = "1 part" if found.parts == 1 else f"{found.parts} parts"
+    print(f"{output}: {found.states} states in {files}, {found.bytes / 1e6:.1f} MB{before}")
+    print(f"columns: {', '.join(f'{name} ({size})' for name, size in found.columns.items())}")
+
+
+def _count(text: str) -> int:
+    """A number of states, also as 1e8."""
+    try:
+        value = float(text)
+        if value.is_integer():
+            return int(value)
+    except (ValueError, OverflowError):
+        pass
+    raise InputError(f"--states is {text!r}", "give a whole number, such as 100000 or 1e8")

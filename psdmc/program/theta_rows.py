@@ -1,0 +1,62 @@
+"""Functions of as many robots as states: a variant of each function with theta_b that reads one theta_b per state.
+
+Its arithmetic is that of the variant with one theta_b for all states. As `thetas` is an input like q, it lies in rows and
+lanes as q does, and nothing that is computed from it is shared between states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+from psdmc.program.kernel import Kernel
+from psdmc.program.program import Program, Slot
+from psdmc.program.signature import Quantity, Signature
+
+THETA_ROWS = "_theta_rows"
+"""Ending of the variants' names."""
+
+THETAS = Quantity("thetas", ("l",), means="base parameters of each state, SI units")
+
+LAST = 1000
+"""Added to a function's order: the variants follow all functions."""
+
+
+@cache
+def by_rows(function: Signature) -> Signature:
+    """The variant of a function with theta_b."""
+    return replace(
+        function,
+        name=function.name + THETA_ROWS,
+        order=function.order + LAST,
+        meaning=f"{function.meaning}; one theta_b per state",
+        inputs=(*function.inputs, THETAS),
+        theta=False,
+    )
+
+
+def kernel_by_rows(kernel: Kernel) -> Kernel:
+    """The variant of a kernel with theta_b.
+
+    Keeps: output values, bit for bit; the PROGRAMs' order.
+    """
+    single = _renamed(kernel.single)
+    return replace(
+        kernel,
+        function=by_rows(kernel.function),
+        theta=False,
+        single=single,
+        batch=single if kernel.batch is kernel.single else _renamed(kernel.batch),
+        before=None if kernel.before is None else _renamed(kernel.before),
+    )
+
+
+def _renamed(program: Program) -> Program:
+    """The PROGRAM with theta_b under the name of its rows."""
+    body = tuple(
+        each._replace(slot=Slot(THETAS.name, each.slot.index))
+        if each.slot is not None and each.slot.vector == "theta_b"
+        else each
+        for each in program.body
+    )
+    return Program(body, program.outputs)

@@ -1,0 +1,402 @@
+"""psdmc sample: states and values against Pinocchio, SciPy and the limits; interruptions, full disks and refusals."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from command_line import typed
+from full_disk import files_of_at_most
+from random_trees import RandomTree
+from robots_at_hand import subject
+from scipy.stats import qmc
+from unoptimised import without_optimisation
+
+import psdmc
+from psdmc import sampling
+from psdmc.derivation.derive import derive_model
+from psdmc.errors import InputError, ToolchainError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import file_bytes
+from psdmc.sampling import Sampled, Sampling
+
+parquet = pytest.importorskip("pyarrow.parquet")
+
+Array = np.ndarray
+
+GIVEN = {"position": 3.0, "speed": 2.0, "acceleration": 5.0, "effort": 10.0}
+WHAT = Sampling(500, ("inverse_dynamics", "mass_matrix"), given=GIVEN, rows=200)
+"""Two whole parts and a half."""
+
+
+def sample(model: DynamicsModel, folder: Path, what: Sampling = WHAT) -> Sampled:
+    with without_optimisation():
+        return sampling.sample(model, folder, what)
+
+
+def columns(folder: Path) -> dict[str, Array]:
+    """All parts, one after the other."""
+    tables = [parquet.read_table(path) for path in sorted(folder.glob("part-*.parquet"))]
+    rows = {name: [] for name in tables[0].column_names}
+    for table in tables:
+        for name in table.column_names:
+            column = table[name].combine_chunks()
+            flat = column.flatten() if hasattr(column, "flatten") else column
+            rows[name].append(flat.to_numpy().reshape(table.num_rows, -1))
+    return {name: np.concatenate(parts) for name, parts in rows.items()}
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.iterdir())}
+
+
+def near(found: Array, expected: Array, limit: float = 1e-12) -> None:
+    assert np.abs(found - expected.reshape(found.shape)).max() < limit * np.abs(expected).max()
+
+
+@pytest.fixture(scope="module")
+def arm() -> DynamicsModel:
+    return subject("two_link").model
+
+
+@pytest.fixture(scope="module")
+def whole(arm: DynamicsModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sample") / "whole"
+    found = sample(arm, folder)
+    assert (found.states, found.parts, found.before) == (500, 3, 0)
+    assert found.columns == {"q": 2, "qd": 2, "qdd": 2, "inverse_dynamics": 2, "mass_matrix": 4}
+    return folder
+
+
+def test_values_are_pinocchios_at_states_within_the_limits(arm: DynamicsModel, whole: Path) -> None:
+    own, pinocchio = columns(whole), subject("two_link").pinocchio
+    assert len(own["q"]) == 500
+    near(own["inverse_dynamics"], pinocchio.inverse_dynamics(own["q"], own["qd"], own["qdd"]))
+    near(own["mass_matrix"], pinocchio.mass_matrix(own["q"]))
+    for name, word in (("q", "position"), ("qd", "speed"), ("qdd", "acceleration")):
+        limits = [joint.limits for joint in arm.mechanism.joints]
+        upper = [{"q": each.upper, "qd": each.speed, "qdd": each.acceleration}[name] for each in limits]
+        upper = np.where(np.isfinite(upper), upper, GIVEN[word])
+        assert (own[name] < upper).all()
+        assert (own[name].max(axis=0) > 0.95 * upper).all()
+        assert (np.abs(own[name].mean(axis=0)) < 0.1 * upper).all() or name == "q"
+
+
+def test_each_part_says_what_it_is(arm: DynamicsModel, whole: Path) -> None:
+    for number, path in enumerate(sorted(whole.glob("part-*.parquet"))):
+        said = json.loads(parquet.read_metadata(path).metadata[b"psdmc"])
+        assert said["model"] == arm.content_hash
+        assert (said["part"], said["first_state"], said["seed"]) == (number, 200 * number, 0)
+        assert (said["psdmc"], said["numpy"]) == (psdmc.__version__, np.__version__)
+
+
+def test_parts_that_are_missing_or_damaged_are_made_again(
+    arm: DynamicsModel, whole: Path, tmp_path: Path
+) -> None:
+    sample(arm, tmp_path / "again")
+    before = hashes(tmp_path / "again")
+    assert before == hashes(whole)
+    (tmp_path / "again" / "part-000000.parquet").unlink()
+    (tmp_path / "again" / "part-000002.parquet").write_bytes(b"PAR1 and no more")
+    assert sample(arm, tmp_path / "again").before == 1
+    assert hashes(tmp_path / "again") == before
+    assert sample(arm, tmp_path / "again").before == 3
+
+
+def test_sobols_points_are_scipys_also_after_an_interruption(arm: DynamicsModel, tmp_path: Path) -> None:
+    what = replace(WHAT, draw="sobol", states=512, rows=128, seed=3)
+    sample(arm, tmp_path / "one", what)
+    before = hashes(tmp_path / "one")
+    for number in (1, 3):
+        (tmp_path / "one" / f"part-00000{number}.parquet").unlink()
+    sample(arm, tmp_path / "one", what)
+    assert hashes(tmp_path / "one") == before
+    shares = qmc.Sobol(6, bits=32, rng=np.random.default_rng(3)).random(512)
+    own, low_high = (
+        columns(tmp_path / "one"),
+        json.loads((tmp_path / "one" / "sample.json").read_text())["ranges"],
+    )
+    for k, name in enumerate(("q", "qd", "qdd")):
+        low, high = map(np.array, low_high[name])
+        np.testing.assert_allclose(own[name], low + (high - low) * shares[:, 2 * k : 2 * k + 2], atol=1e-14)
+
+
+def test_single_precision_gives_the_values_of_the_states_that_it_writes(
+    arm: DynamicsModel, tmp_path: Path
+) -> None:
+    sample(arm, tmp_path / "single", replace(WHAT, real="float32"))
+    own = columns(tmp_path / "single")
+    assert own["q"].dtype == own["inverse_dynamics"].dtype == np.float32
+    q, qd, qdd = (own[name].astype(float) for name in ("q", "qd", "qdd"))
+    near(own["inverse_dynamics"], subject("two_link").pinocchio.inverse_dynamics(q, qd, qdd), 2e-5)
+
+
+def test_other_seeds_give_other_states(arm: DynamicsModel, whole: Path, tmp_path: Path) -> None:
+    sample(arm, tmp_path / "other", replace(WHAT, seed=1))
+    assert not np.isin(columns(tmp_path / "other")["q"], columns(whole)["q"]).any()
+    part = columns(whole)["q"]
+    assert len(np.unique(part, axis=0)) == len(part)
+
+
+def test_quaternions_have_length_one_and_turn_to_every_side(tmp_path: Path) -> None:
+    model = derive_model(RandomTree(4, (-1, 0), "FR").mechanism(), expand=False)
+    sample(model, tmp_path / "free", replace(WHAT, states=4000, rows=4000, functions=("kinetic_energy",)))
+    own = columns(tmp_path / "free")
+    assert own["kinetic_energy"].shape == (4000, 1)
+    quaternions = own["q"][:, 3:7]
+    np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-15)
+    assert np.abs(quaternions.T @ quaternions / 4000 - np.eye(4) / 4).max() < 0.02
+    assert np.abs(own["q"][:, :3]).max(axis=0) == pytest.approx(3.0, rel=0.01)
+
+
+def test_bodies_that_vary_are_pinocchios_with_scaled_inertias(tmp_path: Path) -> None:
+    tree = RandomTree(4, (-1, 0, 1), "RPR")
+    model = derive_model(tree.mechanism(), expand=False)
+    what = replace(WHAT, states=20, functions=("inverse_dynamics", "forward_kinematics"), spread=0.3)
+    sample(model, tmp_path / "varied", what)
+    own, robot = columns(tmp_path / "varied"), model.mechanism
+    effects = np.stack([model.B[:, 11 * i : 11 * i + 11] @ robot.parameters[i] for i in range(3)], axis=1)
+    factors = np.linalg.lstsq(effects, own["theta_b"].T, rcond=None)[0].T
+    near(factors @ effects.T, own["theta_b"])
+    assert (np.abs(factors - 1.0) < 0.3).all()
+    assert (np.ptp(factors, axis=0) > 0.3).all()
+    bodies, drives = tree.parameters, np.array(tree.drives)
+    for row, scale in enumerate(factors):
+        tree.parameters, tree.drives = bodies * scale[:, None], (drives * scale).tolist()
+        other, _ = tree._pinocchio()
+        near(
+            own["inverse_dynamics"][row],
+            pin.rnea(other, other.createData(), *(own[k][row] for k in ("q", "qd", "qdd"))),
+        )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": 1}, "holds another sampling, whose seed is 0, not 1"),
+        ({"states": 501}, "holds another sampling, whose states is 500, not 501"),
+        ({"real": "float32"}, "holds another sampling, whose real is 'float64', not 'float32'"),
+    ],
+)
+def test_the_folder_of_another_sampling_is_refused(
+    arm: DynamicsModel, whole: Path, change: dict[str, object], message: str
+) -> None:
+    before = hashes(whole)
+    with pytest.raises(InputError, match=message):
+        sample(arm, whole, replace(WHAT, **change))
+    assert hashes(whole) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "message", "hint"),
+    [
+        (
+            {"functions": ("integrate",)},
+            "integrate reads v, which has no limits",
+            "sample functions of q, qd, qdd, tau",
+        ),
+        ({"functions": ("inverse",)}, "function 'inverse' is not known", ""),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(
+    arm: DynamicsModel, tmp_path: Path, change: dict[str, object], message: str, hint: str
+) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        sample(arm, tmp_path / "new", replace(WHAT, **change))
+    assert hint in str(caught.value.hint)
+    assert not (tmp_path / "new").exists()
+
+
+def test_joints_without_limits_are_named_with_the_options_that_give_them(tmp_path: Path) -> None:
+    model = derive_model(RandomTree(4, (-1, 0), "FR").mechanism(), expand=False)
+    with pytest.raises(InputError) as caught:
+        sample(model, tmp_path / "new", replace(WHAT, given={"speed": 1.0}))
+    assert caught.value.message == (
+        "tree: joints without limits of position: 'joint0', 'joint1'; acceleration: 'joint0', 'joint1'"
+    )
+    assert (
+        caught.value.hint == "add --position NUMBER (rad or m) and --acceleration NUMBER (rad/s^2 or m/s^2)"
+    )
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"states": 0},
+        {"seed": -1},
+        {"spread": 1.5},
+        {"rows": 0},
+        {"draw": "grid"},
+        {"draw": "sobol", "states": 2**32},
+        {"real": "half"},
+    ]
+    + [{"given": {"speed": value}} for value in (-1.0, float("nan"), float("inf"))],
+    ids=str,
+)
+def test_options_without_a_meaning_are_refused(change: dict[str, object]) -> None:
+    with pytest.raises(InputError, match=r"^--"):
+        replace(WHAT, **change)
+
+
+def test_a_sampling_that_wrote_no_part_gives_way_to_another(arm: DynamicsModel, tmp_path: Path) -> None:
+    with pytest.raises(ToolchainError), files_of_at_most(10_000):
+        sample(arm, tmp_path / "new")
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["sample.json"]
+    assert sample(arm, tmp_path / "new", replace(WHAT, seed=1, states=10)).states == 10
+    assert json.loads((tmp_path / "new" / "sample.json").read_text())["seed"] == 1
+
+
+def test_a_folder_with_other_files_is_refused(arm: DynamicsModel, tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(InputError, match=r"psdmc did not write the files in this folder: thesis\.tex"):
+        sample(arm, tmp_path)
+    (tmp_path / "sample.json").write_text('{"results": 1}')
+    with pytest.raises(
+        InputError, match="holds another sampling, whose generator is None, not 'psdmc sample'"
+    ):
+        sample(arm, tmp_path)
+    (tmp_path / "sample.json").write_text("{")
+    with pytest.raises(InputError, match=r"sample\.json: no manifest of psdmc sample"):
+        sample(arm, tmp_path)
+
+
+def test_a_full_disk_leaves_whole_parts_alone(arm: DynamicsModel, whole: Path, tmp_path: Path) -> None:
+    sample(arm, tmp_path / "disk", replace(WHAT, states=200))
+    manifest = json.loads((whole / "sample.json").read_text())
+    (tmp_path / "disk" / "sample.json").write_text(json.dumps(manifest))
+    (tmp_path / "disk" / "part-000000.parquet").write_bytes((whole / "part-000000.parquet").read_bytes())
+    with (
+        pytest.raises(ToolchainError, match=r"part-000001\.parquet: cannot be written"),
+        files_of_at_most(10_000),
+    ):
+        sample(arm, tmp_path / "disk")
+    assert sorted(path.name for path in (tmp_path / "disk").iterdir()) == [
+        "part-000000.parquet",
+        "sample.json",
+    ]
+    assert sample(arm, tmp_path / "disk").before == 1
+    assert (
+        hashes(tmp_path / "disk").items()
+        >= {k: v for k, v in hashes(whole).items() if k != "sample.json"}.items()
+    )
+
+
+def test_a_disk_that_is_too_small_is_refused_before_the_work(arm: DynamicsModel, tmp_path: Path) -> None:
+    with pytest.raises(ToolchainError, match=r"the missing parts take 96000\.0 GB, and the disk has"):
+        sample(arm, tmp_path / "large", replace(WHAT, states=10**12, rows=10**9))
+
+
+def test_without_pyarrow_it_says_what_to_install(
+    arm: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sampling, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match="psdmc sample needs pyarrow") as caught:
+        sample(arm, tmp_path / "new")
+    assert caught.value.hint == "pip install 'psdmc[sample]'"
+
+
+def test_the_command_says_what_it_wrote(arm: DynamicsModel, tmp_path: Path) -> None:
+    psdmc.save(arm, tmp_path / "arm.npz")
+    words = [
+        "sample",
+        "arm.npz",
+        "-o",
+        "states",
+        "--states",
+        "1e3",
+        "--position",
+        3,
+        "--speed",
+        2,
+        "--acceleration",
+        5,
+    ]
+    done = typed(*words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [
+        "states: 1000 states in 1 part, 0.1 MB",
+        "columns: q (2), qd (2), qdd (2), inverse_dynamics (2)",
+    ]
+    assert "; 1 of them were there" in typed(*words, cwd=tmp_path).stdout
+    refused = typed(*words[:4], "--states", "1e3.5", cwd=tmp_path)
+    assert (refused.returncode, refused.stderr.splitlines()[0]) == (2, "error: --states is '1e3.5'")
+
+
+@pytest.mark.slow
+def test_a_process_that_is_killed_leaves_the_parts_of_one_that_is_not(
+    arm: DynamicsModel, tmp_path: Path
+) -> None:
+    """A million states in 32 parts, killed some ten times."""
+    psdmc.save(arm, tmp_path / "arm.npz")
+    words = [sys.executable, "-m", "psdmc", "sample", "arm.npz", "--states", "1e6", "--part-states", "32768"]
+    words += ["--position", "3", "--speed", "2", "--acceleration", "5", "--draw", "sobol", "-o"]
+    subprocess.run([*words, "whole"], cwd=tmp_path, check=True, capture_output=True)
+    killed = 0
+    for attempt in range(100):
+        process = subprocess.Popen(
+            [*words, "killed"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        parts = len(list((tmp_path / "killed").glob("part-*")))
+        while process.poll() is None and len(list((tmp_path / "killed").glob("part-*"))) < parts + 3:
+            time.sleep(0.001)
+        if process.poll() is not None:
+            assert process.returncode == 0
+            break
+        time.sleep(0.002 * (attempt % 7))
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        killed += 1
+    assert killed > 3
+    assert hashes(tmp_path / "killed") == hashes(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_is_replaced_and_the_parts_are_the_same(
+    arm: DynamicsModel, tmp_path: Path
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    what = Sampling(40_000, draw="sobol", rows=1000)
+    sampling.sample(arm, tmp_path / "whole", what)
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    told: list[str] = []
+    with distributed.LocalCluster(**options, local_directory=tmp_path / "dask") as cluster:
+        with distributed.Client(cluster.scheduler_address) as client:
+            process = next(iter(client.run(os.getpid).values()))
+
+        def kill(step: str) -> None:
+            told.append(step)
+            if len(told) == 5:
+                os.kill(process, signal.SIGKILL)
+
+        found = sampling.sample(arm, tmp_path / "cluster", what, kill, cluster.scheduler_address)
+    assert (found.parts, found.before) == (40, 0)
+    assert sorted(told) == sorted(f"{k} of 40 parts" for k in range(1, 41))
+    assert hashes(tmp_path / "cluster") == hashes(tmp_path / "whole")
+
+
+def test_workers_with_other_versions_are_refused(arm: DynamicsModel) -> None:
+    plan = sampling._Plan(arm, WHAT)
+    other = json.dumps({**plan.manifest, "numpy": "1.0"})
+    with pytest.raises(InputError, match=r"a worker's numpy is '.*', not '1\.0'"):
+        sampling._of_worker(zlib.compress(file_bytes(arm)), WHAT, other, 0)
+
+
+def test_a_scheduler_that_does_not_answer_is_named(
+    arm: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(sampling, "CONNECT", "0.1s")
+    with pytest.raises(ToolchainError, match=r"--scheduler tcp://127\.0\.0\.1:9: does not answer: "):
+        sampling.sample(arm, tmp_path / "new", WHAT, scheduler="tcp://127.0.0.1:9")
