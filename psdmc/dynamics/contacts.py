@@ -27,7 +27,7 @@ Rows = Sequence[Sequence[Scalar]]
 def contact_jacobian(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[Scalar]]:
-    """The rows of all contacts, nv each, along the base's axes: velocity of the origin, of a surface then angular velocity."""
+    """The rows of all contacts, nv each, along the base's axes: velocity of its origin, of a surface then angular."""
     found = zip(named, frame_jacobians(frames, named, q, root), strict=True)
     return [row for each, rows in found for row in rows[: each.rows]]
 

@@ -149,6 +149,17 @@ def inverse(factors: Factors) -> list[list[Scalar]]:
     return rows
 
 
+def inverse_diagonal(factors: Factors) -> list[Scalar]:
+    """The diagonal of M^-1."""
+    found = []
+    for row in _inverse_of_lower(factors.lower):
+        total: Scalar = 0.0
+        for entry, inverse in zip(row, factors.inverses, strict=False):
+            total = total + entry * entry * inverse
+        found.append(total)
+    return found
+
+
 def _inverse_of_lower(lower: Rows) -> list[list[Scalar]]:
     """Row i: the first i + 1 entries of the inverse's row i; ones on the diagonal."""
     found: list[list[Scalar]] = []

@@ -9,12 +9,12 @@ import numpy as np
 
 from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import Factors, factorize
+from psdmc.dynamics.solve import Factors, factorize, inverse_diagonal
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import RobotOnArrays, columns, matrix
-from psdmc.recipes.pivots import LOST
+from psdmc.recipes.pivots import regular
 from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
@@ -77,11 +77,7 @@ class Held(NamedTuple):
     def solved(
         self, factors: Factors, jacobian: Rows, load: Sequence[Scalar], wanted: Sequence[Scalar]
     ) -> tuple[Constrained, list[Scalar]]:
-        """The solution of `constrained`, and a sign for each contact: -1 where there is none.
-
-        A pivot is the share of its diagonal entry that the rows eliminated before do not explain. If that share is below
-        LOST roundings, the matrix is singular within rounding.
-        """
+        """The solution of `constrained`, and a sign for each contact: -1 where there is none."""
         si, rows = self.si, [each.rows for each in self.named if each.rows]
         shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
         unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
@@ -94,13 +90,11 @@ class Held(NamedTuple):
             [each for count in rows for each in shift[:count]],
             [each for count in rows for each in unit[:count]],
         )
-        signs, first = [], 0
+        signs, first, inverse = [], 0, inverse_diagonal(found.factors)
         for on, count in zip(self.active, rows, strict=True):
             sign = Op.SELECT(Op.ABS(on - on * on), NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
             for k in range(first, first + count):
-                x = LOST * (found.matrix[k][k] * found.factors.inverses[k])
-                regular = Op.SELECT(x, x + 1.0, sign, -1.0)
-                sign = Op.SELECT(0.0, found.factors.pivots[k], regular, -1.0)
+                sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
             signs.append(sign)
             first += count
         return found, signs
