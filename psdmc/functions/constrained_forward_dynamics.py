@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.contacts import contact_drift, contact_jacobian
 from psdmc.dynamics.solve import factorize, inner_product
-from psdmc.functions import contact_drift as drift
+from psdmc.functions import contact_drift, contact_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import (
@@ -19,9 +19,7 @@ from psdmc.recipes.contacts import (
     MU,
     Held,
     dense_solution,
-    drift_by_pinocchio,
     held_on_arrays,
-    jacobian_by_pinocchio,
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.on_arrays import RobotOnArrays
@@ -72,8 +70,8 @@ def trace(g: Ingredients) -> Outputs:
     (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     bias = torques(g, qd, g.still, g.base_acceleration)
-    rows = contact_jacobian(g.frames, g.named, q, g.root)
-    drifts = contact_drift(g.frames, g.named, q, qd, g.root)
+    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    drifts = contacts.contact_drift(g.frames, g.named, q, qd, g.root)
     wanted = [
         -(own + kd * inner_product(row, qd) + kp * error)
         for own, row, error in zip(drifts, rows, g.inputs[ERROR.name], strict=True)
@@ -89,7 +87,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     free = given["qdd"]
 
     def wanted(jacobian: Array) -> Array:
-        own = drift.reference(robot, given)["drift"]
+        own = contact_drift.RECIPE.reference(robot, given)["drift"]
         return -_stabilised(given, own, along(jacobian, given["qd"])) - along(jacobian, free)
 
     change, forces, pivots = held_on_arrays(robot, given, wanted)
@@ -102,23 +100,13 @@ def _stabilised(given: Mapping[str, Array], own: Array, velocity: Array) -> Arra
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    def solution(
-        model: Any, data: Any, q: Array, qd: Array, tau: Array, active: Array, gains: Array, error: Array
-    ) -> Array:
-        mu, kp, kd = gains
-        mass = np.triu(pin.crba(model, data, q))
-        mass += np.triu(mass, 1).T
-        rows = jacobian_by_pinocchio(robot, model, data, q)
-        load = tau - pin.nonLinearEffects(model, data, q, qd)
-        own = drift_by_pinocchio(robot, model, data, q, qd)
-        return dense_solution(robot, mass, rows, load, -(own + kd * (rows @ qd) + kp * error), active, mu)
-
-    gains = np.stack([np.reshape(given[each.name], -1) for each in (MU, KP, KD)], axis=1)
-    read = [given[name] for name in ("q", "qd", "tau", ACTIVE.name)]
-    found = robot.each(solution, *read, gains, given[ERROR.name])
-    return {"qdd": found[:, : robot.model.nv], "forces": found[:, robot.model.nv :]}
+    q, qd = given["q"], given["qd"]
+    jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]
+    wanted = -_stabilised(given, own, np.einsum("kij,kj->ki", jacobian, qd))
+    load = given["tau"] - robot.nonlinear_effects(q, qd)
+    qdd, forces = dense_solution(robot, given, jacobian, load, wanted)
+    return {"qdd": qdd, "forces": forces}
 
 
 RECIPE = Recipe(

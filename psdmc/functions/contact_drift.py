@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from psdmc.dynamics.contacts import contact_drift
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.contacts import ROW_WORDS, drift_by_pinocchio
+from psdmc.recipes.contacts import ROW_WORDS
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -27,7 +28,17 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return {"drift": robot.each(partial(drift_by_pinocchio, robot), given["q"], given["qd"])}
+    import pinocchio as pin
+
+    def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
+        found = [
+            pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector[:rows]
+            for frame, rows in robot.contacts
+        ]
+        return np.concatenate(found)
+
+    return {"drift": robot.each(accelerations, given["q"], given["qd"])}
 
 
 RECIPE = Recipe(

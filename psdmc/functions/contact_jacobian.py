@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from psdmc.dynamics.contacts import contact_jacobian
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.contacts import ROW_WORDS, jacobian_by_pinocchio
+from psdmc.recipes.contacts import ROW_WORDS
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -27,7 +28,14 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return {"J": robot.each(partial(jacobian_by_pinocchio, robot), given["q"])}
+    import pinocchio as pin
+
+    def jacobian(model: Any, data: Any, q: Array) -> Array:
+        aligned = pin.LOCAL_WORLD_ALIGNED
+        found = [pin.computeFrameJacobian(model, data, q, frame, aligned) for frame, _ in robot.contacts]
+        return np.concatenate([own[:rows] for own, (_, rows) in zip(found, robot.contacts, strict=True)])
+
+    return {"J": robot.each(jacobian, given["q"])}
 
 
 RECIPE = Recipe(

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.contacts import contact_jacobian
 from psdmc.dynamics.solve import factorize, projected
+from psdmc.functions import contact_jacobian
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
-from psdmc.recipes.contacts import ROW_WORDS, jacobian_by_pinocchio
-from psdmc.recipes.on_arrays import RobotOnArrays, matrix
+from psdmc.recipes.contacts import ROW_WORDS
+from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.reproducible import solved, times
 from psdmc.robot.mechanism import Array
@@ -25,27 +26,20 @@ if TYPE_CHECKING:
 def trace(g: Ingredients) -> Outputs:
     q = g.inputs["q"]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
-    rows = contact_jacobian(g.frames, g.named, q, g.root)
+    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
     return {"D": projected(factors, rows), "pivot": list(factors.pivots)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q = given["q"]
-    rows = matrix(contact_jacobian(robot.frames, robot.chain.frames, list(q.T)), len(q))
+    rows = contact_jacobian.RECIPE.reference(robot, given)["J"]
     found = times(rows, solved(robot.mass_matrix(q), np.swapaxes(rows, -1, -2)))
     return {"D": (found + np.swapaxes(found, -1, -2)) / 2}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    def seen(model: Any, data: Any, q: Array) -> Array:
-        mass = np.triu(pin.crba(model, data, q))
-        mass += np.triu(mass, 1).T
-        rows = jacobian_by_pinocchio(robot, model, data, q)
-        return np.asarray(rows @ np.linalg.solve(mass, rows.T))
-
-    return {"D": robot.each(seen, given["q"])}
+    rows = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    return {"D": rows @ np.linalg.solve(robot.mass_matrix(given["q"]), np.swapaxes(rows, -1, -2))}
 
 
 RECIPE = Recipe(

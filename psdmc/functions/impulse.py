@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.contacts import contact_jacobian
 from psdmc.dynamics.solve import factorize, inner_product
+from psdmc.functions import contact_jacobian
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
@@ -21,7 +22,6 @@ from psdmc.recipes.contacts import (
     Held,
     dense_solution,
     held_on_arrays,
-    jacobian_by_pinocchio,
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.on_arrays import RobotOnArrays
@@ -61,7 +61,7 @@ def trace(g: Ingredients) -> Outputs:
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
     (mu,), (restitution,) = g.inputs[MU.name], g.inputs[RESTITUTION.name]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
-    rows = contact_jacobian(g.frames, g.named, q, g.root)
+    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
     wanted = [-(1.0 + restitution) * inner_product(row, before) for row in rows]
     mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
     found, signs = mask.solved(factors, rows, g.still, wanted)
@@ -85,20 +85,11 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    def solution(model: Any, data: Any, q: Array, before: Array, active: Array, numbers: Array) -> Array:
-        mu, restitution = numbers
-        mass = np.triu(pin.crba(model, data, q))
-        mass += np.triu(mass, 1).T
-        rows = jacobian_by_pinocchio(robot, model, data, q)
-        wanted = -(1.0 + restitution) * (rows @ before)
-        return dense_solution(robot, mass, rows, 0.0 * before, wanted, active, mu)
-
-    numbers = np.stack([np.reshape(given[each.name], -1) for each in (MU, RESTITUTION)], axis=1)
-    found = robot.each(solution, given["q"], given[BEFORE.name], given[ACTIVE.name], numbers)
-    nv = robot.model.nv
-    return {"qd_after": given[BEFORE.name] + found[:, :nv], "impulses": found[:, nv:]}
+    before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
+    jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    wanted = -(1.0 + restitution) * np.einsum("kij,kj->ki", jacobian, before)
+    change, impulses = dense_solution(robot, given, jacobian, np.zeros_like(before), wanted)
+    return {"qd_after": before + change, "impulses": impulses}
 
 
 RECIPE = Recipe(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -119,36 +119,20 @@ def held_on_arrays(
     )
 
 
-def contact_rows(robot: Reference, motions: Callable[[int], Array]) -> Array:
-    """The rows of all contacts, from the six rows of a frame by Pinocchio's number."""
-    return np.concatenate([motions(frame)[:rows] for frame, rows in robot.contacts])
-
-
-def jacobian_by_pinocchio(robot: Reference, model: Any, data: Any, q: Array) -> Array:
-    import pinocchio as pin
-
-    aligned = pin.LOCAL_WORLD_ALIGNED
-    return contact_rows(robot, lambda frame: pin.computeFrameJacobian(model, data, q, frame, aligned))
-
-
-def drift_by_pinocchio(robot: Reference, model: Any, data: Any, q: Array, qd: Array) -> Array:
-    import pinocchio as pin
-
-    pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
-    aligned = pin.LOCAL_WORLD_ALIGNED
-    return contact_rows(
-        robot, lambda frame: pin.getFrameClassicalAcceleration(model, data, frame, aligned).vector
-    )
-
-
 def dense_solution(
-    robot: Reference, mass: Array, jacobian: Array, load: Array, wanted: Array, active: Array, mu: Array
-) -> Array:
-    """x, then f, of the dense system [[M, -J^T], [J, mu]] of the active rows (Karush, Kuhn, Tucker)."""
-    on = np.repeat(active, [rows for _, rows in robot.contacts]) > 0.5
-    own, count = jacobian[on], int(on.sum())
-    whole = np.block([[mass, -own.T], [own, mu * np.eye(count)]])
-    found = np.linalg.solve(whole, np.concatenate([load, wanted[on]]))
-    forces = np.zeros(len(on))
-    forces[on] = found[len(load) :]
-    return np.concatenate([found[: len(load)], forces])
+    robot: Reference, given: Mapping[str, Array], jacobian: Array, load: Array, wanted: Array
+) -> tuple[Array, Array]:
+    """(k, nv) x and (k, rows) f of the dense systems [[M, -J^T], [J, mu]] of the active rows, by Pinocchio's M."""
+    counts = [rows for _, rows in robot.contacts]
+    masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
+    found = np.concatenate([load, np.zeros_like(wanted)], axis=1)
+    nv = load.shape[1]
+    for k, (mass, on, mu) in enumerate(
+        zip(robot.mass_matrix(given["q"]), masks, np.reshape(given[MU.name], -1), strict=True)
+    ):
+        own = jacobian[k, on]
+        whole = np.block([[mass, -own.T], [own, mu * np.eye(len(own))]])
+        found[k, np.append(np.full(nv, True), on)] = np.linalg.solve(
+            whole, np.concatenate([load[k], wanted[k, on]])
+        )
+    return found[:, :nv], found[:, nv:]
