@@ -103,7 +103,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     q, qd = given["q"], given["qd"]
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]
-    wanted = -_stabilised(given, own, np.einsum("kij,kj->ki", jacobian, qd))
+    wanted = -_stabilised(given, own, along(jacobian, qd))
     load = given["tau"] - robot.nonlinear_effects(q, qd)
     qdd, forces = dense_solution(robot, given, jacobian, load, wanted)
     return {"qdd": qdd, "forces": forces}

@@ -87,7 +87,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
-    wanted = -(1.0 + restitution) * np.einsum("kij,kj->ki", jacobian, before)
+    wanted = -(1.0 + restitution) * along(jacobian, before)
     change, impulses = dense_solution(robot, given, jacobian, np.zeros_like(before), wanted)
     return {"qd_after": before + change, "impulses": impulses}
 

@@ -92,7 +92,9 @@ class Held(NamedTuple):
         )
         signs, first, inverse = [], 0, inverse_diagonal(found.factors)
         for on, count in zip(self.active, rows, strict=True):
-            sign = Op.SELECT(Op.ABS(on - on * on), NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+            off = on - on * on
+            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+            sign = Op.SELECT(-NOTHING, off, sign, -1.0)
             for k in range(first, first + count):
                 sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
             signs.append(sign)

@@ -10,7 +10,6 @@ from typing import Any
 from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import POINT, SURFACE
 
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
@@ -20,6 +19,9 @@ LATER = ("contacts", "frames", "tool", "lock", "floating", "root", "xacro_args",
 
 TOOL = "tool"
 """Name of the frame that the option `tool` places."""
+
+POINT, SURFACE = 3, 6
+"""Rows of a contact: its point is held, or its orientation too."""
 
 MAX_SNAP = 0.1
 """rad: a robot whose axes may move by more is another robot."""

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from psdmc.robot.coordinates import Coordinate, checked_coordinates, leaders
 from psdmc.robot.joints import JointType
+from psdmc.robot.load_options import POINT as POINT
+from psdmc.robot.load_options import SURFACE as SURFACE
 from psdmc.robot.placement import Array as Array
 from psdmc.robot.placement import Placement as Placement
 from psdmc.robot.placement import frozen_array as frozen_array
@@ -32,9 +34,6 @@ BASE = -1
 
 BASE_FRAME = "base frame"
 """The frame of gravity and placements, in words: of a robot whose base does not move."""
-
-POINT, SURFACE = 3, 6
-"""Rows of a contact: its point is held, or its orientation too."""
 
 WARNING = "warning: "
 """How a note of a mechanism begins that is a warning."""

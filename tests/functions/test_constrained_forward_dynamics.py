@@ -187,7 +187,7 @@ def test_c_returns_a_status_and_nan_in_every_layout(real: str) -> None:
 
 @pytest.mark.slow
 def test_a_quadruped_has_the_accelerations_of_pinocchios_contact_dynamics() -> None:
-    """HyQ, every mask, some states with a straight knee: constraintDynamics and impulseDynamics."""
+    """HyQ, every mask, some states with a straight knee: constraintDynamics, and the equations of an impact."""
     feet = ["lf_foot", "lh_foot", "rf_foot", "rh_foot"]
     path = in_wheel("hyq_no_sensors.urdf")
     model = derive_model(load_robot(path, floating=True, contacts=feet).mechanism, expand=False)
@@ -202,11 +202,11 @@ def test_a_quadruped_has_the_accelerations_of_pinocchios_contact_dynamics() -> N
         for row, state in enumerate(zip(q, qd, tau, strict=True)):
             data, datas = theirs.createData(), pin.StdVec_RigidConstraintData()
             datas.extend([each.createData() for each in contacts])
-            pin.initConstraintDynamics(theirs, data, contacts)
+            pin.initConstraintDynamics(theirs, data, contacts, datas)
             settings = pin.ProximalSettings(1e-13, 1e-14, 50)
             qdd = pin.constraintDynamics(theirs, data, *state, contacts, datas, settings)
             assert np.abs(found.qdd[row] - qdd).max() < 1e-9 * np.abs(qdd).max()
-            rows = robot.contact_jacobian(q[row])[on]
+            rows = model.contact_jacobian(q[row])[on]
             left = rows @ impact.qd_after[row] + 0.3 * (rows @ qd[row])
             assert np.abs(left).max(initial=0.0) < 1e-9
             kicked = model.mass_matrix(q[row]) @ (impact.qd_after[row] - qd[row])
