@@ -52,6 +52,7 @@ MENU = {
         "how-to/derivatives",
         "how-to/casadi",
         "how-to/floating-base",
+        "how-to/contacts",
         "how-to/whole-body",
         "how-to/many-robots",
         "how-to/plan-campaign",

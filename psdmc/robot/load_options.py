@@ -148,14 +148,14 @@ def _contacts(contacts: Sequence[str]) -> tuple[str, ...]:
 def _with_contacts(options: LoadOptions) -> LoadOptions:
     """The options whose frames have those of the contacts behind them; `tool` places a frame of its own."""
     names = [parsed_contact(text)[0] for text in options.contacts]
-    own = [name for name in names if options.tool is None or name != TOOL]
-    frames = (*options.frames, *(name for name in own if name not in options.frames))
-    placed = [name for name in (*frames, TOOL) if name in names]
+    tool = () if options.tool is None else (TOOL,)
+    frames = (*options.frames, *(name for name in names if name not in (*options.frames, *tool)))
+    placed = [name for name in (*frames, *tool) if name in names]
     if placed != names:
         raise InputError(
             f"contacts are in the order {', '.join(map(shown, names))}, the same frames in the order "
             f"{', '.join(map(shown, placed))}",
-            f"name frames and contacts in one order, '{TOOL}' last",
+            f"name frames and contacts in one order{f', {shown(TOOL)} last' if tool else ''}",
         )
     return replace(options, frames=frames)
 
