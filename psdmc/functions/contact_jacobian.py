@@ -33,7 +33,8 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     def jacobian(model: Any, data: Any, q: Array) -> Array:
         aligned = pin.LOCAL_WORLD_ALIGNED
         found = [pin.computeFrameJacobian(model, data, q, frame, aligned) for frame, _ in robot.contacts]
-        return np.concatenate([own[:rows] for own, (_, rows) in zip(found, robot.contacts, strict=True)])
+        parts = zip(np.reshape(found, (-1, 6, model.nv)), robot.contacts, strict=True)
+        return np.concatenate([own[:rows] for own, (_, rows) in parts])
 
     return {"J": robot.each(jacobian, given["q"])}
 
