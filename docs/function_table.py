@@ -32,6 +32,7 @@ UNRELEASED = frozenset(
         "delassus",
         "impulse",
         "operational_space_inertia",
+        "tangent_map",
     ]
 )
 """Functions that the next release brings."""

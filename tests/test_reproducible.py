@@ -46,6 +46,7 @@ DECISIONS = {
     "recipes/contacts.py": "Pinocchio's side of a comparison",
     "functions/delassus.py": "Pinocchio's side of a comparison",
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",
+    "functions/tangent_map.py": "Pinocchio's side of a comparison",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",
     "functions/frame_velocity_derivatives.py": "Pinocchio's side of a comparison",
     "lower/carriers.py": "thresholds with margins of decades",
