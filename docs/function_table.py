@@ -24,7 +24,17 @@ IN_0_1 = frozenset(
     ]
 )
 
-UNRELEASED = frozenset(["operational_space_inertia", "tangent_map"])
+UNRELEASED = frozenset(
+    [
+        "constrained_forward_dynamics",
+        "contact_drift",
+        "contact_jacobian",
+        "delassus",
+        "impulse",
+        "operational_space_inertia",
+        "tangent_map",
+    ]
+)
 """Functions that the next release brings."""
 
 HEAD = "| function | what it does | inputs | outputs | `_theta` | default | since | Pinocchio's function |"

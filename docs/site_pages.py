@@ -54,6 +54,7 @@ MENU = {
         "how-to/casadi",
         "how-to/adapters",
         "how-to/floating-base",
+        "how-to/contacts",
         "how-to/whole-body",
         "how-to/many-robots",
         "how-to/sample",

@@ -66,6 +66,7 @@ def derive(
     xacro_args: Mapping[str, object] | None = None,
     packages: Mapping[str, str | Path] | None = None,
     unknown: Sequence[str] | str = (),
+    contacts: Sequence[str] | str = (),
 ) -> DynamicsModel:
     """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
@@ -97,6 +98,8 @@ def derive(
                    ROS_PACKAGE_PATH and AMENT_PREFIX_PATH
     unknown        links whose masses and inertias are unknown: a list, one name, "all", or "missing", which means all links
                    without an inertia in the file. Without this option, links without an inertia are massless
+    contacts       names of links that can touch the world, for functions such as constrained_forward_dynamics. "foot" is a
+                   point, "foot:6" a surface. These links become named frames, too; if empty: each named frame is a point
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
     needs other options, for example `expand=False` because E and P need too much memory.
@@ -133,6 +136,7 @@ def derive(
         xacro_args=xacro_args,
         packages=packages,
         unknown=_names(unknown),
+        contacts=_names(contacts),
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

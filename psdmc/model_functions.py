@@ -23,7 +23,7 @@ from psdmc.model.expansion import Expansion
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Recipe
-from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism
+from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism, contact_names
 from psdmc.robot.unit_lengths import units_of
 from psdmc.toolchain.call_arguments import (
     THETA_B,
@@ -152,12 +152,13 @@ def _axes(model: DynamicsModel, recipe: Recipe) -> RobotAxes:
     kept = len(recipe.packs.places(robot, model.representative)) if recipe.packs else 0
     frames = tuple(frame.name for frame in robot.frames)
     return RobotAxes(
-        Sizes(len(own), robot.nq, robot.nv, model.l, len(frames), kept),
+        Sizes(len(own), robot.nq, robot.nv, model.l, len(frames), kept, robot.rows_of_contacts),
         {
             "n": tuple(robot.joints[i].name for i in own),
             "nq": robot.q_names,
             "nv": robot.v_names,
             "frames": frames,
+            **contact_names((frame.name, frame.rows) for frame in robot.contacts),
         },
         units_of(robot.joints[i].type for i in own),
     )

@@ -43,6 +43,8 @@ DECISIONS = {
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
+    "recipes/contacts.py": "Pinocchio's side of a comparison",
+    "functions/delassus.py": "Pinocchio's side of a comparison",
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",
     "functions/tangent_map.py": "Pinocchio's side of a comparison",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",

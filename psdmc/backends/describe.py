@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from itertools import accumulate
 
 from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import Signature
-from psdmc.robot.mechanism import BASE_FRAME
+from psdmc.robot.mechanism import BASE_FRAME, POINT
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 
@@ -40,6 +41,16 @@ def frame_lines(info: PackageInfo) -> tuple[str, ...]:
     return ("", "Frames, in the order of every array over them:", *numbered)
 
 
+def contact_lines(info: PackageInfo) -> tuple[str, ...]:
+    """The contacts by number, with their rows."""
+    ends = accumulate(rows for _, rows in info.contacts)
+    numbered = (
+        f"  {i}  {name}, {'a point' if rows == POINT else 'a surface'}: rows {end - rows} to {end - 1}"
+        for i, ((name, rows), end) in enumerate(zip(info.contacts, ends, strict=True))
+    )
+    return ("", "Contacts, in the order of every array over them:", *numbered)
+
+
 def _extent(info: PackageInfo) -> str:
     if info.base_frame != BASE_FRAME:
         return f"a floating base in the world ({info.base})"
@@ -57,6 +68,11 @@ def _target(target: Target) -> tuple[str, ...]:
 def uses_frames(signatures: Iterable[Signature]) -> bool:
     """Whether some of these functions is about the named frames."""
     return any("frames" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
+
+
+def uses_contacts(signatures: Iterable[Signature]) -> bool:
+    """Whether some of these functions is about the contacts."""
+    return any("contact_rows" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:

@@ -16,7 +16,7 @@ from psdmc.model.equations import BaseParameter
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
-from psdmc.robot.mechanism import BASE_FRAME, Mechanism
+from psdmc.robot.mechanism import BASE_FRAME, POINT, Mechanism
 from psdmc.robot.unit_lengths import units_of
 from psdmc.version import psdmc_version
 
@@ -57,6 +57,7 @@ class PackageInfo:
     model_hash  content hash of the MODEL
     options     what the user chose, as printed in header and manifest
     frames      names of the named frames, untrusted text; empty: the tip alone
+    contacts    those at which there can be contacts, with their rows; empty: all, as points
     payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
                 frame; empty where the package has no function for loads
     units       parts of q, from an entry to before another, whose length must be one
@@ -78,6 +79,7 @@ class PackageInfo:
     psdmc_version: str
     options: Mapping[str, str] = field(default_factory=dict)
     frames: tuple[str, ...] = ()
+    contacts: tuple[tuple[str, int], ...] = ()
     payload: tuple[NDArray[np.float64], ...] = ()
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
@@ -91,6 +93,7 @@ class PackageInfo:
         if not self.joints:
             raise ValueError("a package needs at least one joint")
         object.__setattr__(self, "frames", self.frames or (self.tip,))
+        object.__setattr__(self, "contacts", self.contacts or tuple((name, POINT) for name in self.frames))
 
     @property
     def n(self) -> int:
@@ -120,7 +123,8 @@ class PackageInfo:
     @property
     def sizes(self) -> Sizes:
         """What the words of signatures mean for this robot."""
-        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames))
+        rows = tuple(rows for _, rows in self.contacts)
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames), rows_of_contacts=rows)
 
     @property
     def l(self) -> int:  # noqa: E743
@@ -171,6 +175,7 @@ def package_info(
         psdmc_version=psdmc_version(),
         options=dict(options or {}),
         frames=tuple(frame.name for frame in chain.frames),
+        contacts=tuple((frame.name, frame.rows) for frame in chain.contacts),
         payload=_load_maps(model) if payload else (),
         followers=tuple(_followers(chain)),
         units=units_of(chain.joints[i].type for i in chain.own_joints),

@@ -126,7 +126,9 @@ def _by_rows(
 def _drawn(model: DynamicsModel) -> dict[str, Array]:
     """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
     robot, rng = model.mechanism, np.random.default_rng(SEED)
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(robot.frames))
+    sizes = Sizes(
+        model.n, model.nq, model.nv, model.l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
+    )
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
     drawn = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q)))) for q in read.values()}
     return drawn | {q.name: on_joints(robot, drawn[q.name]) for q in read.values() if q.axes == Q.axes}

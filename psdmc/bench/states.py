@@ -41,7 +41,9 @@ def _further(function: str) -> tuple[Quantity, ...]:
 
 def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
     """What a signature's words mean for a robot with l base parameters."""
-    return Sizes(len(robot), robot.nq, robot.nv, l, len(robot.frames))
+    return Sizes(
+        len(robot), robot.nq, robot.nv, l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
+    )
 
 
 def output_sizes(function: str, sizes: Sizes) -> tuple[int, ...]:

@@ -122,6 +122,13 @@ def derive(
             help="links whose inertia is unknown; all: every link; missing: links without <inertial>",
         ),
     ] = None,
+    contacts: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK[:6],...",
+            help="links that can touch the world, as a point or (:6) a surface; default: each frame, a point",
+        ),
+    ] = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
@@ -151,6 +158,7 @@ def derive(
             xacro_arguments(arguments, xacro_arg),
             package_folders(package),
             names(unknown),
+            names(contacts),
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"

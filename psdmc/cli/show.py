@@ -16,7 +16,7 @@ from psdmc.model.joined_units import joined_units
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.limits import listed
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import POINT, Mechanism
 
 
 def print_model(model: DynamicsModel) -> None:
@@ -27,6 +27,11 @@ def print_model(model: DynamicsModel) -> None:
         print_calibration(calibrated)
     print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
     print_line(f"gravity {_numbers(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
+    if model.contacts != dict.fromkeys(model.frame_names, POINT):
+        kinds = (
+            f"{name} ({'point' if rows == POINT else 'surface'})" for name, rows in model.contacts.items()
+        )
+        print_line(f"contacts: {', '.join(kinds)}")
     print("\n".join(_sizes(found)))
     print()
     print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))

@@ -43,6 +43,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
         "gravity_m_s2": list(found.gravity),
         "joints": joints,
         "frames": [frame.name for frame in robot.frames],
+        "contacts": model.contacts,
         "p": found.p,
         "l": found.l,
         "monomials": None if found.sizes is None else found.sizes._asdict(),

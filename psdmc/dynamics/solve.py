@@ -93,8 +93,12 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 def projected(factors: Factors, rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
     """J M^-1 J^T, both triangles, from the rows of J: with Y = J L^-1, it is Y D^-1 Y^T."""
-    halves = [_half_solved(factors, row) for row in rows]
-    found: list[list[Scalar]] = [[0.0] * len(rows) for _ in rows]
+    return half_products(factors, [half_solved(factors, row) for row in rows])
+
+
+def half_products(factors: Factors, halves: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
+    """Y D^-1 Y^T, both triangles, from the rows of Y."""
+    found: list[list[Scalar]] = [[0.0] * len(halves) for _ in halves]
     for i, half in enumerate(halves):
         own = _nonzero(half)
         scaled = [half[k] * factors.inverses[k] for k in own]
@@ -103,7 +107,7 @@ def projected(factors: Factors, rows: Sequence[Sequence[Scalar]]) -> list[list[S
     return found
 
 
-def _half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
+def half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
     """y of L^T y = right; zero where no joint beyond is in `right`."""
     found = list(right)
     for k in reversed(range(len(found))):
@@ -111,6 +115,15 @@ def _half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
             for i in _nonzero(factors.lower[k]):
                 found[i] = found[i] - factors.lower[k][i] * found[k]
     return found
+
+
+def rest_solved(factors: Factors, half: Sequence[Scalar]) -> list[Scalar]:
+    """x of D L x = half, which solves M x = right if L^T half = right."""
+    solution = [value * inverse for value, inverse in zip(half, factors.inverses, strict=True)]
+    for k, row in enumerate(factors.lower):
+        for i in _nonzero(row):
+            solution[k] = solution[k] - row[i] * solution[i]
+    return solution
 
 
 def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
@@ -134,6 +147,17 @@ def inverse(factors: Factors) -> list[list[Scalar]]:
                 total = total + scaled[j][k] * columns[i][k]
             rows[i][j] = rows[j][i] = total
     return rows
+
+
+def inverse_diagonal(factors: Factors) -> list[Scalar]:
+    """The diagonal of M^-1."""
+    found = []
+    for row in _inverse_of_lower(factors.lower):
+        total: Scalar = 0.0
+        for entry, inverse in zip(row, factors.inverses, strict=False):
+            total = total + entry * entry * inverse
+        found.append(total)
+    return found
 
 
 def _inverse_of_lower(lower: Rows) -> list[list[Scalar]]:

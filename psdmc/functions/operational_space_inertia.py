@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
+from psdmc.recipes import contacts
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.pivots import inverse_and_sign
@@ -24,13 +26,7 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-MU = Quantity(
-    "mu",
-    largest=1.0,
-    least=0.1,
-    means="regularisation, 0 or more: 1/kg on the three linear axes, 1/(kg m^2) on the three angular axes",
-    unit="1/kg",
-)
+MU = replace(contacts.MU, default=None)
 
 SEEN_BY_FRAMES = SymmetricMatrix(
     "J M^-1 J^T + mu I",

@@ -15,7 +15,6 @@ from psdmc.dynamics.frames import BASE, Frame, part_of, with_carriers
 from psdmc.lower.factored import Arrangement, RobotConstants
 from psdmc.lower.geometry import LARGE
 from psdmc.lower.reframe import Reframed
-from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.limbs import Limbs
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
@@ -63,7 +62,7 @@ class Branches:
         reframed = _part_of(whole.reframed, kept)
         joints = [frame.joint for frame in reframed.frames if frame.follows is None]
         old = self.robot.sizes
-        sizes = Sizes(len(kept), sum(j.nq for j in joints), sum(j.nv for j in joints), old.l, old.frames)
+        sizes = replace(old, n=len(kept), nq=sum(j.nq for j in joints), nv=sum(j.nv for j in joints))
         arrangement = replace(whole, reframed=reframed, carriers=carriers, transfer=whole.transfer[rows])
         return arrangement, replace(self.robot, sizes=sizes)
 

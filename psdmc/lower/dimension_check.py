@@ -92,7 +92,7 @@ class _Measured:
         self.tracer = DimensionedTracer()
         self._numbers = count()
         self.theta_b, self.standard = _theta_dimensions(robot.representative, reframed.frames)
-        self.axes = own_axes(reframed.frames, len(reframed.named), self.theta_b)
+        self.axes = own_axes(reframed.frames, reframed.named, self.theta_b)
 
     def value(self, dimension: Dimension) -> Scalar:
         return self.tracer.measured(Slot("ingredient", next(self._numbers)), dimension)

@@ -142,7 +142,7 @@ def traced(
 ) -> Recorded:
     """Record a recipe on these frames, bodies and symbols: every entry of its outputs with its slot."""
     is_scaled = unit != 1.0 and are_scaled((*recipe.signature.inputs, *recipe.signature.stored))
-    axes = own_axes(reframed.frames, len(reframed.named), [NUMBER] * robot.sizes.l) if is_scaled else {}
+    axes = own_axes(reframed.frames, reframed.named, [NUMBER] * robot.sizes.l) if is_scaled else {}
     for quantity in recipe.signature.inputs if is_scaled else ():
         own = zip(inputs[quantity.name], quantity.dimensions(axes), strict=True)
         inputs = {**inputs, quantity.name: [symbol * multiple(unit, each) for symbol, each in own]}

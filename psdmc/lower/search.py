@@ -81,7 +81,8 @@ class Search:
         known: Array | None = None,
     ) -> None:
         l, frames = representative.shape[1], len(chain.frames)
-        sizes = Sizes(len(chain), chain.nq, chain.nv, l, frames)
+        contacts = chain.rows_of_contacts
+        sizes = Sizes(len(chain), chain.nq, chain.nv, l, frames, rows_of_contacts=contacts)
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.is_large = len(chain) > LARGE

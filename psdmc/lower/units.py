@@ -18,18 +18,21 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.slices import leading
 from psdmc.program.dimensions import INERTIA, LENGTH, MASS, MOMENT, NUMBER, Dimension, dimension_of, times
 from psdmc.program.signature import Quantity, Signature
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import Array, NamedFrame
 
 Axes = Mapping[str, Sequence[Dimension]]
 """The dimensions that entries have along an axis, by its word."""
 
 RATE = dimension_of("1/s")
 
+TWIST = (*[LENGTH] * 3, *[NUMBER] * 3)
+"""Of three linear axes and three angular ones."""
+
 STANDARD = (MASS, *(MOMENT,) * 3, *(INERTIA,) * 7)
 """Of a link's standard parameters; the drive inertia of a sliding joint has another."""
 
 
-def own_axes(frames: Sequence[Frame], named: int, theta_b: Sequence[Dimension]) -> Axes:
+def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequence[Dimension]) -> Axes:
     """The axes of a robot with these frames."""
     joints = [frame.joint for frame in leading(frames)]
     nq, nv = (
@@ -42,8 +45,10 @@ def own_axes(frames: Sequence[Frame], named: int, theta_b: Sequence[Dimension]) 
         "nv": nv,
         "nx": [*nv, *(times(each, RATE) for each in nv)],
         "l": theta_b,
-        "frames": [NUMBER] * named,
-        "6": [LENGTH] * 3 + [NUMBER] * 3,
+        "frames": [NUMBER] * len(named),
+        "contacts": [NUMBER] * len([each for each in named if each.rows]),
+        "contact_rows": [axis for each in named for axis in TWIST[: each.rows]],
+        "6": TWIST,
     }
 
 
@@ -66,7 +71,9 @@ def multiple(unit: float, dimension: Dimension) -> float:
 
 def are_scaled(quantities: Iterable[Quantity]) -> bool:
     """Whether values of some of these differ inside of a trace, for robots without sliding joints."""
-    return any(quantity.dimension.order or "6" in quantity.axes for quantity in quantities)
+    return any(
+        quantity.dimension.order or {"6", "contact_rows"} & {*quantity.axes} for quantity in quantities
+    )
 
 
 def scaled_parameters(x: Array, unit: float) -> Array:

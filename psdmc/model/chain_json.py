@@ -17,6 +17,8 @@ from psdmc.robot.joints import joint_type
 from psdmc.robot.mechanism import (
     BASE,
     PARAMETERS_PER_LINK,
+    POINT,
+    SURFACE,
     Array,
     Joint,
     Limits,
@@ -122,17 +124,19 @@ def _frames(data: object) -> Sequence[object]:
 
 def _is_tip_alone(chain: Mechanism) -> bool:
     """Whether the only frame is the tip, as in all model files of earlier versions."""
-    return [frame.name for frame in chain.frames] == [chain.tip_name]
+    return [(frame.name, frame.rows) for frame in chain.frames] == [(chain.tip_name, POINT)]
 
 
 def _frame_to_json(frame: NamedFrame) -> dict[str, Any]:
-    return {"name": frame.name, "joint": frame.joint, "placement": _placement_to_json(frame.placement)}
+    plain = {"name": frame.name, "joint": frame.joint, "placement": _placement_to_json(frame.placement)}
+    return plain if frame.rows == POINT else {**plain, "rows": frame.rows}
 
 
 def _frame_from_json(data: object, joints: int) -> NamedFrame:
     name = text(part(data, "name", "a frame"), "a frame's name")
     joint = whole(part(data, "joint", "a frame"), "a frame's joint", 0, joints - 1)
-    return NamedFrame(name, joint, _placement_from_json(part(data, "placement", "a frame"), "a frame"))
+    rows = whole(data.get("rows", POINT), "a contact's rows", 0, SURFACE) if isinstance(data, dict) else POINT
+    return NamedFrame(name, joint, _placement_from_json(part(data, "placement", "a frame"), "a frame"), rows)
 
 
 def chain_from_json(data: object) -> Mechanism:

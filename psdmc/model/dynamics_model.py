@@ -119,6 +119,11 @@ class DynamicsModel(Answers):
         return tuple(frame.name for frame in self.mechanism.frames)
 
     @property
+    def contacts(self) -> dict[str, int]:
+        """Return the names of the contacts with their rows, 3 for a point and 6 for a surface, in the order of forces."""
+        return {frame.name: frame.rows for frame in self.mechanism.contacts}
+
+    @property
     def n(self) -> int:
         """Return the number of joints. Mimic joints, which follow another joint, are counted, too."""
         return len(self.mechanism)

@@ -163,8 +163,9 @@ def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
     for statement in json.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
         json.text(statement, "an entry of the option assume_zero")
     json.number(options.get("snap", 0.0), "the option snap")
-    for name in json.entries(options.get("frames", []), "the option frames", MOST_ROWS):
-        json.text(name, "the option frames")
+    for option in ("frames", "contacts"):
+        for name in json.entries(options.get(option, []), f"the option {option}", MOST_ROWS):
+            json.text(name, f"the option {option}")
     for value in json.record(options.get("lock", {}), "the option lock").values():
         json.number(value, "an entry of the option lock")
     for text in json.record(options.get("xacro_args", {}), "the option xacro_args").values():

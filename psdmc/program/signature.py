@@ -15,14 +15,17 @@ from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
 from psdmc.program.thin_products import Thin
 
-WORDS = ("n", "nq", "nv", "nx", "l", "frames", "nonzeros")
-"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames; and, of
-a function that packs a matrix, entries that it puts out."""
+WORDS = ("n", "nq", "nv", "nx", "l", "frames", "contacts", "contact_rows", "nonzeros")
+"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames, contacts
+and the rows of all contacts; and, of a function that packs a matrix, entries that it puts out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """What the words of a signature mean for one robot."""
+    """What the words of a signature mean for one robot.
+
+    rows_of_contacts  3 or 6 for each contact; left out: every named frame is a point, of 3 rows
+    """
 
     n: int
     nq: int
@@ -30,6 +33,15 @@ class Sizes:
     l: int
     frames: int
     nonzeros: int = 0
+    rows_of_contacts: tuple[int, ...] = ()
+
+    @property
+    def contacts(self) -> int:
+        return len(self.rows_of_contacts) or self.frames
+
+    @property
+    def contact_rows(self) -> int:
+        return sum(self.rows_of_contacts) or 3 * self.frames
 
     @property
     def nx(self) -> int:
@@ -68,7 +80,9 @@ class Quantity:
     unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
     powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
              joint coordinates (rad or m), nx those of nv and then the same per second, l those of base parameters. The
-             first three of 6 are m, the others 1
+             first three of 6, and of each contact's rows, are m, the others 1
+    default  of an input that Python's callers may leave out: the value of all its entries
+    whole    whether tests draw whole numbers alone
     """
 
     name: str
@@ -78,6 +92,8 @@ class Quantity:
     unit: str = ""
     powers: tuple[int, ...] = ()
     least: float | None = None
+    default: float | None = None
+    whole: bool = False
 
     def __post_init__(self) -> None:
         words = [word for axis in self.axes for part in axis.split("+") for word in part.split("*")]
@@ -104,7 +120,8 @@ class Quantity:
         """Values for tests, from shares between -1 and 1."""
         if self.least is None:
             return self.largest * shares
-        return self.least + (self.largest - self.least) * (0.5 + 0.5 * shares)
+        drawn = self.least + (self.largest - self.least) * (0.5 + 0.5 * shares)
+        return (drawn + 0.5) // 1 if self.whole else drawn
 
     @property
     def is_matrix(self) -> bool:

@@ -23,6 +23,12 @@ def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar
     factors = factorize(rows)
     found, sign = inverse(factors), 1.0
     for k, pivot in enumerate(factors.pivots):
-        x = LOST * (rows[k][k] * found[k][k])
-        sign = Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)
+        sign = regular(sign, pivot, rows[k][k], found[k][k])
     return found, sign
+
+
+def regular(sign: Scalar, pivot: Scalar, entry: Scalar, inverse_entry: Scalar) -> Scalar:
+    """The sign, -1 if a pivot is not positive, or the matrix is singular but for rounding, by this entry of its diagonal and
+    that of its inverse."""
+    x = LOST * (entry * inverse_entry)
+    return Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,11 @@ from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
-from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
+from psdmc.robot.load_options import DEFAULT_SNAP, TOOL, LoadOptions, checked_options, parsed_contact
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
 from psdmc.robot.missing_inertia import with_massless_warning
 from psdmc.robot.source_words import with_source_words
-from psdmc.robot.urdf_bodies import TOOL, tool_frame
+from psdmc.robot.urdf_bodies import tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.xacro_file import checked_packages
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
@@ -163,7 +163,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         gravity=draft.gravity,
         tip=draft.tip,
         notes=(*turned, *draft.notes, *_zero_notes(draft, said, values)),
-        frames=_frames(draft, options, source),
+        frames=_with_contacts(_frames(draft, options, source), options),
         parents=draft.parents,
         tip_body=draft.tip_body,
         coordinates=draft.coordinates,
@@ -181,6 +181,14 @@ def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame
     if any(frame.name == TOOL for frame in named):
         raise InputError(f"{source}: a frame of the file is called '{TOOL}' too", "leave --tool out")
     return (*named, tool_frame(tip, options.tool))
+
+
+def _with_contacts(frames: tuple[NamedFrame, ...], options: LoadOptions) -> tuple[NamedFrame, ...]:
+    """The frames with the rows of their contacts, where some are declared."""
+    if not options.contacts:
+        return frames
+    rows = dict(map(parsed_contact, options.contacts))
+    return tuple(replace(frame, rows=rows.get(frame.name, 0)) for frame in frames)
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from psdmc.errors import InputError
@@ -14,8 +14,14 @@ from psdmc.robot.limits import shown
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
-LATER = ("frames", "tool", "lock", "floating", "root", "xacro_args", "unknown")
+LATER = ("contacts", "frames", "tool", "lock", "floating", "root", "xacro_args", "unknown")
 """Options that the first versions did not have."""
+
+TOOL = "tool"
+"""Name of the frame that the option `tool` places."""
+
+POINT, SURFACE = 3, 6
+"""Rows of a contact: its point is held, or its orientation too."""
 
 MAX_SNAP = 0.1
 """rad: a robot whose axes may move by more is another robot."""
@@ -37,6 +43,7 @@ class LoadOptions:
     root           the body under an MJCF's world that the robot begins with; None: all of them
     xacro_args     values of a xacro file's arguments
     unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": those without any
+    contacts       frames that can touch the world, which are among `frames` then: "foot" is a point, "foot:6" a surface
     """
 
     base: str | None = None
@@ -52,6 +59,7 @@ class LoadOptions:
     root: str | None = None
     xacro_args: dict[str, str] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Keyword arguments of load_robot_text as plain JSON values. Later options are included only where they are given,
@@ -65,6 +73,7 @@ def checked_options(**given: Any) -> LoadOptions:
     options = LoadOptions(
         **{name: CHECKS[name](value) if name in CHECKS else value for name, value in given.items()}
     )
+    options = _with_contacts(options)
     if options.floating and (options.base is not None or options.tip is not None):
         raise InputError(
             "--floating puts the whole robot on a free joint, --base and --tip cut a chain out of it",
@@ -103,11 +112,52 @@ def _floating(floating: object) -> bool:
 def _frames(frames: Sequence[str]) -> tuple[str, ...]:
     if not _are_texts_in_order(frames):
         raise InputError(f"frames are {shown(frames)}, expected links' names", "such as tcp,camera")
-    names = tuple(frames)
+    return _each_once("frame", frames)
+
+
+def _each_once(what: str, given: Sequence[str]) -> tuple[str, ...]:
+    names = tuple(given)
     twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
-        raise InputError(f"frame {shown(twice[0])} is named twice", "name each once")
+        raise InputError(f"{what} {shown(twice[0])} is named twice", "name each once")
     return names
+
+
+def parsed_contact(text: str) -> tuple[str, int]:
+    """Name and rows of a contact from a text such as "lf_foot" (a point) or "lf_foot:6" (a surface)."""
+    name, colon, rows = text.rpartition(":")
+    if not colon or not rows.isdecimal():
+        return text, POINT
+    if rows not in (str(POINT), str(SURFACE)):
+        raise InputError(
+            f"contact {shown(text)} has {shown(rows)} rows, expected {POINT} or {SURFACE}",
+            f"{shown(name + ':3')} is a point, {shown(name + ':6')} a surface",
+        )
+    return name, int(rows)
+
+
+def _contacts(contacts: Sequence[str]) -> tuple[str, ...]:
+    if not _are_texts_in_order(contacts):
+        raise InputError(
+            f"contacts are {shown(contacts)}, expected links' names", 'such as ["lf_foot", "rf_foot:6"]'
+        )
+    _each_once("contact", [parsed_contact(text)[0] for text in contacts])
+    return tuple(contacts)
+
+
+def _with_contacts(options: LoadOptions) -> LoadOptions:
+    """The options whose frames have those of the contacts behind them; `tool` places a frame of its own."""
+    names = [parsed_contact(text)[0] for text in options.contacts]
+    tool = () if options.tool is None else (TOOL,)
+    frames = (*options.frames, *(name for name in names if name not in (*options.frames, *tool)))
+    placed = [name for name in (*frames, *tool) if name in names]
+    if placed != names:
+        raise InputError(
+            f"contacts are in the order {', '.join(map(shown, names))}, the same frames in the order "
+            f"{', '.join(map(shown, placed))}",
+            f"name frames and contacts in one order{f', {shown(TOOL)} last' if tool else ''}",
+        )
+    return replace(options, frames=frames)
 
 
 def _tool(tool: Sequence[float] | None) -> tuple[float, ...] | None:
@@ -227,6 +277,7 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "gravity": _gravity,
     "snap": _snap,
     "frames": _frames,
+    "contacts": _contacts,
     "tool": _tool,
     "lock": _lock,
     "xacro_args": _xacro_args,

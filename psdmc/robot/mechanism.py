@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from psdmc.robot.coordinates import Coordinate, checked_coordinates, leaders
 from psdmc.robot.joints import JointType
+from psdmc.robot.load_options import POINT as POINT
+from psdmc.robot.load_options import SURFACE as SURFACE
 from psdmc.robot.placement import Array as Array
 from psdmc.robot.placement import Placement as Placement
 from psdmc.robot.placement import frozen_array as frozen_array
@@ -81,11 +83,20 @@ class NamedFrame:
     name       a link's of the file, or a user's own: untrusted text
     joint      number of the joint whose frame it moves with; 0 is the first
     placement  its place in that joint frame
+    rows       what a contact there holds: 3, its point, or 6, its orientation too; 0: there is no contact
     """
 
     name: str
     joint: int
     placement: Placement
+    rows: int = POINT
+
+
+def contact_names(contacts: Iterable[tuple[str, int]]) -> dict[str, tuple[str, ...]]:
+    """Names of contacts and of their rows, by the words of arrays' axes."""
+    own = tuple(contacts)
+    rows = (f"{name}.{axis}" for name, count in own for axis in ("x", "y", "z", "rx", "ry", "rz")[:count])
+    return {"contacts": tuple(name for name, _ in own), "contact_rows": tuple(rows)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,6 +153,8 @@ class Mechanism:
         object.__setattr__(self, "frames", tuple(self.frames) or (self.tip_frame,))
         if any(not 0 <= frame.joint < n for frame in self.frames):
             raise ValueError(f"a frame moves with none of the {n} joints")
+        if not self.contacts or {*self.rows_of_contacts} - {POINT, SURFACE}:
+            raise ValueError(f"the frames have {[frame.rows for frame in self.frames]} rows of contacts")
 
     @property
     def has_unknown_body(self) -> NDArray[np.bool_]:
@@ -174,6 +187,15 @@ class Mechanism:
     @property
     def tip_frame(self) -> NamedFrame:
         return NamedFrame(self.tip_name, self.tip_body, self.tip)
+
+    @property
+    def contacts(self) -> tuple[NamedFrame, ...]:
+        """The named frames at which there can be contacts: all, as points, where none are declared."""
+        return tuple(frame for frame in self.frames if frame.rows)
+
+    @property
+    def rows_of_contacts(self) -> tuple[int, ...]:
+        return tuple(frame.rows for frame in self.contacts)
 
     @property
     def types(self) -> tuple[JointType, ...]:

@@ -12,7 +12,7 @@ from psdmc.errors import InternalError
 from psdmc.robot.coordinates import Following
 from psdmc.robot.joints import REVOLUTE, WIDE_TYPES, JointType
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.mechanism import Array, Mechanism
+from psdmc.robot.mechanism import POINT, Array, Mechanism
 from psdmc.robot.reference_model import reference_model
 
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
@@ -28,11 +28,21 @@ class Reference:
 
     tip_name     the frame of `jacobian`
     frame_names  the named frames; empty: the tip alone
+    rows         of the contact at each of them; empty: all are points
     """
 
     model: pinocchio.Model
     tip_name: str
     frame_names: tuple[str, ...] = ()
+    rows: tuple[int, ...] = ()
+
+    @property
+    def contacts(self) -> list[tuple[int, int]]:
+        """Pinocchio's number of the frame and the rows of each contact."""
+        ids = self.frame_ids
+        return [
+            (frame, rows) for frame, rows in zip(ids, self.rows or (POINT,) * len(ids), strict=True) if rows
+        ]
 
     @property
     def frame_ids(self) -> list[int]:
@@ -195,7 +205,8 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
     """The Reference of reference_model."""
     model = reference_model(loaded, snapped=snapped, parameters=parameters)
     names = tuple(frame.name for frame in loaded.mechanism.frames)
-    return Reference(model, loaded.mechanism.tip_name, names)
+    rows = tuple(frame.rows for frame in loaded.mechanism.frames)
+    return Reference(model, loaded.mechanism.tip_name, names, rows)
 
 
 def pinocchio_version() -> str:

@@ -22,11 +22,11 @@ import pinocchio
 
 from psdmc.errors import InputError
 from psdmc.robot.load import LoadedRobot
+from psdmc.robot.load_options import TOOL
 from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
 from psdmc.robot.urdf import read_urdf
-from psdmc.robot.urdf_bodies import TOOL
 
 
 def reference_model(

@@ -10,6 +10,7 @@ from psdmc.errors import InputError
 from psdmc.reproducible import times
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import REVOLUTE
+from psdmc.robot.load_options import TOOL
 from psdmc.robot.mechanism import Array, NamedFrame, Placement
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
@@ -124,10 +125,6 @@ def _compare(own: Array, other: object, link: str, what: str, source: str) -> No
 
 def _listed(values: Array) -> str:
     return " ".join(f"{value:.9g}" for value in values)
-
-
-TOOL = "tool"
-"""Name of the frame."""
 
 
 def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:

@@ -59,12 +59,14 @@ def bound_arguments(
 @cache
 def signature_of(function: Signature) -> inspect.Signature:
     """Return the signature of a method, `self` included."""
+    defaults: dict[str, float | None] = {q.name: q.default for q in function.inputs if q.default is not None}
+    defaults["theta_b"] = None
     return inspect.Signature(
         [
             inspect.Parameter(
                 name,
                 inspect.Parameter.POSITIONAL_OR_KEYWORD,
-                default=None if name == "theta_b" else inspect.Parameter.empty,
+                default=defaults.get(name, inspect.Parameter.empty),
             )
             for name in ("self", *arguments(function))
         ]
@@ -82,6 +84,8 @@ def states(
         what = f"{function.name}: {quantity.name}"
         array = real_array(what, values, dtype, quantity.axes, axes.names)
         tail = axes.sizes.shape(quantity.axes)
+        if quantity.default is not None and array.ndim == 0:
+            array = np.full(tail, array)
         if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
             raise InputError(*other_shape(what, array.shape, tail, quantity.axes, axes))
         arrays.append(array)
@@ -103,6 +107,8 @@ def other_shape(
         hint = "give one value per base parameter"
     if "frames" in words:
         hint = f"the frames are {', '.join(frames)}"
+    if {"contacts", "contact_rows"} & {*words}:
+        hint = f"the contacts are {', '.join(axes.names['contacts'])}; a point has 3 rows, a surface 6"
     return f"{what} has shape {shape}, expected ({expected})", hint
 
 

@@ -103,6 +103,11 @@ class RobotFacts:
         return self._interface.frame_names
 
     @property
+    def contacts(self) -> dict[str, int]:
+        """Return the names of the contacts with their rows, 3 for a point and 6 for a surface, in the order of forces."""
+        return dict(self._interface.contacts)
+
+    @property
     def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:
         """Return the NumPy type of all results: float64 or float32."""
         single, double = np.dtype(np.float32), np.dtype(np.float64)

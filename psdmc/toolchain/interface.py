@@ -16,8 +16,9 @@ from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.patterns import patterns
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
+from psdmc.robot.mechanism import contact_names
 
-FORMAT = 6
+FORMAT = 7
 """Version of the text's form."""
 
 
@@ -33,6 +34,7 @@ class Interface:
     q_names      nq names of q's entries, and
     v_names      nv names of rates' and torques'
     frame_names  the named frames
+    contacts     names and rows of the contacts
     units        parts of q, from an entry to before another, whose length must be one
     limits       n rows: lower, upper, speed, acceleration, effort; infinite where unknown
     gravity      3, m/s^2 in
@@ -54,6 +56,7 @@ class Interface:
     q_names: tuple[str, ...]
     v_names: tuple[str, ...]
     frame_names: tuple[str, ...]
+    contacts: tuple[tuple[str, int], ...]
     units: tuple[tuple[int, int], ...]
     limits: tuple[tuple[float, ...], ...]
     gravity: tuple[float, ...]
@@ -66,12 +69,14 @@ class Interface:
     @property
     def sizes(self) -> Sizes:
         """Return the sizes that the words of signatures mean for this robot."""
-        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names))
+        rows = tuple(rows for _, rows in self.contacts)
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names), rows_of_contacts=rows)
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
         """Names along the axes of arrays, by the axes' words."""
-        return {"n": self.joint_names, "nq": self.q_names, "nv": self.v_names, "frames": self.frame_names}
+        own = {"n": self.joint_names, "nq": self.q_names, "nv": self.v_names, "frames": self.frame_names}
+        return own | contact_names(self.contacts)
 
 
 def interface_of(package: PackageView) -> Interface:
@@ -91,6 +96,7 @@ def interface_of(package: PackageView) -> Interface:
         q_names=package.info.q_names,
         v_names=package.info.v_names,
         frame_names=package.info.frames,
+        contacts=package.info.contacts,
         units=package.info.units,
         limits=tuple((j.lower, j.upper, j.speed, j.acceleration, j.effort) for j in package.info.joints),
         gravity=package.info.gravity,
@@ -132,6 +138,7 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
         plain = whole["interface"]
         joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
         coordinates, rates = tuple(plain.pop("q_names")), tuple(plain.pop("v_names"))
+        contacts = tuple((str(name), int(rows)) for name, rows in plain.pop("contacts"))
         units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
         kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
         places = {
@@ -144,6 +151,7 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
             q_names=coordinates,
             v_names=rates,
             frame_names=frames,
+            contacts=contacts,
             units=units,
             limits=limits,
             gravity=gravity,

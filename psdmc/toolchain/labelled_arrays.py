@@ -32,10 +32,12 @@ _DIMENSIONS = {
     "nx": "state",
     "l": "base_parameter",
     "frames": "frame",
+    "contacts": "contact",
+    "contact_rows": "contact_row",
     "3": "axis",
     "6": "twist",
 }
-_COLUMNS = {JOINT: COLUMN, "axis": "axis_column", "state": "state_column"}
+_COLUMNS = {JOINT: COLUMN, "axis": "axis_column", "state": "state_column", "contact_row": "contact_column"}
 
 
 def is_foreign(value: object) -> bool:

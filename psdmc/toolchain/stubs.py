@@ -58,7 +58,10 @@ def documentation(function: Signature) -> str:
     """A method's docstring: what it computes, its arguments and results, what NaN means, and the lengths of axes."""
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
-    given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
+    given = [
+        (q.name, f"{_shape(q)} {q.means}" + ("" if q.default is None else f"; default {q.default:g}"))
+        for q in function.inputs
+    ]
     theta = (
         "(l,) base parameters to use instead of the model's, or (..., l), one set per state. SI units; optional if the "
         "model's are known"
@@ -87,6 +90,8 @@ _SIZES = {
     "nx": "2 nv: the first nv are for q (ball joint or floating base: for small motions along qd), the last nv for qd",
     "l": "number of base parameters",
     "frames": "number of named frames",
+    "contacts": "number of contacts",
+    "contact_rows": "number of rows of all contacts: 3 for a point, 6 for a surface",
     "nonzeros": "number of matrix entries that can differ from zero",
 }
 
@@ -126,7 +131,9 @@ def _results(function: Signature) -> list[str]:
 
 
 def _method(function: Signature) -> list[str]:
-    given = [f"{quantity.name}: ArrayLike" for quantity in function.inputs]
+    given = [
+        f"{q.name}: ArrayLike" + ("" if q.default is None else f" = {q.default}") for q in function.inputs
+    ]
     given += ["theta_b: ArrayLike | None = None"] if function.theta else []
     one = "NDArray[RealT] | None" if len(function.outputs) == 1 else "tuple[NDArray[RealT], ...] | None"
     given = ["self", *given, "*", f"out: {one} = None"]

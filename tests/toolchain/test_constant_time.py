@@ -19,17 +19,24 @@ from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
 from psdmc.functions import RECIPES
+from psdmc.functions.impulse import RESTITUTION
 from psdmc.functions.operational_space_inertia import MU
 from psdmc.lower.kernels import lower
+from psdmc.recipes.contacts import ACTIVE
 from psdmc.recipes.steps import DT
 
 CALLS = 20
 SCALES = ("0", "1e-300", "1", "6", "1e5")
 """Standing still, denormal squares, ordinary motion, several turns, the sincos's whole range."""
 
-DRAWN = {DT.name: "1e-9 * rand() / RAND_MAX", MU.name: "1.0 + rand() / (double)RAND_MAX"}
+DRAWN = {
+    DT.name: "1e-9 * rand() / RAND_MAX",
+    MU.name: "1.0 + rand() / (double)RAND_MAX",
+    ACTIVE.name: "rand() % 2",
+    RESTITUTION.name: "rand() / (double)RAND_MAX",
+}
 """Inputs of another size: a long step from the largest states would leave the sincos's range, and without a mu that is
-positive there is no operational-space inertia, which takes other instructions."""
+positive there is no operational-space inertia, which takes other instructions. Contacts are active or not."""
 
 PACKAGES = {
     "two_link": tuple(RECIPES),

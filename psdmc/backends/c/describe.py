@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.describe import facts, frame_lines
+from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
 from psdmc.backends.info import PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import Signature
@@ -25,7 +25,12 @@ def description(
     if any(len(function.signature.outputs) > 1 for function in functions):
         lines += ["Several outputs of one call must not overlap each other."]
     lines += [line for function in functions for line in _failure(function.signature, options.target)]
-    return (*lines, *(frame_lines(info) if with_frames else ()))
+    touching = uses_contacts(function.signature for function in functions)
+    return (
+        *lines,
+        *(frame_lines(info) if with_frames else ()),
+        *(contact_lines(info) if touching else ()),
+    )
 
 
 def _arrays(info: PackageInfo) -> tuple[str, ...]:

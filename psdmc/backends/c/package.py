@@ -24,7 +24,7 @@ from psdmc.backends.c.self_test import given_vectors, labels
 from psdmc.backends.c.self_test_view import SelfTestView
 from psdmc.backends.c.tables import Table, tables
 from psdmc.backends.c.vectors_view import VectorsView
-from psdmc.backends.describe import uses_frames
+from psdmc.backends.describe import uses_contacts, uses_frames
 from psdmc.backends.info import PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
@@ -73,9 +73,11 @@ class PackageView:
     @property
     def size_macros(self) -> dict[str, int]:
         """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of bodies;
-        of sparse matrices' patterns."""
+        of contacts; of sparse matrices' patterns."""
         wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
         wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
+        if uses_contacts(function.signature for function in self.functions):
+            wide |= {"CONTACTS": self.info.sizes.contacts, "CONTACT_ROWS": self.info.sizes.contact_rows}
         return wide | {pattern.macro: len(pattern.places) for pattern in self.patterns}
 
     @property

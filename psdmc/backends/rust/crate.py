@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from psdmc.backends.describe import facts, frame_lines, uses_frames
+from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts, uses_frames
 from psdmc.backends.info import PackageInfo
 from psdmc.backends.protocol import Emission, Function
 from psdmc.backends.rust.body import WRITTEN, array, number, place, statements
@@ -102,7 +102,12 @@ def crate_view(given: Emission) -> CrateView:
         robot,
         info,
         version[0] if version else "0.0.0",
-        (*facts(info, given.options), ARRAYS, *(frame_lines(info) if framed else ())),
+        (
+            *facts(info, given.options),
+            ARRAYS,
+            *(frame_lines(info) if framed else ()),
+            *(contact_lines(info) if uses_contacts(f.signature for f in functions) else ()),
+        ),
         tuple(_function(function, info) for function in functions),
         tuple(_constants(info, functions, framed)),
         tuple(_inputs(given)),
@@ -125,6 +130,13 @@ def _constants(info: PackageInfo, functions: Iterable[Function], framed: bool) -
     yield Constant("THETA_B", theta, "Base parameters that are compiled in; NaN where unknown.")
     if framed:
         yield Constant("FRAME_NAMES", list(info.frames), "Named frames, in the order of arrays over them.")
+    if uses_contacts(function.signature for function in functions):
+        yield Constant(
+            "CONTACT_NAMES",
+            [name for name, _ in info.contacts],
+            "Contacts, in the order of arrays over them.",
+        )
+        yield Constant("CONTACT_ROWS", [rows for _, rows in info.contacts], "3 for a point, 6 for a surface.")
     for function in functions:
         if places := function.kernels[0].places:
             name = f"{function.signature.name.upper()}_PATTERN"

@@ -1,0 +1,132 @@
+"""Forward dynamics with contacts: accelerations and contact forces from torques, for every set of active contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics import contacts
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.solve import factorize, inner_product
+from psdmc.functions import contact_drift, contact_jacobian
+from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
+from psdmc.recipes.accelerations import MASS_MATRIX
+from psdmc.recipes.contacts import (
+    ACTIVE,
+    CONTACTS,
+    MU,
+    Held,
+    dense_solution,
+    held_on_arrays,
+)
+from psdmc.recipes.directions import along
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques import torques
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+KP = Quantity(
+    "kp",
+    largest=100.0,
+    least=0.0,
+    means="position gain of Baumgarte's stabilisation, 1/s^2",
+    unit="1/s^2",
+    default=0.0,
+)
+KD = Quantity(
+    "kd",
+    largest=20.0,
+    least=0.0,
+    means="velocity gain of Baumgarte's stabilisation, 1/s",
+    unit="1/s",
+    default=0.0,
+)
+ERROR = Quantity(
+    "error",
+    ("contact_rows",),
+    largest=0.01,
+    means="how far each contact is from where it should be, m and rad along the axes of the base frame; kp multiplies it",
+    unit="1",
+    powers=(1,),
+    default=0.0,
+)
+FORCES = Quantity(
+    "forces",
+    ("contact_rows",),
+    means="what the world exerts on the robot, zero where a contact is not active: force (N) for each contact, then moment "
+    "(N m) about the contact's origin for a surface, along the axes of the base frame",
+    unit="J",
+    powers=(-1,),
+)
+
+
+def trace(g: Ingredients) -> Outputs:
+    q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
+    (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
+    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
+    bias = torques(g, qd, g.still, g.base_acceleration)
+    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    drifts = contacts.contact_drift(g.frames, g.named, q, qd, g.root)
+    wanted = [
+        -(own + kd * inner_product(row, qd) + kp * error)
+        for own, row, error in zip(drifts, rows, g.inputs[ERROR.name], strict=True)
+    ]
+    load = [given - h for given, h in zip(tau, bias, strict=True)]
+    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    found, signs = mask.solved(factors, rows, load, wanted)
+    return {"qdd": found.motion, "forces": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    """What contacts change of the accelerations that the torques were computed from, which are exact."""
+    free = given["qdd"]
+
+    def wanted(jacobian: Array) -> Array:
+        own = contact_drift.RECIPE.reference(robot, given)["drift"]
+        return -_stabilised(given, own, along(jacobian, given["qd"])) - along(jacobian, free)
+
+    change, forces, pivots = held_on_arrays(robot, given, wanted)
+    return {"qdd": free + change, "forces": forces, PIVOTS: pivots}
+
+
+def _stabilised(given: Mapping[str, Array], own: Array, velocity: Array) -> Array:
+    kp, kd = (np.reshape(given[each.name], (-1, 1)) for each in (KP, KD))
+    return np.asarray(own + kd * velocity + kp * given[ERROR.name])
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    q, qd = given["q"], given["qd"]
+    jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]
+    wanted = -_stabilised(given, own, along(jacobian, qd))
+    load = given["tau"] - robot.nonlinear_effects(q, qd)
+    qdd, forces = dense_solution(robot, given, jacobian, load, wanted)
+    return {"qdd": qdd, "forces": forces}
+
+
+RECIPE = Recipe(
+    Signature(
+        "constrained_forward_dynamics",
+        340,
+        "joint accelerations and contact forces that torques cause: M qdd + h = tau + J^T forces, where "
+        "J qdd + dJ/dt qd + kd J qd + kp error + mu forces = 0 for each active contact, and forces = 0 for each other one; "
+        "active is 0 or 1 for each contact, mu is not negative",
+        (Q, QD, TAU, ACTIVE, MU, KP, KD, ERROR),
+        (QDD, FORCES),
+        theta=True,
+        summary="Compute the joint accelerations and the contact forces that torques cause while the active contacts do not "
+        "accelerate.",
+        factorises=(MASS_MATRIX, CONTACTS),
+    ),
+    "constrained forward dynamics",
+    trace,
+    reference,
+    "crba, nonLinearEffects, computeFrameJacobian",
+    pinocchio,
+    shares="inverse_dynamics",
+)

@@ -1,0 +1,66 @@
+"""Jacobian of the contacts in the base frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.contacts import ROW_WORDS
+from psdmc.recipes.on_arrays import RobotOnArrays, matrix
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"J": contact_jacobian(g.frames, g.named, g.inputs["q"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"J": matrix(contact_jacobian(robot.frames, robot.chain.frames, list(q.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def jacobian(model: Any, data: Any, q: Array) -> Array:
+        aligned = pin.LOCAL_WORLD_ALIGNED
+        found = [pin.computeFrameJacobian(model, data, q, frame, aligned) for frame, _ in robot.contacts]
+        parts = zip(np.reshape(found, (-1, 6, model.nv)), robot.contacts, strict=True)
+        return np.concatenate([own[:rows] for own, (_, rows) in parts])
+
+    return {"J": robot.each(jacobian, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "contact_jacobian",
+        310,
+        "velocities of all contacts per unit joint rate, base frame",
+        (Q,),
+        (
+            Quantity(
+                "J",
+                ("contact_rows", "nv"),
+                means=f"{ROW_WORDS}; column j for qd[j]",
+                unit="1",
+                powers=(1, -1),
+            ),
+        ),
+        theta=False,
+        summary="Compute the Jacobian J of all contacts: J qd are the velocities of the contacts along the axes of the base "
+        "frame.",
+    ),
+    "contact Jacobian",
+    trace,
+    reference,
+    "computeFrameJacobian",
+    pinocchio,
+)

@@ -1,0 +1,115 @@
+"""Impacts: joint rates and contact impulses after contacts touch the world (Featherstone 2008, section 11.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics import contacts
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.solve import factorize, inner_product
+from psdmc.functions import contact_jacobian
+from psdmc.program.operations import Op
+from psdmc.program.signature import PIVOTS, QD, Q, Quantity, Signature
+from psdmc.recipes.accelerations import MASS_MATRIX
+from psdmc.recipes.contacts import (
+    ACTIVE,
+    CONTACTS,
+    MU,
+    Held,
+    dense_solution,
+    held_on_arrays,
+)
+from psdmc.recipes.directions import along
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+BEFORE = replace(QD, name="qd_before", means="joint rates before the impact, rad/s or m/s")
+AFTER = replace(QD, name="qd_after", means="joint rates after the impact, rad/s or m/s")
+RESTITUTION = Quantity(
+    "restitution",
+    largest=1.0,
+    least=0.0,
+    means="share of the contacts' velocity that is reversed, 0 to 1",
+    unit="1",
+    default=0.0,
+)
+IMPULSES = Quantity(
+    "impulses",
+    ("contact_rows",),
+    means="impulse from the world on the robot, zero where a contact is not active: N s for each contact, then N m s about "
+    "the contact's origin for a surface, along the axes of the base frame",
+    unit="J s",
+    powers=(-1,),
+)
+
+TOUCHING = replace(
+    CONTACTS,
+    failure=f"{CONTACTS.failure}, or restitution is not from 0 to 1",
+    error=f"{CONTACTS.error}, or restitution = {{restitution:g}} is not from 0 to 1",
+)
+
+
+def trace(g: Ingredients) -> Outputs:
+    q, before = g.inputs["q"], g.inputs[BEFORE.name]
+    (mu,), (restitution,) = g.inputs[MU.name], g.inputs[RESTITUTION.name]
+    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
+    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    wanted = [-(1.0 + restitution) * inner_product(row, before) for row in rows]
+    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    found, signs = mask.solved(factors, rows, g.still, wanted)
+    after = [rate + change for rate, change in zip(before, found.motion, strict=True)]
+    signs = [_within(restitution, sign) for sign in signs]
+    return {"qd_after": after, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def _within(restitution: Any, sign: Any) -> Any:
+    """The sign, -1 unless restitution is from 0 to 1."""
+    return Op.SELECT(restitution, 0.0, -1.0, Op.SELECT(1.0, restitution, -1.0, sign))
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
+    change, impulses, pivots = held_on_arrays(
+        robot, given, lambda jacobian: -(1.0 + restitution) * along(jacobian, before)
+    )
+    pivots[:, robot.nv :] = _within(restitution, pivots[:, robot.nv :])
+    return {"qd_after": before + change, "impulses": impulses, PIVOTS: pivots}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
+    jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    wanted = -(1.0 + restitution) * along(jacobian, before)
+    change, impulses = dense_solution(robot, given, jacobian, np.zeros_like(before), wanted)
+    return {"qd_after": before + change, "impulses": impulses}
+
+
+RECIPE = Recipe(
+    Signature(
+        "impulse",
+        350,
+        "joint rates and contact impulses of an impact: M (qd_after - qd_before) = J^T impulses, where "
+        "J qd_after + restitution J qd_before + mu impulses = 0 for each active contact, and impulses = 0 for each other "
+        "one; active is 0 or 1 for each contact, mu is not negative",
+        (Q, BEFORE, ACTIVE, RESTITUTION, MU),
+        (AFTER, IMPULSES),
+        theta=True,
+        summary="Compute the joint rates after an impact, and the impulses that stop or reverse the active contacts.",
+        factorises=(MASS_MATRIX, TOUCHING),
+    ),
+    "impulses of an impact",
+    trace,
+    reference,
+    "crba, computeFrameJacobian",
+    pinocchio,
+    shares="inverse_dynamics",
+    matters=("fold_double_angle",),
+)

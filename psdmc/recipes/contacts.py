@@ -1,0 +1,140 @@
+"""Contacts on a trace's ingredients, on arrays and in Pinocchio, which several functions need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import Factors, factorize, inverse_diagonal
+from psdmc.program.factorisation import Structure, SymmetricMatrix
+from psdmc.program.operations import Op
+from psdmc.program.signature import Quantity
+from psdmc.recipes.on_arrays import RobotOnArrays, columns, matrix
+from psdmc.recipes.pivots import regular
+from psdmc.robot.mechanism import Array, NamedFrame
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+ROW_WORDS = "three linear rows for each contact, then three angular ones for a surface, along the axes of the base frame"
+
+ACTIVE = Quantity(
+    "active",
+    ("contacts",),
+    largest=1.0,
+    least=0.0,
+    means="1 for each contact that touches the world, 0 for each that does not",
+    unit="1",
+    whole=True,
+)
+
+MU = Quantity(
+    "mu",
+    largest=1.0,
+    least=0.1,
+    means="regularisation, 0 or more: 1/kg on the three linear axes, 1/(kg m^2) on the three angular axes",
+    unit="1/kg",
+    default=0.0,
+)
+
+CONTACTS = SymmetricMatrix(
+    "J M^-1 J^T + mu I of the active contacts",
+    Structure.DENSE,
+    ("contacts",),
+    number="the number, from 0, of the contact at which J M^-1 J^T + mu I of the active contacts is not positive definite, "
+    "or whose active is neither 0 nor 1",
+    failure="J M^-1 J^T + mu I of the active contacts is not positive definite (for example, if mu = 0 and two contacts "
+    "hold the same motion), mu is negative, or an entry of active is neither 0 nor 1",
+    error="contact {contacts!r}: J M^-1 J^T + mu I of the active contacts is not positive definite at mu = {mu:g}, or "
+    "active is not 0 or 1",
+    hint="give active 0 or 1 for each contact, and mu > 0, such as 1e-6, if contacts hold more motions than the robot has",
+)
+
+NOTHING = 1e-30
+"""An active in this distance from 0 is 0: a and a^2 are then equal within rounding, as they are at 0 and 1."""
+
+Rows = Sequence[Sequence[Scalar]]
+
+
+class Held(NamedTuple):
+    """Which rows of the contacts the world holds, and how.
+
+    named   the named frames
+    active  an entry for each contact
+    mu      regularisation
+    si      gives a constant from its value and its unit
+    """
+
+    named: Sequence[NamedFrame]
+    active: Sequence[Scalar]
+    mu: Scalar
+    si: Callable[[float, str], Scalar] = lambda value, unit: value
+
+    def solved(
+        self, factors: Factors, jacobian: Rows, load: Sequence[Scalar], wanted: Sequence[Scalar]
+    ) -> tuple[Constrained, list[Scalar]]:
+        """The solution of `constrained`, and a sign for each contact: -1 where there is none."""
+        si, rows = self.si, [each.rows for each in self.named if each.rows]
+        shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
+        unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
+        found = constrained(
+            factors,
+            jacobian,
+            load,
+            wanted,
+            [on for on, count in zip(self.active, rows, strict=True) for _ in range(count)],
+            [each for count in rows for each in shift[:count]],
+            [each for count in rows for each in unit[:count]],
+        )
+        signs, first, inverse = [], 0, inverse_diagonal(found.factors)
+        for on, count in zip(self.active, rows, strict=True):
+            off = on - on * on
+            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+            sign = Op.SELECT(-NOTHING, off, sign, -1.0)
+            for k in range(first, first + count):
+                sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
+            signs.append(sign)
+            first += count
+        return found, signs
+
+
+def held_on_arrays(
+    robot: RobotOnArrays, given: Mapping[str, Array], wanted: Callable[[Array], Array]
+) -> tuple[Array, Array, Array]:
+    """(k, nv) x, (k, rows) f and the pivots of `constrained` without a load; `wanted` (k, rows) from J (k, rows, nv)."""
+    q, count = list(given["q"].T), len(given["q"])
+    mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
+    factors = factorize([list(row) for row in mass])
+    rows = contact_jacobian(robot.frames, robot.chain.frames, q)
+    right = list(wanted(matrix(rows, count)).T)
+    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    with np.errstate(all="ignore"):
+        found, signs = mask.solved(factors, rows, [0.0] * robot.nv, right)
+    return (
+        columns(found.motion, count),
+        columns(found.forces, count),
+        columns([*factors.pivots, *signs], count),
+    )
+
+
+def dense_solution(
+    robot: Reference, given: Mapping[str, Array], jacobian: Array, load: Array, wanted: Array
+) -> tuple[Array, Array]:
+    """(k, nv) x and (k, rows) f of the dense systems [[M, -J^T], [J, mu]] of the active rows, by Pinocchio's M."""
+    counts = [rows for _, rows in robot.contacts]
+    masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
+    found = np.concatenate([load, np.zeros_like(wanted)], axis=1)
+    nv = load.shape[1]
+    for k, (mass, on, mu) in enumerate(
+        zip(robot.mass_matrix(given["q"]), masks, np.reshape(given[MU.name], -1), strict=True)
+    ):
+        own = jacobian[k, on]
+        whole = np.block([[mass, -own.T], [own, mu * np.eye(len(own))]])
+        found[k, np.append(np.full(nv, True), on)] = np.linalg.solve(
+            whole, np.concatenate([load[k], wanted[k, on]])
+        )
+    return found[:, :nv], found[:, nv:]
