@@ -346,6 +346,17 @@ class CompiledFunctions(RobotFacts):
         kernels = self._kernels
         return (kernels[function] if function in kernels else kernels[f"{function}_theta"]).tails
 
+    def call_at(self, kernel: str, count: int, addresses: Sequence[int]) -> None:
+        """Compute `count` states, whose inputs and outputs, theta_b between them, are contiguous rows at these addresses.
+
+        Nothing is checked. If a matrix is not positive definite, the results of that state are NaN.
+        """
+        self._kernel(kernel).batch(count, *(self._ffi.cast(self._pointer, address) for address in addresses))
+
+    def tails(self, kernel: str) -> tuple[tuple[int, ...], ...]:
+        """Trailing axes of each output of a kernel."""
+        return self._kernel(kernel).tails
+
     def _address_of(self, function: str) -> int:
         """Where the library has a kernel's batch function."""
         symbol = batch_symbol(self._robot, function)
