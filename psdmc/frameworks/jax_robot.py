@@ -259,11 +259,15 @@ _call.multiple_results = True
 
 @_call.def_abstract_eval
 def _shapes(*given: Any, kernel: Kernel) -> list[Any]:
-    lead = kernel.lead(given[0])
-    return [
-        jax.core.ShapedArray(kernel.with_tail(lead, output), given[0].dtype)
-        for output in kernel.function.outputs
-    ]
+    return [_like(given[0], kernel, output) for output in kernel.function.outputs]
+
+
+def _like(first: Any, kernel: Kernel, output: Quantity) -> Any:
+    """The abstract value of an output, whose leading axes lie on devices as those of the first argument."""
+    lead, spec = kernel.lead(first), first.sharding.spec
+    shape = kernel.with_tail(lead, output)
+    own = jax.sharding.PartitionSpec(*spec[: len(lead)], *[None] * (len(shape) - len(lead)))
+    return first.update(shape=shape, weak_type=False, sharding=first.sharding.update(spec=own))
 
 
 @_call.def_impl
@@ -354,13 +358,9 @@ _linear.multiple_results = True
 
 @_linear.def_abstract_eval
 def _shapes_of_tangents(*given: Any, kernel: Kernel, by_theta: bool) -> list[Any]:
-    lead = kernel.lead(given[0])
-    outputs = (replace(output, axes=_tangent_axes(output)) for output in kernel.function.outputs)
-    return [jax.core.ShapedArray(kernel.with_tail(lead, output), given[0].dtype) for output in outputs]
-
-
-def _tangent_axes(quantity: Quantity) -> tuple[str, ...]:
-    return ("nv",) if quantity.axes == Q.axes else quantity.axes
+    outputs = kernel.function.outputs
+    along = (replace(output, axes=("nv",)) if output.axes == Q.axes else output for output in outputs)
+    return [_like(given[0], kernel, output) for output in along]
 
 
 @dataclass(frozen=True)
