@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
+    from psdmc.frameworks.jax_robot import jax_robot as jax
+    from psdmc.frameworks.torch_robot import torch_robot as torch
     from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.model.load import load
     from psdmc.model.store import save
@@ -35,8 +37,10 @@ __all__ = [
     "emit_c",
     "export_urdf",
     "identify_payload",
+    "jax",
     "load",
     "save",
+    "torch",
 ]
 
 _MODULES = {"CompiledRobot": "psdmc.toolchain.call"}
@@ -46,11 +50,16 @@ _MODULES |= {
     "calibrate": "psdmc.calibration.api",
     "export_urdf": "psdmc.export.export_urdf",
     "identify_payload": "psdmc.calibration.payload",
+    "jax": "psdmc.frameworks.jax_robot",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
+    "torch": "psdmc.frameworks.torch_robot",
 }
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
+
+_NAMES = {"jax": "jax_robot", "torch": "torch_robot"}
+"""What a name is called in its module, if not the same."""
 
 
 if not TYPE_CHECKING:  # a type checker would take any name that there is none of
@@ -58,7 +67,7 @@ if not TYPE_CHECKING:  # a type checker would take any name that there is none o
     def __getattr__(name: str) -> Any:
         if name not in _MODULES:
             raise AttributeError(f"module 'psdmc' has no attribute {name!r}")
-        found = getattr(import_module(_MODULES[name]), name)
+        found = getattr(import_module(_MODULES[name]), _NAMES.get(name, name))
         globals()[name] = found
         return found
 

@@ -71,7 +71,8 @@ def require_rule(function: str) -> Rule:
     rule = rule_of(function)
     if rule is None:
         known = ", ".join(name for name in SIGNATURES if rule_of(name))
-        raise ArgumentError(f"{function} has no derivatives", f"these functions have them: {known}")
+        hint = f"psdmc has first derivatives, of these functions: {known}"
+        raise ArgumentError(f"{function} has no derivatives", hint)
     return rule
 
 

@@ -245,7 +245,7 @@ class _Operator:
     def compute(self, *given: Tensor) -> Any:
         """Call the C function with the tensors' memory. Only tensors that are not contiguous rows of all states are copied."""
         inputs, theta_b, lead = self.checked(given)
-        made = self._results(inputs[0], lead)
+        made = self._results(inputs[0], lead, theta_b is not None)
         pairs = zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
         rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in pairs]
         robot, states = self.robot.compiled(inputs[0].dtype), math.prod(lead)
@@ -261,8 +261,8 @@ class _Operator:
 
     def without_values(self, *given: Tensor) -> Any:
         """Return tensors of the results' shapes, for torch.compile."""
-        inputs, _, lead = self.checked(given)
-        made = self._results(inputs[0], lead)
+        inputs, theta_b, lead = self.checked(given)
+        made = self._results(inputs[0], lead, theta_b is not None)
         return made[0] if len(made) == 1 else tuple(made)
 
     def differentiable(self, operator: Any) -> Callable[..., Any]:
@@ -401,14 +401,14 @@ class _Operator:
         except RuntimeError:
             shapes = ", ".join(f"{quantity.name} {tuple(tensor.shape)}" for quantity, tensor in pairs)
             raise ArgumentError(
-                f"{name}: shapes do not broadcast: {shapes}", "give tensors of one shape, or that broadcast"
+                f"{name}: shapes do not broadcast: {shapes}", "make leading axes equal or one"
             ) from None
         return list(given[:count]), pairs[-1][1] if len(pairs) > count else None, tuple(lead)
 
-    def _results(self, like: Tensor, lead: tuple[int, ...]) -> list[Tensor]:
+    def _results(self, like: Tensor, lead: tuple[int, ...], theta: bool) -> list[Tensor]:
         """Empty tensors for the outputs."""
         if any("nonzeros" in quantity.axes for quantity in self.function.outputs):
-            tails = self.robot.compiled(like.dtype).tails(self.function.name)
+            tails = self.robot.compiled(like.dtype).tails(self.function.name + ("_theta" if theta else ""))
         else:
             tails = tuple(map(self.robot.shape, self.function.outputs))
         return [like.new_empty(lead + tail) for tail in tails]

@@ -357,10 +357,10 @@ class CompiledFunctions(RobotFacts):
         """Trailing axes of each output of a kernel."""
         return self._kernel(kernel).tails
 
-    def _address_of(self, function: str) -> int:
-        """Where the library has a kernel's batch function."""
-        symbol = batch_symbol(self._robot, function)
-        return int(self._ffi.cast("uintptr_t", self._ffi.addressof(self._library, symbol)))
+    def address_of(self, kernel: str) -> int:
+        """Return where in memory a batch function in C is, such as that of 'gravity' or of 'gravity_theta', compiled now if
+        it was not. It stays there as long as the robot lives."""
+        return int(self._ffi.cast("uintptr_t", self._kernel(kernel).batch))
 
     def _rows(self, lead: tuple[int, ...], function: Signature, arrays: Sequence[Array]) -> list[Array]:
         """The arrays as contiguous rows of the common leading shape."""
