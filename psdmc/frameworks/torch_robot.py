@@ -249,14 +249,12 @@ class _Operator:
         pairs = zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
         rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in pairs]
         robot, states = self.robot.compiled(inputs[0].dtype), math.prod(lead)
-        if theta_b is None:
-            robot.call_at(self.function.name, states, [each.data_ptr() for each in (*rows, *made)])
-        else:
-            thetas = _apart(theta_b, lead)
-            for k, theta in enumerate(thetas):
-                ins, outs = ([x.data_ptr() + k * (x.nbytes // len(thetas)) for x in xs] for xs in (rows, made))
-                addresses = [*ins, theta.data_ptr(), *outs]
-                robot.call_at(f"{self.function.name}_theta", states // len(thetas), addresses)
+        kernel = self.function.name + ("" if theta_b is None else "_theta")
+        thetas = () if not states else ((),) if theta_b is None else _apart(theta_b, lead).split(1)
+        for k, theta in enumerate(thetas):
+            ins, outs = ([x.data_ptr() + k * (x.nbytes // len(thetas)) for x in xs] for xs in (rows, made))
+            own = [part.data_ptr() for part in theta]
+            robot.call_at(kernel, states // len(thetas), [*ins, *own, *outs])
         return made[0] if len(made) == 1 else tuple(made)
 
     def without_values(self, *given: Tensor) -> Any:
