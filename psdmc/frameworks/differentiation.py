@@ -71,8 +71,11 @@ def require_rule(function: str) -> Rule:
     rule = rule_of(function)
     if rule is None:
         known = ", ".join(name for name in SIGNATURES if rule_of(name))
-        hint = f"psdmc has first derivatives, of these functions: {known}"
-        raise ArgumentError(f"{function} has no derivatives", hint)
+        what = f"{function} has no derivatives"
+        for ending in ("_vjp", "_jvp", "_vjp_parameters"):
+            if function.endswith(ending):
+                what = f"{function.removesuffix(ending)} has no second derivatives"
+        raise ArgumentError(what, f"these functions have first derivatives: {known}")
     return rule
 
 

@@ -404,15 +404,18 @@ def _transposed(cotangents: Sequence[Any], *given: Any, kernel: Kernel, by_theta
 
 
 def _second(primals: Sequence[Array], tangents: Sequence[Any], *, kernel: Kernel, by_theta: bool) -> Any:
-    """The derivative by the linear arguments; ArgumentError for one by the others."""
+    """The derivative of the linear primitive. By what is not linear it exists if the rule calls functions that have one."""
     first = len(kernel.function.inputs) + kernel.theta
+    linear = [ad.instantiate_zeros(tangent) for tangent in tangents[first:]]
+    found = _linear.bind(*primals[:first], *linear, kernel=kernel, by_theta=by_theta)
     if any(type(tangent) is not ad.Zero for tangent in tangents[:first]):
-        raise ArgumentError(
-            f"{kernel.function.name} has no second derivatives", "differentiate once, or use finite differences"
-        )
-    along = map(ad.instantiate_zeros, tangents[first:])
-    outs = _linear.bind(*primals, kernel=kernel, by_theta=by_theta)
-    return outs, _linear.bind(*primals[:first], *along, kernel=kernel, by_theta=by_theta)
+
+        def tangents_of(*given: Array) -> list[Array]:
+            return _tangents(*given, *primals[first:], kernel=kernel, by_theta=by_theta)
+
+        _, more = jax.jvp(tangents_of, tuple(primals[:first]), tuple(map(ad.instantiate_zeros, tangents[:first])))
+        found = [a + b for a, b in zip(found, more, strict=True)]
+    return _linear.bind(*primals, kernel=kernel, by_theta=by_theta), found
 
 
 mlir.register_lowering(_linear, mlir.lower_fun(_tangents, multiple_results=True))
