@@ -35,6 +35,7 @@ MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
     "calibration": LEFT_OF_TOOLS,
     "export": {"robot", "dynamics", "friction", "model", "links"},
+    "frameworks": LEFT_OF_TOOLS - {"model_functions"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
@@ -84,6 +85,7 @@ OUTSIDE = {
         "jinja2",
     },
     "export": {"numpy", "mujoco"},
+    "frameworks": {"numpy", "jax", "jaxlib"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
     "cli": {"typer", "rich", "numpy"},
@@ -405,5 +407,9 @@ def test_a_module_that_runs_runs_at_its_end():
     """What stands behind the call of main() would not be defined yet."""
     for _, path in modules():
         body = ast.parse(path.read_text(encoding="utf-8")).body
-        runs = [k for k, node in enumerate(body) if isinstance(node, ast.If) and "__main__" in ast.unparse(node.test)]
+        runs = [
+            k
+            for k, node in enumerate(body)
+            if isinstance(node, ast.If) and "__main__" in ast.unparse(node.test)
+        ]
         assert runs in ([], [len(body) - 1]), path.relative_to(PACKAGE)

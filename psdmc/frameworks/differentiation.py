@@ -27,12 +27,11 @@ class ArgumentError(InputError, ValueError):
 
 
 class Framework(Protocol):
-    """What a rule runs on.
+    """What a rule runs on."""
 
-    arrays  the library: jax.numpy, torch or numpy
-    """
-
-    arrays: Any
+    @property
+    def arrays(self) -> Any:
+        """The library: jax.numpy, torch or numpy."""
 
     def call(self, function: str, *inputs: Array) -> Arrays:
         """The outputs of a generated function, with theta_b where the caller gave it and the function takes it. Leading axes
@@ -113,7 +112,7 @@ def _gradient(name: str) -> Rule:
         if name == "inverse_dynamics":
             (found,) = f.call(f"{name}_jvp", *inputs, *tangents)[1:]
             if dtheta is not None:
-                found = found + _times(f, *f.call("regressor", *inputs), dtheta)
+                found = found + _times(f, f.call("regressor", *inputs)[0], dtheta)
             return (found,)
         if dtheta is not None:
             (qdd,) = f.call(name, *inputs)

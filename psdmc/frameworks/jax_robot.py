@@ -58,7 +58,8 @@ def jax_robot(
     """Return the functions of a model as functions of JAX, which run compiled code on the CPU.
 
     The result has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods work
-    inside jax.jit, vmap, grad, jvp, jacfwd, jacrev, lax.scan and lax.map. psdmc compiles a function when JAX first traces it.
+    inside jax.jit, vmap, grad, jvp, jacfwd, jacrev, lax.scan and lax.map. psdmc compiles a function when
+    JAX first traces it.
 
     model  a model, or the path of a model file
     real   precision of all arrays, "float64" or "float32"; None: float64
@@ -83,9 +84,9 @@ def jax_robot(
 class JaxRobot:
     """A robot whose methods, one for each generated function, are functions of JAX. `psdmc.jax` makes such robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy. If the
-    mass matrix of a state is not positive definite, the results of this state are NaN. A method with several results returns a
-    named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy. If
+    the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several results
+    returns a named tuple.
 
     The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
     its nq entries, and zero along the quaternion.
@@ -107,26 +108,16 @@ class JaxRobot:
 
     def call(self, function: Signature, inputs: Sequence[Any], theta_b: Any = None) -> Any:
         """Call a generated function by its entry in `psdmc.functions.SIGNATURES`, and return the result."""
-        arrays = [
-            self._checked(function, quantity, x) for quantity, x in zip(function.inputs, inputs, strict=True)
-        ]
-        axes = [self._sizes.shape(quantity.axes) for quantity in function.inputs]
-        leads = [array.shape[: array.ndim - len(tail)] for array, tail in zip(arrays, axes, strict=True)]
-        if not arrays:
+        if not function.inputs:
             return jnp.asarray(getattr(self.compiled, function.name)())
-        parameters = [] if theta_b is None else [self._checked(function, THETA, theta_b)]
-        try:
-            lead = jnp.broadcast_shapes(*leads, *(array.shape[:-1] for array in parameters))
-        except ValueError:
-            shapes = ", ".join(f"{q.name} {x.shape}" for q, x in zip(function.inputs, arrays, strict=True))
-            raise ArgumentError(
-                f"{function.name}: shapes do not broadcast: {shapes}", "make leading axes equal or one"
-            ) from None
-        states = [jnp.broadcast_to(array, lead + tail) for array, tail in zip(arrays, axes, strict=True)]
+        pairs = zip(function.inputs, inputs, strict=True)
+        arrays = [self._checked(function, quantity, given) for quantity, given in pairs]
+        own = None if theta_b is None else self._checked(function, THETA, theta_b)
+        kernel = self._kernel(function, own is not None)
+        given = kernel.given(arrays, own)
         if function.name in ON_COORDINATES:
-            return getattr(self._coordinates, ON_COORDINATES[function.name])(*states)
-        own = [jnp.broadcast_to(array, (*lead, self._sizes.l)) if array.ndim > 1 else array for array in parameters]
-        found = _call.bind(*states, *own, kernel=self._kernel(function, bool(own)))
+            return getattr(self._coordinates, ON_COORDINATES[function.name])(*given)
+        found = _call.bind(*given, kernel=kernel)
         return found[0] if len(found) == 1 else results(function)(*found)
 
     def _checked(self, function: Signature, quantity: Quantity, given: Any) -> Array:
@@ -139,7 +130,9 @@ class JaxRobot:
         if jnp.issubdtype(array.dtype, jnp.integer):
             array = array.astype(dtype)
         if array.dtype != dtype:
-            switch = "" if jax.config.jax_enable_x64 else 'set jax_enable_x64 to True with jax.config.update, '
+            switch = (
+                "" if jax.config.jax_enable_x64 else "set jax_enable_x64 to True with jax.config.update, "
+            )
             raise ArgumentError(
                 f"{what} has dtype {array.dtype}, expected {dtype}",
                 f"{switch}convert the array, or make the robot with psdmc.jax(model, real={str(array.dtype)!r})",
@@ -198,6 +191,23 @@ class Kernel:
         """The shape of an input or output for leading axes."""
         return lead + self._sizes.shape(quantity.axes)
 
+    def given(self, inputs: Sequence[Array], theta_b: Array | None) -> list[Array]:
+        """All arguments of the call, with common leading axes. One theta_b for all states stays alone."""
+        named = [*zip(self.function.inputs, inputs, strict=True)]
+        named += [] if theta_b is None else [(THETA, theta_b)]
+        leads = [x.shape[: x.ndim - len(quantity.axes)] for quantity, x in named]
+        try:
+            lead = jnp.broadcast_shapes(*leads)
+        except ValueError:
+            shapes = ", ".join(f"{quantity.name} {x.shape}" for quantity, x in named)
+            raise ArgumentError(
+                f"{self.function.name}: shapes do not broadcast: {shapes}", "make leading axes equal or one"
+            ) from None
+        return [
+            x if quantity is THETA and x.ndim == 1 else jnp.broadcast_to(x, self.with_tail(lead, quantity))
+            for quantity, x in named
+        ]
+
     def lead(self, first: Any) -> tuple[int, ...]:
         """The leading axes, from the first argument."""
         return tuple(first.shape[: first.ndim - len(self.function.inputs[0].axes)])
@@ -240,16 +250,8 @@ class _Rules:
     def call(self, name: str, *inputs: Array) -> Arrays:
         function = SIGNATURES[name]
         kernel = self.robot._kernel(function, self.theta_b is not None and function.theta)
-        tails = [len(quantity.axes) for quantity in function.inputs]
-        lead = jnp.broadcast_shapes(*(x.shape[: x.ndim - k] for x, k in zip(inputs, tails, strict=True)))
-        states = [
-            jnp.broadcast_to(x, kernel.with_tail(lead, quantity))
-            for x, quantity in zip(inputs, function.inputs, strict=True)
-        ]
         own = self.theta_b if kernel.theta else None
-        if own is not None:
-            states.append(own if own.ndim == 1 else jnp.broadcast_to(own, (*lead, own.shape[-1])))
-        return tuple(_call.bind(*states, kernel=kernel))
+        return tuple(_call.bind(*kernel.given(inputs, own), kernel=kernel))
 
 
 # The call of a generated function: all inputs (..., *axes) with the same leading axes, then theta_b, (l,) or (..., l).
@@ -257,7 +259,6 @@ _call = jax.extend.core.Primitive("psdmc_call")
 _call.multiple_results = True
 
 
-@_call.def_abstract_eval
 def _shapes(*given: Any, kernel: Kernel) -> list[Any]:
     return [_like(given[0], kernel, output) for output in kernel.function.outputs]
 
@@ -270,7 +271,6 @@ def _like(first: Any, kernel: Kernel, output: Quantity) -> Any:
     return first.update(shape=shape, weak_type=False, sharding=first.sharding.update(spec=own))
 
 
-@_call.def_impl
 def _called(*given: Array, kernel: Kernel) -> list[Array]:
     lead = kernel.lead(given[0])
     shapes = [
@@ -280,12 +280,14 @@ def _called(*given: Array, kernel: Kernel) -> list[Array]:
     return list(jax.ffi.ffi_call(xla.TARGET, shapes)(*given, function=np.int64(kernel.number)))
 
 
+_call.def_abstract_eval(_shapes)
+_call.def_impl(_called)
 mlir.register_lowering(_call, mlir.lower_fun(_called, multiple_results=True), platform="cpu")
 
 
 def _batched(primitive: Any) -> Callable[..., Any]:
-    """The rule of `vmap`: one more leading axis. An array that has none yet is broadcast, but for a theta_b that all states
-    share."""
+    """The rule of `vmap`: one more leading axis. An array that has none yet is broadcast, but for a theta_b that all
+    states share."""
 
     def rule(given: Sequence[Array], axes: Sequence[int | None], *, kernel: Kernel, **more: Any) -> Any:
         size = next(x.shape[axis] for x, axis in zip(given, axes, strict=True) if axis is not None)
@@ -356,7 +358,6 @@ _linear = jax.extend.core.Primitive("psdmc_linear")
 _linear.multiple_results = True
 
 
-@_linear.def_abstract_eval
 def _shapes_of_tangents(*given: Any, kernel: Kernel, by_theta: bool) -> list[Any]:
     outputs = kernel.function.outputs
     along = (replace(output, axes=("nv",)) if output.axes == Q.axes else output for output in outputs)
@@ -381,7 +382,6 @@ class _Parts:
         return cls(_Rules(kernel.robot, theta_b), tuple(given[:count]), places)
 
 
-@_linear.def_impl
 def _tangents(*given: Array, kernel: Kernel, by_theta: bool) -> list[Array]:
     parts, rule = _Parts.of(given, kernel), require_rule(kernel.function.name)
     tangents = tuple(None if at is None else given[at] for at in parts.places)
@@ -404,20 +404,25 @@ def _transposed(cotangents: Sequence[Any], *given: Any, kernel: Kernel, by_theta
 
 
 def _second(primals: Sequence[Array], tangents: Sequence[Any], *, kernel: Kernel, by_theta: bool) -> Any:
-    """The derivative of the linear primitive. By what is not linear it exists if the rule calls functions that have one."""
+    """The derivative of the linear primitive. By what is not linear it exists if the rule calls functions that have
+    one."""
     first = len(kernel.function.inputs) + kernel.theta
     linear = [ad.instantiate_zeros(tangent) for tangent in tangents[first:]]
-    found = _linear.bind(*primals[:first], *linear, kernel=kernel, by_theta=by_theta)
+    found: list[Any] = _linear.bind(*primals[:first], *linear, kernel=kernel, by_theta=by_theta)
     if any(type(tangent) is not ad.Zero for tangent in tangents[:first]):
 
         def tangents_of(*given: Array) -> list[Array]:
             return _tangents(*given, *primals[first:], kernel=kernel, by_theta=by_theta)
 
-        _, more = jax.jvp(tangents_of, tuple(primals[:first]), tuple(map(ad.instantiate_zeros, tangents[:first])))
+        _, more = jax.jvp(
+            tangents_of, tuple(primals[:first]), tuple(map(ad.instantiate_zeros, tangents[:first]))
+        )
         found = [a + b for a, b in zip(found, more, strict=True)]
     return _linear.bind(*primals, kernel=kernel, by_theta=by_theta), found
 
 
+_linear.def_abstract_eval(_shapes_of_tangents)
+_linear.def_impl(_tangents)
 mlir.register_lowering(_linear, mlir.lower_fun(_tangents, multiple_results=True))
 batching.primitive_batchers[_linear] = _batched(_linear)
 ad.primitive_jvps[_linear] = _second

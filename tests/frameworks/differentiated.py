@@ -92,9 +92,7 @@ class Subject:
             given["qdd"] = self.pinocchio.forward_dynamics(given["q"], given["qd"], given["tau"])
         return RECIPES[function.name].pinocchio(self.pinocchio, given)
 
-    def moved(
-        self, function: Signature, inputs: list[Array], ways: list[Array], step: float
-    ) -> list[Array]:
+    def moved(self, function: Signature, inputs: list[Array], ways: list[Array], step: float) -> list[Array]:
         """The inputs a step along the ways."""
         return [
             self.pinocchio.integrated(x, step * way) if quantity.axes == Q.axes else x + step * way

@@ -56,7 +56,9 @@ def test_slopes_are_pinocchios_and_gradients_their_transpose(robot: str, name: s
     for found, expected in zip(along, own.slopes(function, inputs, ways), strict=True):
         assert near(found, expected, SOLVED if name in INVERTING else EXACT)
     forward = by_state(zip(along, weights, strict=True))
-    assert near(by_state((g, way) for g, way in zip(back, ways, strict=True) if g is not None), forward, 1e-12)
+    assert near(
+        by_state((g, way) for g, way in zip(back, ways, strict=True) if g is not None), forward, 1e-12
+    )
 
 
 def by_state(pairs: Any) -> Array:
@@ -99,13 +101,15 @@ def test_maps_between_entries_of_q_and_the_tangent() -> None:
     along = np.zeros_like(raw)
     along[:, 3:7] = raw[:, 3:7]
     assert np.abs(on.tangent(raw, along)).max() < 1e-13  # a quaternion's length moves nothing
-    assert near((on.gradient(raw, gradient) * moved).sum(-1), (on.tangent(raw, moved) * gradient).sum(-1), 1e-12)
+    assert near(
+        (on.gradient(raw, gradient) * moved).sum(-1), (on.tangent(raw, moved) * gradient).sum(-1), 1e-12
+    )
     assert near((on.pulled_back(q, weights) * v).sum(-1), (on.rates(q, v) * weights).sum(-1), 1e-12)
     assert near(on.integrated(q, v), own.pinocchio.integrated(q, v), 1e-12)
     assert near(on.difference(q, q[::-1]), own.between(q, q[::-1]), 1e-12)
 
 
 def test_what_cannot_be_differentiated_is_named() -> None:
-    with pytest.raises(ArgumentError, match="^regressor has no derivatives") as caught:
+    with pytest.raises(ArgumentError, match=r"^regressor has no derivatives") as caught:
         require_rule("regressor")
     assert "inverse_dynamics" in caught.value.hint

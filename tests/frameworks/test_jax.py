@@ -84,21 +84,31 @@ def test_jacobians_are_pinocchios(name: str, mode: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "function"), slow_but_for([("hopper", f) for f in RULED if "step" not in f], [(r, f) for r in ROBOTS for f in RULED], spread=True)
+    ("name", "function"),
+    slow_but_for(
+        [("hopper", f) for f in RULED if "step" not in f],
+        [(r, f) for r in ROBOTS for f in RULED],
+        spread=True,
+    ),
 )
 def test_every_ruled_function_has_both_modes(name: str, function: str) -> None:
     """Along the tangent of q against Pinocchio's slopes; the gradient is the transpose of that."""
     own, robot, signature = differentiated(name), robot_of(name), SIGNATURES[function]
     inputs, ways = own.drawn(signature, COUNT)
     expected = own.slopes(signature, inputs, ways)
-    entries = [own.pinocchio.coordinate_rates(q, way) if k == 0 else way for k, (q, way) in enumerate(zip(inputs, ways, strict=True))]
+    entries = [
+        own.pinocchio.coordinate_rates(q, way) if k == 0 else way
+        for k, (q, way) in enumerate(zip(inputs, ways, strict=True))
+    ]
     constant = [x for x in inputs if x.ndim == 1]  # dt
     moving = len(inputs) - len(constant)
 
     def values(*given: Any) -> list[Any]:
         return jax.tree.leaves(getattr(robot, function)(*given, *constant))
 
-    found, along = jax.jit(lambda x, v: jax.jvp(values, x, v))(tuple(inputs[:moving]), tuple(entries[:moving]))
+    found, along = jax.jit(lambda x, v: jax.jvp(values, x, v))(
+        tuple(inputs[:moving]), tuple(entries[:moving])
+    )
     outputs = jax.tree.leaves(getattr(robot.compiled, function)(*inputs))
     for k, (value, slope) in enumerate(zip(along, expected, strict=True)):
         if signature.outputs[k].axes == ("nq",):
@@ -110,7 +120,9 @@ def test_every_ruled_function_has_both_modes(name: str, function: str) -> None:
     _, back = jax.vjp(values, *inputs[:moving])
     gradients = back(weights)
     forward = sum(float((w * a).sum()) for w, a in zip(weights, along, strict=True))
-    assert float(sum((g * e).sum() for g, e in zip(gradients, entries, strict=False))) == pytest.approx(forward, rel=1e-10)
+    assert float(sum((g * e).sum() for g, e in zip(gradients, entries, strict=False))) == pytest.approx(
+        forward, rel=1e-10
+    )
 
 
 def test_functions_without_derivatives_are_called_too() -> None:
@@ -146,12 +158,18 @@ def test_each_state_may_have_its_theta_b() -> None:
 
     assert near(robot.inverse_dynamics(*inputs, thetas), tau, 1e-13)
     assert near(jax.vmap(robot.inverse_dynamics)(*inputs, thetas), tau, 1e-13)
-    both = jax.vmap(lambda theta: robot.inverse_dynamics(*inputs, theta))(thetas)  # of every state with every theta_b
+    both = jax.vmap(lambda theta: robot.inverse_dynamics(*inputs, theta))(
+        thetas
+    )  # of every state with every theta_b
     assert near(both[2], 2.0 * robot.compiled.inverse_dynamics(*inputs), 1e-13)
-    many = jax.jit(jax.vmap(jax.grad(lambda theta, *x: robot.inverse_dynamics(*x, theta).sum())))(thetas, *inputs)
+    many = jax.jit(jax.vmap(jax.grad(lambda theta, *x: robot.inverse_dynamics(*x, theta).sum())))(
+        thetas, *inputs
+    )
     assert near(many, robot.compiled.regressor(*inputs).sum(1), 1e-12)
     mass = jax.vmap(jax.jacrev(robot.mass_matrix, 1))(inputs[0], thetas)
-    assert near(jnp.einsum("kijl,kl->kij", mass, thetas), jax.vmap(robot.mass_matrix)(inputs[0], thetas), 1e-11)
+    assert near(
+        jnp.einsum("kijl,kl->kij", mass, thetas), jax.vmap(robot.mass_matrix)(inputs[0], thetas), 1e-11
+    )
 
 
 def test_leading_axes_broadcast_and_vmap_is_one_call() -> None:
@@ -160,7 +178,9 @@ def test_leading_axes_broadcast_and_vmap_is_one_call() -> None:
     q, qd, tau = (x.reshape(2, 3, -1) for x in inputs)
     expected = robot.compiled.forward_dynamics(q, qd, tau)
 
-    assert near(robot.forward_dynamics(q, qd[:1], tau), robot.compiled.forward_dynamics(q, qd[:1], tau), 1e-13)
+    assert near(
+        robot.forward_dynamics(q, qd[:1], tau), robot.compiled.forward_dynamics(q, qd[:1], tau), 1e-13
+    )
     assert near(jax.vmap(jax.vmap(robot.forward_dynamics))(q, qd, tau), expected, 1e-13)
     turned = jax.vmap(robot.forward_dynamics, (1, 2, 1), 2)(q, np.moveaxis(qd, 1, 2), tau)
     assert near(np.moveaxis(turned, 2, 1), expected, 1e-13)
@@ -235,7 +255,11 @@ def refused(call: Callable[[], Any], message: str, hint: str = "") -> None:
 def test_wrong_arguments_are_refused() -> None:
     robot = robot_of("scara")
     q = jnp.zeros(4)
-    refused(lambda: robot.gravity(q.astype(np.float32)), "^gravity: q has dtype float32, expected float64", "real='float32'")
+    refused(
+        lambda: robot.gravity(q.astype(np.float32)),
+        "^gravity: q has dtype float32, expected float64",
+        "real='float32'",
+    )
     refused(lambda: robot.gravity(q[:3]), r"^gravity: q has shape \(3,\), expected \(..., 4\)", "J1")
     refused(lambda: robot.gravity(0.0), r"^gravity: q has shape \(\)")
     refused(lambda: robot.gravity("q"), "^gravity: q is no array")
@@ -254,12 +278,23 @@ def test_wrong_arguments_are_refused() -> None:
 def test_what_has_no_derivative_is_refused_by_name() -> None:
     robot = robot_of("scara")
     q = jnp.zeros(4)
-    refused(lambda: jax.grad(lambda q: robot.jacobian(q).sum())(q), "^jacobian has no derivatives", "inverse_dynamics")
-    refused(lambda: jax.hessian(lambda q: robot.gravity(q).sum())(q), "^inverse_dynamics has no second derivatives")
+    refused(
+        lambda: jax.grad(lambda q: robot.jacobian(q).sum())(q),
+        "^jacobian has no derivatives",
+        "inverse_dynamics",
+    )
+    refused(
+        lambda: jax.hessian(lambda q: robot.gravity(q).sum())(q),
+        "^inverse_dynamics has no second derivatives",
+    )
     step = jax.jacfwd(lambda dt: robot.semi_implicit_euler(q, q, q, dt).q_next)
     refused(lambda: step(0.01), "^semi_implicit_euler has no derivative by dt", "forward_dynamics")
     energy = jax.grad(lambda theta: robot.potential_energy(q, theta))
-    refused(lambda: energy(robot.compiled.theta_b), "^potential_energy has no derivative by theta_b", "inverse_dyn")
+    refused(
+        lambda: energy(robot.compiled.theta_b),
+        "^potential_energy has no derivative by theta_b",
+        "inverse_dyn",
+    )
     with pytest.raises(ArgumentError, match="second"):
         jax.jit(jax.jacfwd(jax.jacfwd(lambda q: robot.gravity(q).sum())))(q)
 
@@ -269,13 +304,15 @@ def test_energy_has_second_derivatives() -> None:
     robot = robot_of("hopper")
     q = state("hopper", "gravity")[0]
     check_grads(robot.potential_energy, (1.3 * q,), 2, rtol=1e-6, atol=1e-6)
-    assert near(jax.jacfwd(jax.jacfwd(robot.potential_energy))(q), jax.hessian(robot.potential_energy)(q), 1e-12)
+    assert near(
+        jax.jacfwd(jax.jacfwd(robot.potential_energy))(q), jax.hessian(robot.potential_energy)(q), 1e-12
+    )
 
 
 def test_float64_needs_jax_enable_x64() -> None:
     model = differentiated("scara").model
     with jax.enable_x64(False):
-        refused(lambda: psdmc.jax(model), "JAX's option jax_enable_x64 is off", "real=\"float32\"")
+        refused(lambda: psdmc.jax(model), "JAX's option jax_enable_x64 is off", 'real="float32"')
 
 
 def test_an_equal_robot_is_the_same_one() -> None:
