@@ -85,7 +85,7 @@ OUTSIDE = {
         "jinja2",
     },
     "export": {"numpy", "mujoco"},
-    "frameworks": {"numpy", "jax", "jaxlib"},
+    "frameworks": {"numpy", "jax", "jaxlib", "torch"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
     "cli": {"typer", "rich", "numpy"},

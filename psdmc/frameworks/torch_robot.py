@@ -1,7 +1,7 @@
 """A robot's generated functions as PyTorch operators on CPU tensors, with derivatives in both modes.
 
-Each function is an operator of torch.library, so torch.compile keeps it in its graph. Its kernel gives the tensors' memory to
-the compiled C code. Its autograd kernel follows the function's rule (differentiation.py).
+Each function is an operator of torch.library, so torch.compile keeps it in its graph. Its kernel gives the tensors' memory
+to the compiled C code. Its autograd kernel follows the function's rule (differentiation.py).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.target.native import NATIVE
-from psdmc.target.target import Target, Trig
+from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compiled_functions import results
 from psdmc.toolchain.stubs import arguments
@@ -47,7 +47,7 @@ from psdmc.toolchain.stubs import arguments
 Tensor = Any
 """A torch.Tensor. mypy sees no types of PyTorch, which is optional."""
 
-REALS = {torch.float64: "float64", torch.float32: "float32"}
+REALS: dict[Any, Real] = {torch.float64: "float64", torch.float32: "float32"}
 """Precisions of the C code, by dtypes of tensors."""
 
 ARRAYS = SimpleNamespace(**(vars(torch) | {"moveaxis": torch.movedim}))
@@ -94,8 +94,8 @@ def torch_robot(
 class TorchRobot:
     """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64, or all
-    are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite, the
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64, or
+    all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite, the
     results of this state are NaN. A method with several results returns a named tuple.
 
     The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
@@ -127,7 +127,9 @@ class TorchRobot:
         """Return the same robot for NumPy arrays, with the C code that the methods call for tensors of this dtype."""
         if dtype not in self._compiled:
             lowering, trig, target = self._options
-            self._compiled[dtype] = compiled(self.model, lowering, real=REALS[dtype], trig=trig, target=target)
+            self._compiled[dtype] = compiled(
+                self.model, lowering, real=REALS[dtype], trig=trig, target=target
+            )
         return self._compiled[dtype]
 
     @property
@@ -167,7 +169,9 @@ def _method(function: Signature) -> Callable[..., Any]:
     def method(self: TorchRobot, *given: Tensor, **named: Tensor) -> Any:
         missing = [name for name in names[len(given) : required] if name not in named]
         if missing or len(given) > len(names) or any(name not in names[len(given) :] for name in named):
-            raise TypeError(f"{function.name}({', '.join(names)}): got {len(given)} tensors{_and_named(named)}")
+            raise TypeError(
+                f"{function.name}({', '.join(names)}): got {len(given)} tensors{_and_named(named)}"
+            )
         tensors = [*given, *(named.get(name) for name in names[len(given) :])]
         for name, tensor in zip(names, tensors, strict=True):
             _refuse_elsewhere(f"{function.name}: {name}", tensor, is_optional=name == "theta_b")
@@ -243,7 +247,7 @@ class _Operator:
         return operator
 
     def compute(self, *given: Tensor) -> Any:
-        """Call the C function with the tensors' memory. Only tensors that are not contiguous rows of all states are copied."""
+        """Call the C function with the tensors' memory. Only what is not contiguous rows of all states is copied."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         pairs = zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
@@ -379,7 +383,9 @@ class _Operator:
         TypeError for another dtype, ArgumentError for another shape.
         """
         count, name = len(self.function.inputs), self.function.name
-        pairs = [pair for pair in zip((*self.function.inputs, THETA_B), given, strict=False) if pair[1] is not None]
+        pairs = [
+            pair for pair in zip((*self.function.inputs, THETA_B), given, strict=False) if pair[1] is not None
+        ]
         leads = []
         for quantity, tensor in pairs:
             what, tail = f"{name}: {quantity.name}", self.robot.shape(quantity)

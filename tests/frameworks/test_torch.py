@@ -123,7 +123,9 @@ def test_opcheck(name: str, function: str) -> None:
         torch.library.opcheck(robot.operator(function), (*given, robot.theta_b.requires_grad_()))
 
 
-@pytest.mark.parametrize("function", ["mass_matrix_packed", "regressor", "inverse_dynamics_vjp", "frame_jacobian"])
+@pytest.mark.parametrize(
+    "function", ["mass_matrix_packed", "regressor", "inverse_dynamics_vjp", "frame_jacobian"]
+)
 def test_functions_without_derivatives_are_operators_too(function: str) -> None:
     robot, given = robot_of("hopper"), drawn("hopper", function)
     found = getattr(robot, function)(*given)
@@ -238,7 +240,7 @@ def test_positions_are_differentiated_twice() -> None:
 def test_second_derivatives_are_refused() -> None:
     robot, given = robot_of("hopper"), [x.requires_grad_() for x in drawn("hopper", "inverse_dynamics")]
     (slope,) = torch.autograd.grad(robot.inverse_dynamics(*given).sum(), given[:1], create_graph=True)
-    with pytest.raises(ArgumentError, match="^inverse_dynamics has no second derivatives") as caught:
+    with pytest.raises(ArgumentError, match=r"^inverse_dynamics has no second derivatives") as caught:
         slope.sum().backward()
     assert "create_graph" in caught.value.hint
     with pytest.raises(ArgumentError, match="second derivatives"):
@@ -248,9 +250,9 @@ def test_second_derivatives_are_refused() -> None:
 def test_what_has_no_derivative_is_named() -> None:
     robot = robot_of("hopper")
     q, qd, tau, dt = drawn("hopper", "semi_implicit_euler")
-    with pytest.raises(ArgumentError, match="^semi_implicit_euler has no derivative by dt"):
+    with pytest.raises(ArgumentError, match=r"^semi_implicit_euler has no derivative by dt"):
         robot.semi_implicit_euler(q, qd, tau, dt.requires_grad_()).q_next.sum().backward()
-    with pytest.raises(ArgumentError, match="^potential_energy has no derivative by theta_b"):
+    with pytest.raises(ArgumentError, match=r"^potential_energy has no derivative by theta_b"):
         robot.potential_energy(q, robot.theta_b.requires_grad_()).sum().backward()
 
 
@@ -318,7 +320,7 @@ WRONG = {
     "shape": (lambda q, v: (q[:, :3], v, v), ValueError, r"inverse_dynamics: q has shape \(3, 3\), expected \(\.\.\., 4\)"),
     "no axes": (lambda q, v: (q, v[0, 0], v), ValueError, r"qd has shape \(\), expected \(\.\.\., 4\)"),
     "leads": (lambda q, v: (q, v[:2], v), ValueError, r"shapes do not broadcast: q \(3, 4\), qd \(2, 4\), qdd \(3, 4\)"),
-    "theta_b": (lambda q, v: (q, v, v, v), ValueError, r"inverse_dynamics: theta_b has shape \(3, 4\), expected \(\.\.\., 8\)"),
+    "theta_b": (lambda q, v: (q, v, v, v), ValueError, r"theta_b has shape \(3, 4\), expected \(\.\.\., 8\)"),
     "half": (lambda q, v: (q.half(), v, v), TypeError, r"q is torch.float16, expected torch.float64 or torch.float32"),
     "mixed": (lambda q, v: (q, v.float(), v), TypeError, r"qd is torch.float32, expected torch.float64"),
     "integers": (lambda q, v: (q.long(), v, v), TypeError, r"q is torch.int64, expected"),
