@@ -74,8 +74,8 @@ def torch_robot(
     """Return the functions of a model as functions of PyTorch, which run compiled code on the CPU.
 
     The result has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods have
-    gradients, and work inside torch.func.vmap, grad, jvp, jacrev and jacfwd, and torch.compile. psdmc compiles a function
-    when you first call it, separately for float32 and float64.
+    gradients. They also work inside torch.compile and torch.func.vmap, grad, jvp, jacrev and jacfwd. psdmc compiles a
+    function when you first call it, separately for float32 and float64.
 
     model  a model, or the path of a model file
 
@@ -95,8 +95,8 @@ class TorchRobot:
     """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such robots.
 
     The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64, or
-    all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite, the
-    results of this state are NaN. A method with several results returns a named tuple.
+    all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite,
+    the results of this state are NaN. A method with several results returns a named tuple.
 
     The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
     its nq entries, and zero along the quaternion. Second derivatives are not available.
