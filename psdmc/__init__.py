@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
-    from psdmc.frameworks.jax_robot import jax_robot as jax
+    from psdmc.frameworks.api import jax
     from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.model.load import load
     from psdmc.model.store import save
@@ -48,15 +48,12 @@ _MODULES |= {
     "calibrate": "psdmc.calibration.api",
     "export_urdf": "psdmc.export.export_urdf",
     "identify_payload": "psdmc.calibration.payload",
-    "jax": "psdmc.frameworks.jax_robot",
+    "jax": "psdmc.frameworks.api",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
 }
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
-
-_NAMES = {"jax": "jax_robot"}
-"""What a name is called in its module, if not the same."""
 
 
 if not TYPE_CHECKING:  # a type checker would take any name that there is none of
@@ -64,7 +61,7 @@ if not TYPE_CHECKING:  # a type checker would take any name that there is none o
     def __getattr__(name: str) -> Any:
         if name not in _MODULES:
             raise AttributeError(f"module 'psdmc' has no attribute {name!r}")
-        found = getattr(import_module(_MODULES[name]), _NAMES.get(name, name))
+        found = getattr(import_module(_MODULES[name]), name)
         globals()[name] = found
         return found
 
