@@ -51,6 +51,7 @@ MENU = {
         "how-to/batch",
         "how-to/derivatives",
         "how-to/casadi",
+        "how-to/jax",
         "how-to/pytorch",
         "how-to/floating-base",
         "how-to/whole-body",

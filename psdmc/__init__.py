@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
-    from psdmc.frameworks.jax_robot import jax_robot as jax
-    from psdmc.frameworks.torch_robot import torch_robot as torch
+    from psdmc.frameworks.api import jax, torch
     from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.model.load import load
     from psdmc.model.store import save
@@ -50,16 +49,13 @@ _MODULES |= {
     "calibrate": "psdmc.calibration.api",
     "export_urdf": "psdmc.export.export_urdf",
     "identify_payload": "psdmc.calibration.payload",
-    "jax": "psdmc.frameworks.jax_robot",
+    "jax": "psdmc.frameworks.api",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
-    "torch": "psdmc.frameworks.torch_robot",
+    "torch": "psdmc.frameworks.api",
 }
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
-
-_NAMES = {"jax": "jax_robot", "torch": "torch_robot"}
-"""What a name is called in its module, if not the same."""
 
 
 if not TYPE_CHECKING:  # a type checker would take any name that there is none of
@@ -67,7 +63,7 @@ if not TYPE_CHECKING:  # a type checker would take any name that there is none o
     def __getattr__(name: str) -> Any:
         if name not in _MODULES:
             raise AttributeError(f"module 'psdmc' has no attribute {name!r}")
-        found = getattr(import_module(_MODULES[name]), _NAMES.get(name, name))
+        found = getattr(import_module(_MODULES[name]), name)
         globals()[name] = found
         return found
 

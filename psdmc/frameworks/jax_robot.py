@@ -34,7 +34,6 @@ from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
-from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.call_arguments import bound_arguments
@@ -50,26 +49,12 @@ _MADE: dict[str, JaxRobot] = {}
 
 def jax_robot(
     model: DynamicsModel | str | Path,
-    lowering: Lowering = "auto",
-    real: Real | None = None,
-    trig: Trig | None = None,
-    target: str | Target = NATIVE,
+    lowering: Lowering,
+    real: Real | None,
+    trig: Trig | None,
+    target: str | Target,
 ) -> JaxRobot:
-    """Return the functions of a model as functions of JAX, which run compiled code on the CPU.
-
-    The result has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods work
-    inside jax.jit, vmap, grad, jvp, jacfwd, jacrev, lax.scan and lax.map. psdmc compiles a function when
-    JAX first traces it.
-
-    model  a model, or the path of a model file
-    real   precision of all arrays, "float64" or "float32"; None: float64
-
-    `compile` and `emit_c` explain the other options. Raises InputError if the precision is float64 and JAX's option
-    jax_enable_x64 is off.
-
-    >>> robot = psdmc.jax("kr6.npz", real="float32")  # doctest: +SKIP
-    >>> jax.grad(lambda q: robot.potential_energy(q))(q)  # doctest: +SKIP
-    """
+    """The robot of `psdmc.jax`; the same object for equal requests."""
     found = model_of(model)
     compiled = compile(found, lowering, real=real, trig=trig, target=target)
     if compiled.dtype == np.float64 and not jax.config.jax_enable_x64:

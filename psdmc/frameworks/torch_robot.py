@@ -14,13 +14,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from psdmc.errors import ToolchainError
-
-try:
-    import torch
-except ModuleNotFoundError as error:
-    raise ToolchainError("psdmc.torch needs PyTorch", "pip install 'psdmc[torch]'") from error
-
+import torch
 from torch._functorch.utils import enable_single_level_autograd_function
 from torch.autograd.function import _SingleLevelFunction
 
@@ -71,19 +65,7 @@ def torch_robot(
     trig: Trig | None = None,
     target: str | Target = NATIVE,
 ) -> TorchRobot:
-    """Return the functions of a model as functions of PyTorch, which run compiled code on the CPU.
-
-    The result has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods have
-    gradients. They also work inside torch.compile and torch.func.vmap, grad, jvp, jacrev and jacfwd. psdmc compiles a
-    function when you first call it, separately for float32 and float64.
-
-    model  a model, or the path of a model file
-
-    `compile` and `emit_c` explain the other options.
-
-    >>> robot = psdmc.torch("kr6.npz")  # doctest: +SKIP
-    >>> tau = robot.inverse_dynamics(q, qd, qdd)  # doctest: +SKIP
-    """
+    """Return the robot of a model, the same one for the same options; `psdmc.torch` explains them."""
     found = model_of(model)
     key = hashlib.sha256(repr((found.content_hash, lowering, trig, target)).encode()).hexdigest()
     if key not in _ROBOTS:

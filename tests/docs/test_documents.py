@@ -39,8 +39,10 @@ def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """What they build is not optimised: what they show does not depend on it."""
     if "\n$ cargo " in document.read_text(encoding="utf-8") and not is_installed("cargo"):
         pytest.skip("cargo is not installed")
-    if ">>> import psdmc, torch\n" in document.read_text(encoding="utf-8"):
-        pytest.importorskip("torch")
+    for library in re.findall(
+        r"^>>> import (jax|torch)\b", document.read_text(encoding="utf-8"), re.MULTILINE
+    ):
+        pytest.importorskip(library)
     (tmp_path / "document").mkdir()
     monkeypatch.chdir(tmp_path / "document")
     monkeypatch.setenv("CC", str(wrapper(tmp_path)))
