@@ -151,9 +151,8 @@ def _method(function: Signature) -> Callable[..., Any]:
     def method(self: TorchRobot, *given: Tensor, **named: Tensor) -> Any:
         missing = [name for name in names[len(given) : required] if name not in named]
         if missing or len(given) > len(names) or any(name not in names[len(given) :] for name in named):
-            raise TypeError(
-                f"{function.name}({', '.join(names)}): got {len(given)} tensors{_and_named(named)}"
-            )
+            got = ", ".join([f"{len(given)} tensors", *named])
+            raise TypeError(f"{function.name}({', '.join(names)}): got {got}")
         tensors = [*given, *(named.get(name) for name in names[len(given) :])]
         for name, tensor in zip(names, tensors, strict=True):
             _refuse_elsewhere(f"{function.name}: {name}", tensor, is_optional=name == "theta_b")
@@ -165,10 +164,6 @@ def _method(function: Signature) -> Callable[..., Any]:
     method.__name__, method.__qualname__ = function.name, f"{TorchRobot.__name__}.{function.name}"
     method.__doc__ = f"{function.summary}\n\nSee `psdmc.CompiledRobot.{function.name}` for shapes and units."
     return method
-
-
-def _and_named(named: dict[str, Any]) -> str:
-    return f" and {', '.join(named)}" if named else ""
 
 
 def _refuse_elsewhere(what: str, tensor: Any, is_optional: bool) -> None:
@@ -185,9 +180,16 @@ def _refuse_elsewhere(what: str, tensor: Any, is_optional: bool) -> None:
         )
 
 
+def _constant(function: Signature) -> Callable[..., Any]:
+    def method(self: TorchRobot, dtype: Any = torch.float64) -> Tensor:
+        return torch.tensor(getattr(self.compiled(dtype), function.name)())
+
+    method.__name__, method.__doc__ = function.name, function.summary
+    return method
+
+
 for _function in SIGNATURES.values():
-    if _function.inputs:
-        setattr(TorchRobot, _function.name, _method(_function))
+    setattr(TorchRobot, _function.name, (_method if _function.inputs else _constant)(_function))
 
 
 @dataclass(frozen=True, slots=True)

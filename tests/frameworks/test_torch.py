@@ -345,7 +345,7 @@ def test_unknown_arguments_and_unknown_parameters() -> None:
     robot = robot_of("scara")
     q, v, _ = drawn("scara", "inverse_dynamics")
     assert torch.equal(robot.inverse_dynamics(q, qdd=v, qd=v), robot.inverse_dynamics(q, v, v))
-    with pytest.raises(TypeError, match=r"got 3 tensors and out"):
+    with pytest.raises(TypeError, match=r"got 3 tensors, out$"):
         robot.inverse_dynamics(q, v, v, out=v)
     with pytest.raises(ArgumentError, match="device meta") as caught:
         robot.gravity(q.to("meta"))
@@ -359,6 +359,8 @@ def test_a_robot_is_one_object() -> None:
     assert copy.deepcopy(robot) is robot
     assert pickle.loads(pickle.dumps(robot)) is robot
     assert repr(robot) == "TorchRobot 'scara': 4 joints"
+    assert robot.neutral().tolist() == [0.0] * 4
+    assert robot.neutral(torch.float32).dtype == torch.float32
     assert same(robot.theta_b, differentiated("scara").model.theta_b, 0.0)
     with pytest.raises(InputError, match="no such file"):
         psdmc.torch("nothing.npz")
