@@ -186,6 +186,8 @@ def test_leading_axes_broadcast_and_vmap_is_one_call() -> None:
     assert near(np.moveaxis(turned, 2, 1), expected, 1e-13)
     mapped = jax.lax.map(lambda x: robot.forward_dynamics(*x), (q, qd, tau))
     assert near(mapped, expected, 1e-13)
+    donated = jax.jit(robot.forward_dynamics, donate_argnums=2)(q, qd, jnp.array(tau))
+    assert near(donated, expected, 1e-13)
     gradient = jax.jit(jax.vmap(jax.grad(lambda *x: robot.forward_dynamics(*x).sum(), (0, 1, 2))))
     text = gradient.lower(*inputs).as_text()
     assert "while" not in text
