@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, Protocol
 
 from psdmc.errors import InputError
@@ -306,12 +307,12 @@ class Coordinates:
 
     def tangent(self, q: Array, moved: Array) -> Array:
         """(..., nv) the tangent along which q moves while its entries move by `moved`, (..., nq)."""
-        return self._made([j.tangent(a, b) for (j, a), (_, b) in self._pairs(q, moved)], q)
+        return self._made([joint.tangent(here, own) for joint, here, own in self._pairs(q, moved)], q)
 
     def gradient(self, q: Array, by_tangent: Array) -> Array:
         """(..., nq) the derivatives by the entries of q of what has the derivatives (..., nv) along the tangent."""
         found = []
-        for joint, here, own in self._with_rates(q, by_tangent):
+        for joint, here, own in self._pairs(q, by_tangent, rates=True):
             for k in range(joint.nq):
                 moved = [1.0 if i == k else 0.0 for i in range(joint.nq)]
                 found.append([_inner(joint.tangent(here, moved), own)])
@@ -319,12 +320,14 @@ class Coordinates:
 
     def rates(self, q: Array, v: Array) -> Array:
         """(..., nq) how the entries of q, of length one, move along the tangent v, (..., nv)."""
-        return self._made([j.coordinate_rates(here, own) for j, here, own in self._with_rates(q, v)], q)
+        return self._made(
+            [j.coordinate_rates(here, own) for j, here, own in self._pairs(q, v, rates=True)], q
+        )
 
     def pulled_back(self, q: Array, gradient: Array) -> Array:
         """(..., nv) the derivatives along the tangent of what has these derivatives (..., nq) by the entries of q."""
         found = []
-        for (joint, here), (_, own) in self._pairs(q, gradient):
+        for joint, here, own in self._pairs(q, gradient):
             for k in range(joint.nv):
                 rates = [1.0 if i == k else 0.0 for i in range(joint.nv)]
                 found.append([_inner(joint.coordinate_rates(here, rates), own)])
@@ -332,32 +335,34 @@ class Coordinates:
 
     def integrated(self, q: Array, v: Array) -> Array:
         """q after constant rates v for one second, as the generated function `integrate`."""
-        return self._made([j.integrated(here, own) for j, here, own in self._with_rates(q, v)], q)
+        return self._made([j.integrated(here, own) for j, here, own in self._pairs(q, v, rates=True)], q)
 
     def difference(self, q0: Array, q1: Array) -> Array:
         """The constant rates that lead from q0 to q1 in one second, as the generated function `difference`."""
-        return self._made([j.difference(a, b) for (j, a), (_, b) in self._pairs(q0, q1)], q0)
+        return self._made([joint.difference(here, there) for joint, here, there in self._pairs(q0, q1)], q0)
 
-    def _parts(self, q: Array) -> Iterator[tuple[JointType, list[_Entry]]]:
+    def _parts(self, values: Array, rates: bool = False) -> Iterator[tuple[JointType, list[_Entry]]]:
+        """Joint by joint the entries that belong to it, (..., 1) each. Joints of one coordinate in a row come together, as
+        one joint whose entry is (..., k)."""
         at = 0
-        for joint in self.joints:
-            yield joint, [_Entry(q[..., k], self.arrays) for k in range(at, at + joint.nq)]
-            at += joint.nq
+        for is_plain, joints in groupby(self.joints, lambda joint: joint.about_z):
+            own = tuple(joints)
+            for joint in own[:1] if is_plain else own:
+                count = len(own) if is_plain else joint.nv if rates else joint.nq
+                size = count if is_plain else 1
+                starts = range(at, at + count, size)
+                yield joint, [_Entry(values[..., k : k + size], self.arrays) for k in starts]
+                at += count
 
-    def _pairs(self, q: Array, other: Array) -> Iterator[tuple[Any, Any]]:
-        return zip(self._parts(q), self._parts(other), strict=True)
-
-    def _with_rates(self, q: Array, v: Array) -> Iterator[tuple[JointType, list[_Entry], list[_Entry]]]:
-        at = 0
-        for joint, here in self._parts(q):
-            yield joint, here, [_Entry(v[..., k], self.arrays) for k in range(at, at + joint.nv)]
-            at += joint.nv
+    def _pairs(self, q: Array, other: Array, rates: bool = False) -> Iterator[tuple[JointType, Any, Any]]:
+        parts = zip(self._parts(q), self._parts(other, rates), strict=True)
+        return ((joint, here, own) for (joint, here), (_, own) in parts)
 
     def _made(self, parts: Sequence[Sequence[Any]], like: Array) -> Array:
         """The entries as the last axis of one array."""
-        zero = self.arrays.zeros_like(like[..., 0])
+        zero = self.arrays.zeros_like(like[..., :1])
         values = [x.value if isinstance(x, _Entry) else zero + x for part in parts for x in part]
-        return self.arrays.stack(values, -1)
+        return self.arrays.concatenate(values, -1)
 
 
 def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
@@ -369,7 +374,7 @@ def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Entry:
-    """An entry of q or of a tangent, (...,), as the abstract scalar that joint types compute with."""
+    """Entries of q or of a tangent, (..., k), as the abstract scalar that joint types compute with."""
 
     value: Array
     arrays: Any

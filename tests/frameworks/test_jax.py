@@ -186,6 +186,8 @@ def test_leading_axes_broadcast_and_vmap_is_one_call() -> None:
     assert near(np.moveaxis(turned, 2, 1), expected, 1e-13)
     mapped = jax.lax.map(lambda x: robot.forward_dynamics(*x), (q, qd, tau))
     assert near(mapped, expected, 1e-13)
+    donated = jax.jit(robot.forward_dynamics, donate_argnums=2)(q, qd, jnp.array(tau))
+    assert near(donated, expected, 1e-13)
     gradient = jax.jit(jax.vmap(jax.grad(lambda *x: robot.forward_dynamics(*x).sum(), (0, 1, 2))))
     text = gradient.lower(*inputs).as_text()
     assert "while" not in text
@@ -282,6 +284,28 @@ def test_wrong_arguments_are_refused() -> None:
         robot.gravity(q, out=q)
     with pytest.raises(TypeError, match=r"^gravity\(\)"):
         robot.gravity(q, q, q, q)
+
+
+def test_the_handler_checks_arrays_itself() -> None:
+    """Whoever calls it from another program: with a number of no function, too few arrays, or arrays that do not fit."""
+    robot = robot_of("scara")
+    number = robot._kernel(SIGNATURES["gravity"], False).number
+
+    def call(number: int, *given: Array) -> Any:
+        out = jax.ShapeDtypeStruct((2, 4), np.float64)
+        return jax.ffi.ffi_call("psdmc_call", out)(*given, function=np.int64(number))
+
+    q = np.zeros((2, 4))
+    assert near(call(number, q), robot.compiled.gravity(q), 1e-13)
+    for found, message in (
+        (lambda: call(number ^ 1, q), "not loaded"),
+        (lambda: call(number, q, q), "number of arrays"),
+        (lambda: call(number, q[:, :3]), "shape or dtype"),
+        (lambda: call(number, q[:1]), "shape or dtype"),
+        (lambda: call(number, q.astype(np.float32)), "shape or dtype"),
+    ):
+        with pytest.raises(jax.errors.JaxRuntimeError, match=message):
+            jax.block_until_ready(found())
 
 
 def test_what_has_no_derivative_is_refused_by_name() -> None:
