@@ -10,7 +10,7 @@ from pathlib import Path
 import jax
 import jaxlib
 
-from psdmc.errors import ToolchainError
+from psdmc.errors import InternalError, ToolchainError
 from psdmc.toolchain.direct_calls import MOST_ARRAYS, called_from
 
 SOURCE = Path(__file__).with_name("xla_call.c")
@@ -40,7 +40,9 @@ def add(
     if not _library().psdmc_xla_add(
         ctypes.c_int64(number), ctypes.c_size_t(address), can_fail, is_single, len(sizes), place, counts
     ):
-        raise ToolchainError(f"XLA cannot call a function of {len(sizes)} arrays; {MOST_ARRAYS} are the most")
+        raise InternalError(
+            f"a function of {len(sizes)} arrays, of {MOST_ARRAYS} at most, or no memory for one"
+        )
 
 
 @cache
