@@ -46,11 +46,11 @@ def add(
 
 
 @cache
-def _library() -> ctypes.CDLL:
+def _library() -> ctypes.PyDLL:
     words = (*FLAGS, f"-I{jax.ffi.include_dir()}")
     path = called_from(SOURCE, PRODUCT, words, ("calls from XLA", jaxlib.__version__))
     try:
-        library = ctypes.CDLL(str(path))
+        library = ctypes.PyDLL(str(path))  # its calls hold the GIL, so they come one at a time
     except OSError as error:
         raise ToolchainError(
             f"the library that XLA calls cannot be loaded: {error}", "set CC to a compiler that works here"
