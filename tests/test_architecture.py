@@ -38,6 +38,7 @@ MAY_IMPORT |= {
     "frameworks": LEFT_OF_TOOLS - {"model_functions"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
+    "mujoco": {"robot", "model"},
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
 }
 
@@ -88,6 +89,7 @@ OUTSIDE = {
     "frameworks": {"numpy", "jax", "jaxlib"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
+    "mujoco": {"numpy"},
     "cli": {"typer", "rich", "numpy"},
 }
 
