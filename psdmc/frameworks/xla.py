@@ -10,7 +10,7 @@ from pathlib import Path
 import jax
 import jaxlib
 
-from psdmc.errors import ToolchainError
+from psdmc.errors import InternalError, ToolchainError
 from psdmc.toolchain.direct_calls import MOST_ARRAYS, called_from
 
 SOURCE = Path(__file__).with_name("xla_call.c")
@@ -40,15 +40,17 @@ def add(
     if not _library().psdmc_xla_add(
         ctypes.c_int64(number), ctypes.c_size_t(address), can_fail, is_single, len(sizes), place, counts
     ):
-        raise ToolchainError(f"XLA cannot call a function of {len(sizes)} arrays; {MOST_ARRAYS} are the most")
+        raise InternalError(
+            f"a function of {len(sizes)} arrays, of {MOST_ARRAYS} at most, or no memory for one"
+        )
 
 
 @cache
-def _library() -> ctypes.CDLL:
+def _library() -> ctypes.PyDLL:
     words = (*FLAGS, f"-I{jax.ffi.include_dir()}")
     path = called_from(SOURCE, PRODUCT, words, ("calls from XLA", jaxlib.__version__))
     try:
-        library = ctypes.CDLL(str(path))
+        library = ctypes.PyDLL(str(path))  # its calls hold the GIL, so they come one at a time
     except OSError as error:
         raise ToolchainError(
             f"the library that XLA calls cannot be loaded: {error}", "set CC to a compiler that works here"
