@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -85,6 +85,19 @@ $(LOWEST)/ready: pyproject.toml constraints/lowest.txt
 
 test-lowest: $(LOWEST)/ready ## run the fast tests with the oldest dependencies that pyproject.toml allows
 	$(LOWEST)/bin/python -m pytest -q -n $(JOBS) --dist worksteal -m 'not slow' $(LOWEST_TESTS)
+
+ADAPTERS := .venv-adapters
+TORCH ?= torch==2.13.0+cpu
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
+
+$(ADAPTERS)/ready: pyproject.toml
+	$(PYTHON) -m venv --clear $(ADAPTERS)
+	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url $(TORCH_INDEX) \
+	  --editable '.[jax,torch]' '$(TORCH)' pytest pytest-xdist hypothesis example-robot-data mpmath
+	@touch $@
+
+test-adapters: $(ADAPTERS)/ready ## test robots inside JAX and PyTorch, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
+	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks
 
 test-pages: $(READY) ## open bench, calibration and site pages in Chromium at three widths, light and dark; screenshots in generated/pages
 	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[pages]'
@@ -178,6 +191,6 @@ mutate: $(READY) ## put faults into program/ and lower/ and list those that no f
 	$(RUN)/mutmut results
 
 clean: ## remove the environment and all generated files but the reference robot
-	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
 	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

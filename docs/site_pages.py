@@ -53,6 +53,8 @@ MENU = {
         "how-to/derivatives",
         "how-to/casadi",
         "how-to/adapters",
+        "how-to/jax",
+        "how-to/pytorch",
         "how-to/floating-base",
         "how-to/contacts",
         "how-to/whole-body",

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
+    from psdmc.frameworks.api import jax, torch
     from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.model.load import load
     from psdmc.model.store import save
@@ -35,8 +36,10 @@ __all__ = [
     "emit_c",
     "export_urdf",
     "identify_payload",
+    "jax",
     "load",
     "save",
+    "torch",
 ]
 
 _MODULES = {"CompiledRobot": "psdmc.toolchain.call"}
@@ -46,9 +49,11 @@ _MODULES |= {
     "calibrate": "psdmc.calibration.api",
     "export_urdf": "psdmc.export.export_urdf",
     "identify_payload": "psdmc.calibration.payload",
+    "jax": "psdmc.frameworks.api",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
+    "torch": "psdmc.frameworks.api",
 }
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
 

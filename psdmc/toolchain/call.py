@@ -55,14 +55,14 @@ class CompiledRobot(CompiledFunctions):
         takes_theta = with_theta in compiled._kernels and arrays <= MOST_ARRAYS
         return (
             MethodType(getattr(type(self), function.name), self),
-            compiled._address_of(function.name) if function.name in compiled._kernels else 0,
+            compiled.address_of(function.name) if function.name in compiled._kernels else 0,
             bool(function.factorises) + function.raises,
             self.dtype == np.float32,
             tuple(self._sizes.shape(quantity.axes) for quantity in function.inputs),
             compiled._tails_of(function.name),
             results(function) if len(function.outputs) > 1 else None,
             self._units_of(function),
-            compiled._address_of(with_theta) if takes_theta else 0,
+            compiled.address_of(with_theta) if takes_theta else 0,
             self._sizes.l,
         )
 

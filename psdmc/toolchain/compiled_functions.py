@@ -361,10 +361,21 @@ class CompiledFunctions(RobotFacts):
         kernels = self._kernels
         return (kernels[function] if function in kernels else kernels[f"{function}_theta"]).tails
 
-    def _address_of(self, function: str) -> int:
-        """Where the library has a kernel's batch function."""
-        symbol = batch_symbol(self._robot, function)
-        return int(self._ffi.cast("uintptr_t", self._ffi.addressof(self._library, symbol)))
+    def call_at(self, kernel: str, count: int, addresses: Sequence[int]) -> None:
+        """Compute `count` states, whose inputs and outputs, theta_b between them, are contiguous rows at these addresses.
+
+        Nothing is checked. If a matrix is not positive definite, the results of that state are NaN.
+        """
+        self._kernel(kernel).batch(count, *(self._ffi.cast(self._pointer, address) for address in addresses))
+
+    def tails(self, kernel: str) -> tuple[tuple[int, ...], ...]:
+        """Trailing axes of each output of a kernel."""
+        return self._kernel(kernel).tails
+
+    def address_of(self, kernel: str) -> int:
+        """Return where in memory a batch function in C is, such as that of 'gravity' or of 'gravity_theta', compiled now if
+        it was not. It stays there as long as the robot lives."""
+        return int(self._ffi.cast("uintptr_t", self._kernel(kernel).batch))
 
     def _rows(self, lead: tuple[int, ...], function: Signature, arrays: Sequence[Array]) -> list[Array]:
         """The arrays as contiguous rows of the common leading shape."""

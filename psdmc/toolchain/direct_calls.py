@@ -10,7 +10,7 @@ import importlib.util
 import os
 import sys
 import sysconfig
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import ExtensionFileLoader
@@ -25,6 +25,7 @@ from psdmc.toolchain.compiler_command import find_compiler, run
 
 MODULE = "psdmc_direct_call"
 SOURCE = Path(__file__).with_name("direct_call.c")
+ARRAYS = Path(__file__).with_name("called_arrays.h")
 PRODUCT = f"{MODULE}.so"
 
 VARIABLE = "PSDMC_DIRECT_CALLS"
@@ -33,7 +34,7 @@ VARIABLE = "PSDMC_DIRECT_CALLS"
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
 
 MOST_ARRAYS, MOST_UNITS = 12, 64
-"""Of one function, as the C source has them (MOST_CALLED, MOST_UNITS)."""
+"""Of one function, as the C sources have them (MOST_CALLED, MOST_UNITS)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +85,26 @@ def _found() -> DirectCalls:
 
 def _library(headers: Path) -> Path:
     """The compiled module, from the cache or compiled now."""
-    text = SOURCE.read_text(encoding="utf-8")
-    compiler = find_compiler()
     # An extension module takes Python's own functions from the process that loads it.
-    words = [
-        *compiler.command,
-        *FLAGS,
-        *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),
-        f"-I{headers}",
-        f"-I{np.get_include()}",
-    ]
-    parts = ("direct calls", sys.version, np.__version__, *words, *compiler.identity)
+    loose = ("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()
+    words = (*FLAGS, *loose, f"-I{headers}", f"-I{np.get_include()}")
+    return called_from(SOURCE, PRODUCT, words, ("direct calls", sys.version, np.__version__))
+
+
+def called_from(source: Path, product: str, words: Sequence[str], parts: Sequence[str]) -> Path:
+    """The shared library of a C file of psdmc's own that calls robots' functions, from the cache or compiled now.
+
+    words  for the compiler, behind its own
+    parts  what the library depends on besides, the first in words for messages
+    """
+    texts = {path.name: path.read_text(encoding="utf-8") for path in (source, ARRAYS)}
+    compiler = find_compiler()
+    command = [*compiler.command, *words]
 
     def build(folder: Path) -> None:
-        (folder / SOURCE.name).write_text(text, encoding="utf-8", newline="\n")
-        run([*words, SOURCE.name, "-o", PRODUCT], "direct calls", str(folder))
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
+        run([*command, source.name, "-o", product], parts[0], str(folder))
 
-    return cached(cache_key({SOURCE.name: text}, parts), build, [PRODUCT]) / PRODUCT
+    key = cache_key(texts, (*parts, *command, *compiler.identity))
+    return cached(key, build, [product]) / product

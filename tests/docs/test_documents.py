@@ -42,6 +42,10 @@ def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
         pytest.skip("cargo is not installed")
     if "\n$ psdmc view " in document.read_text(encoding="utf-8"):
         pytest.importorskip("plotly")
+    for library in re.findall(
+        r"^>>> import (jax|torch)\b", document.read_text(encoding="utf-8"), re.MULTILINE
+    ):
+        pytest.importorskip(library)
     (tmp_path / "document").mkdir()
     monkeypatch.chdir(tmp_path / "document")
     monkeypatch.setenv("CC", str(wrapper(tmp_path)))

@@ -123,16 +123,20 @@ class _Package:
         self._trees: dict[Path, ast.Module] = {}
 
     def public(self) -> dict[str, str]:
-        """The module of each name of psdmc.__all__."""
+        """The module of each name of psdmc.__all__, by what the name is called there."""
         tree = self._tree(self.root / "psdmc/__init__.py")
         imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
-        where = {alias.name: str(node.module) for node in imports for alias in node.names}
+        where = {
+            alias.asname or alias.name: (alias.name, str(node.module))
+            for node in imports
+            for alias in node.names
+        }
         listed = next(
             node.value
             for node in tree.body
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
         )
-        return {name: where[name] for name in ast.literal_eval(listed) if not name.startswith("_")}
+        return dict(where[name] for name in ast.literal_eval(listed) if not name.startswith("_"))
 
     def found(self, module: str, name: str) -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
         """A function, or a class with its public methods and those of the classes of psdmc that it is made of."""

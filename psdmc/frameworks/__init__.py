@@ -1,0 +1,1 @@
+"""Compiled robots inside array frameworks that differentiate: JAX and PyTorch."""

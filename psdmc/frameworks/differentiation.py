@@ -1,0 +1,414 @@
+"""How array frameworks differentiate generated functions: by which other generated functions, over any array library.
+
+A derivative by q is along the tangent at q here, with nv entries. `Coordinates` leads from there to derivatives by the nq
+entries of q: a framework evaluates f(q with its quaternions normalised), and differentiates that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, Protocol
+
+from psdmc.errors import InputError
+from psdmc.functions import SIGNATURES
+from psdmc.program.signature import Signature
+from psdmc.robot.joints import JointType
+from psdmc.robot.mechanism import Mechanism
+
+Array = Any
+"""An array of the framework's, with leading axes (...) for states."""
+
+Arrays = tuple[Array, ...]
+
+
+class ArgumentError(InputError, ValueError):
+    """A framework's function was called with a wrong argument, or differentiated by an input that has no derivative."""
+
+
+class Framework(Protocol):
+    """What a rule runs on."""
+
+    @property
+    def arrays(self) -> Any:
+        """The library: jax.numpy, torch or numpy."""
+
+    def call(self, function: str, *inputs: Array) -> Arrays:
+        """The outputs of a generated function, with theta_b where the caller gave it and the function takes it. Leading axes
+        broadcast, those of theta_b too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How one generated function is differentiated.
+
+    along       (framework, inputs, tangents, dtheta) to the tangents of all outputs; a tangent of an input or output along
+                nq has nv entries. dtheta: (..., l), or None where theta_b does not change
+    back        (framework, inputs, cotangents, by_theta) to the gradients of the weighted outputs by each input, and by
+                theta_b (..., l) if `by_theta`, else None. Gradients have the leading axes of the states
+    parameters  whether there are derivatives by theta_b
+    constant    names of inputs by which there are none: their tangents are not read, their gradients are None
+    """
+
+    along: Callable[[Framework, Arrays, Arrays, Array | None], Arrays]
+    back: Callable[[Framework, Arrays, Arrays, bool], tuple[Arrays, Array | None]]
+    parameters: bool = False
+    constant: tuple[str, ...] = ()
+
+
+def rule_of(function: str) -> Rule | None:
+    """How a generated function is differentiated; None if there is no way."""
+    if f"{function}_vjp" in SIGNATURES and f"{function}_jvp" in SIGNATURES:
+        return _gradient(function)
+    if "A" in (output.name for output in _outputs(f"{function}_derivatives")):
+        return _step(function)
+    return _OTHERS.get(function)
+
+
+def require_rule(function: str) -> Rule:
+    """How a generated function is differentiated; ArgumentError, which names it, if there is no way."""
+    rule = rule_of(function)
+    if rule is None:
+        known = ", ".join(name for name in SIGNATURES if rule_of(name))
+        what = f"{function} has no derivatives"
+        for ending in ("_vjp", "_jvp", "_vjp_parameters"):
+            if function.endswith(ending):
+                what = f"{function.removesuffix(ending)} has no second derivatives"
+        raise ArgumentError(what, f"these functions have first derivatives: {known}")
+    return rule
+
+
+def refuse_constant(function: str, given: str) -> ArgumentError:
+    """The error of a derivative by an input, or by theta_b, that a function's rule does not have."""
+    if given == "theta_b":
+        known = ", ".join(name for name in SIGNATURES if (rule := rule_of(name)) and rule.parameters)
+        return ArgumentError(f"{function} has no derivative by theta_b", f"these functions have one: {known}")
+    return ArgumentError(
+        f"{function} has no derivative by {given}",
+        f"keep {given} constant, or write the step with forward_dynamics and integrate",
+    )
+
+
+def _outputs(function: str) -> tuple[Any, ...]:
+    known: Signature | None = SIGNATURES.get(function)
+    return () if known is None else known.outputs
+
+
+def _weighted(f: Framework, weights: Array, matrix: Array) -> Array:
+    """weights^T matrix, state by state."""
+    return f.arrays.einsum("...i,...ij->...j", weights, matrix)
+
+
+def _times(f: Framework, matrix: Array, vector: Array) -> Array:
+    """matrix vector, state by state."""
+    return f.arrays.einsum("...ij,...j->...i", matrix, vector)
+
+
+def _gradient(name: str) -> Rule:
+    """Of inverse and forward dynamics, which have functions for both modes. Torques are linear in theta_b: the regressor
+    gives their change, and at fixed torques accelerations change as by the opposite torques."""
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        if name == "inverse_dynamics":
+            (found,) = f.call(f"{name}_jvp", *inputs, *tangents)[1:]
+            if dtheta is not None:
+                found = found + _times(f, f.call("regressor", *inputs)[0], dtheta)
+            return (found,)
+        if dtheta is not None:
+            (qdd,) = f.call(name, *inputs)
+            (regressor,) = f.call("regressor", *inputs[:2], qdd)
+            tangents = (*tangents[:2], tangents[2] - _times(f, regressor, dtheta))
+        return f.call(f"{name}_jvp", *inputs, *tangents)[1:]
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        called = f"{name}_vjp_parameters" if by_theta else f"{name}_vjp"
+        _, *found = f.call(called, *inputs, *cotangents)
+        return tuple(found[:3]), found[3] if by_theta else None
+
+    return Rule(along, back, parameters=True)
+
+
+def _step(name: str) -> Rule:
+    """Of a step in time, from the matrices A by (q, qd) and B by tau."""
+    jacobians = f"{name}_derivatives"
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        *_, a, b = f.call(jacobians, *inputs)
+        dq, dqd, dtau, _ = tangents
+        moved = _times(f, a, f.arrays.concatenate((dq, dqd), -1)) + _times(f, b, dtau)
+        nv = dqd.shape[-1]
+        return moved[..., :nv], moved[..., nv:]
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        *_, a, b = f.call(jacobians, *inputs)
+        weights, nv = f.arrays.concatenate(cotangents, -1), cotangents[1].shape[-1]
+        by_state = _weighted(f, weights, a)
+        return (by_state[..., :nv], by_state[..., nv:], _weighted(f, weights, b), None), None
+
+    return Rule(along, back, constant=("dt",))
+
+
+INVERSE, FORWARD = _gradient("inverse_dynamics"), _gradient("forward_dynamics")
+
+
+def _still(f: Framework, inputs: Arrays, like: Array) -> Arrays:
+    """q, qd and qdd of torques without acceleration: qd is zero where it is not given. `like` has nv entries."""
+    q, *qd = inputs
+    zero = f.arrays.zeros_like(like)
+    return (q, *(qd or [zero]), zero)
+
+
+def _bias() -> Rule:
+    """Of gravity(q) and nonlinear_effects(q, qd): inverse dynamics at zero rates, or without accelerations."""
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        like = tangents[0]
+        return INVERSE.along(f, _still(f, inputs, like), _still(f, tangents, like), dtheta)
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        found, theta = INVERSE.back(f, _still(f, inputs, cotangents[0]), cotangents, by_theta)
+        return found[: len(inputs)], theta
+
+    return Rule(along, back, parameters=True)
+
+
+def _columns(base: Rule) -> Rule:
+    """Of M(q) or its inverse, which is symmetric: column j is inverse or forward dynamics at rest with unit acceleration or
+    torque j, less those with none. The columns are a leading axis of the calls."""
+
+    def unit(f: Framework, q: Array, like: Array) -> tuple[Arrays, Arrays]:
+        nv, zero = like.shape[-1], f.arrays.zeros_like(like)
+        each = f.arrays.eye(nv, dtype=like.dtype).reshape(nv, *(1,) * (like.ndim - 1), nv)
+        units = f.arrays.broadcast_to(each, (nv, *like.shape))
+        return (q, zero, units), (q, zero, zero)
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        (dq,) = tangents
+        zero = f.arrays.zeros_like(dq)
+        parts = (base.along(f, states, (dq, zero, zero), dtheta)[0] for states in unit(f, inputs[0], dq))
+        columns, none = parts
+        return (f.arrays.moveaxis(columns - none, 0, -1),)
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        weights = f.arrays.moveaxis(cotangents[0], -1, 0)
+        whole = weights.sum(0)
+        units, none = unit(f, inputs[0], whole)
+        (more, *_), theta = base.back(f, units, (weights,), by_theta)
+        (less, *_), other = base.back(f, none, (whole,), by_theta)
+        by_q = more.sum(0) - less
+        return (by_q,), None if theta is None or other is None else theta.sum(0) - other
+
+    return Rule(along, back, parameters=True)
+
+
+def _kinetic() -> Rule:
+    """Of T = qd . M qd / 2, where M qd are the torques at rest with the accelerations qd, less those without."""
+
+    def slopes(f: Framework, inputs: Arrays, by_theta: bool) -> tuple[Array, Array, Array | None]:
+        q, qd = inputs
+        zero = f.arrays.zeros_like(qd)
+        called = "inverse_dynamics_vjp_parameters" if by_theta else "inverse_dynamics_vjp"
+        more, less = f.call(called, q, zero, qd, qd), f.call(called, q, zero, zero, qd)
+        by_theta_b = 0.5 * (more[-1] - less[-1]) if by_theta else None
+        return 0.5 * (more[1] - less[1]), more[0] - less[0], by_theta_b
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        by_q, by_qd, theta = slopes(f, inputs, dtheta is not None)
+        found = (by_q * tangents[0]).sum(-1) + (by_qd * tangents[1]).sum(-1)
+        return (found if theta is None else found + (theta * dtheta).sum(-1),)
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        by_q, by_qd, theta = slopes(f, inputs, by_theta)
+        weight = cotangents[0][..., None]
+        return (weight * by_q, weight * by_qd), None if theta is None else weight * theta
+
+    return Rule(along, back, parameters=True)
+
+
+def _jacobian(function: str, is_scalar: bool = False) -> Rule:
+    """Of a function of q whose Jacobian, or gradient, another function is."""
+
+    def jacobian(f: Framework, inputs: Arrays) -> Array:
+        (found,) = f.call(function, *inputs)
+        return found[..., None, :] if is_scalar else found
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        found = _times(f, jacobian(f, inputs), tangents[0])
+        return (found[..., 0] if is_scalar else found,)
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        weights = cotangents[0][..., None] if is_scalar else cotangents[0]
+        return (_weighted(f, weights, jacobian(f, inputs)),), None
+
+    return Rule(along, back)
+
+
+def _poses() -> Rule:
+    """Of forward kinematics, by the frames' Jacobian: an axis of a frame that turns at w moves at w x axis."""
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        (jacobian,) = f.call("frame_jacobian", *inputs)
+        _, rotation = f.call("forward_kinematics", *inputs)
+        moved = f.arrays.einsum("...fij,...j->...fi", jacobian, tangents[0])
+        axes = f.arrays.swapaxes(rotation, -1, -2)
+        turned = f.arrays.linalg.cross(f.arrays.broadcast_to(moved[..., None, 3:], axes.shape), axes)
+        return moved[..., :3], f.arrays.swapaxes(turned, -1, -2)
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        (jacobian,) = f.call("frame_jacobian", *inputs)
+        _, rotation = f.call("forward_kinematics", *inputs)
+        axes, weights = (f.arrays.swapaxes(each, -1, -2) for each in (rotation, cotangents[1]))
+        moments = f.arrays.linalg.cross(axes, weights).sum(-2)
+        wrenches = f.arrays.concatenate((cotangents[0], moments), -1)
+        return (f.arrays.einsum("...fi,...fij->...j", wrenches, jacobian),), None
+
+    return Rule(along, back)
+
+
+_OTHERS = {
+    "gravity": _bias(),
+    "nonlinear_effects": _bias(),
+    "mass_matrix": _columns(INVERSE),
+    "mass_matrix_inverse": _columns(FORWARD),
+    "kinetic_energy": _kinetic(),
+    "potential_energy": _jacobian("gravity", is_scalar=True),
+    "centre_of_mass": _jacobian("com_jacobian"),
+    "forward_kinematics": _poses(),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """The maps between the nq entries of q and the nv entries of tangents, for the joints of one robot in a row.
+
+    Arrays of one call are (..., nq) or (..., nv), with the same leading axes.
+
+    arrays  the library: jax.numpy, torch or numpy
+    joints  types of the joints that have coordinates
+    """
+
+    arrays: Any
+    joints: tuple[JointType, ...]
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, arrays: Any) -> Coordinates:
+        """Those of a robot's own joints."""
+        return cls(arrays, tuple(mechanism.joints[i].type for i in mechanism.own_joints))
+
+    @property
+    def are_plain(self) -> bool:
+        """Whether every joint has one coordinate: then q is its own tangent, and all maps are the identity."""
+        return all(joint.about_z for joint in self.joints)
+
+    def normalized(self, q: Array) -> Array:
+        """q with its quaternions, or cosines and sines, of length one; NaN where such a length is zero."""
+        return self._made([joint.restored(here) for joint, here in self._parts(q)], q)
+
+    def tangent(self, q: Array, moved: Array) -> Array:
+        """(..., nv) the tangent along which q moves while its entries move by `moved`, (..., nq)."""
+        return self._made([joint.tangent(here, own) for joint, here, own in self._pairs(q, moved)], q)
+
+    def gradient(self, q: Array, by_tangent: Array) -> Array:
+        """(..., nq) the derivatives by the entries of q of what has the derivatives (..., nv) along the tangent."""
+        found = []
+        for joint, here, own in self._pairs(q, by_tangent, rates=True):
+            for k in range(joint.nq):
+                moved = [1.0 if i == k else 0.0 for i in range(joint.nq)]
+                found.append([_inner(joint.tangent(here, moved), own)])
+        return self._made(found, q)
+
+    def rates(self, q: Array, v: Array) -> Array:
+        """(..., nq) how the entries of q, of length one, move along the tangent v, (..., nv)."""
+        return self._made(
+            [j.coordinate_rates(here, own) for j, here, own in self._pairs(q, v, rates=True)], q
+        )
+
+    def pulled_back(self, q: Array, gradient: Array) -> Array:
+        """(..., nv) the derivatives along the tangent of what has these derivatives (..., nq) by the entries of q."""
+        found = []
+        for joint, here, own in self._pairs(q, gradient):
+            for k in range(joint.nv):
+                rates = [1.0 if i == k else 0.0 for i in range(joint.nv)]
+                found.append([_inner(joint.coordinate_rates(here, rates), own)])
+        return self._made(found, q)
+
+    def integrated(self, q: Array, v: Array) -> Array:
+        """q after constant rates v for one second, as the generated function `integrate`."""
+        return self._made([j.integrated(here, own) for j, here, own in self._pairs(q, v, rates=True)], q)
+
+    def difference(self, q0: Array, q1: Array) -> Array:
+        """The constant rates that lead from q0 to q1 in one second, as the generated function `difference`."""
+        return self._made([joint.difference(here, there) for joint, here, there in self._pairs(q0, q1)], q0)
+
+    def _parts(self, values: Array, rates: bool = False) -> Iterator[tuple[JointType, list[_Entry]]]:
+        """Joint by joint the entries that belong to it, (..., 1) each. Joints of one coordinate in a row come together, as
+        one joint whose entry is (..., k)."""
+        at = 0
+        for is_plain, joints in groupby(self.joints, lambda joint: joint.about_z):
+            own = tuple(joints)
+            for joint in own[:1] if is_plain else own:
+                count = len(own) if is_plain else joint.nv if rates else joint.nq
+                size = count if is_plain else 1
+                starts = range(at, at + count, size)
+                yield joint, [_Entry(values[..., k : k + size], self.arrays) for k in starts]
+                at += count
+
+    def _pairs(self, q: Array, other: Array, rates: bool = False) -> Iterator[tuple[JointType, Any, Any]]:
+        parts = zip(self._parts(q), self._parts(other, rates), strict=True)
+        return ((joint, here, own) for (joint, here), (_, own) in parts)
+
+    def _made(self, parts: Sequence[Sequence[Any]], like: Array) -> Array:
+        """The entries as the last axis of one array."""
+        zero = self.arrays.zeros_like(like[..., :1])
+        values = [x.value if isinstance(x, _Entry) else zero + x for part in parts for x in part]
+        return self.arrays.concatenate(values, -1)
+
+
+def _inner(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Entry:
+    """Entries of q or of a tangent, (..., k), as the abstract scalar that joint types compute with."""
+
+    value: Array
+    arrays: Any
+
+    def root(self) -> _Entry:
+        return _Entry(self.arrays.sqrt(self.value), self.arrays)
+
+    def sincos(self) -> tuple[_Entry, _Entry]:
+        sine, cosine = self.arrays.sin(self.value), self.arrays.cos(self.value)
+        return _Entry(sine, self.arrays), _Entry(cosine, self.arrays)
+
+    def __add__(self, other: Any) -> _Entry:
+        return _Entry(self.value + _plain(other), self.arrays)
+
+    def __sub__(self, other: Any) -> _Entry:
+        return _Entry(self.value - _plain(other), self.arrays)
+
+    def __rsub__(self, other: Any) -> _Entry:
+        return _Entry(_plain(other) - self.value, self.arrays)
+
+    def __mul__(self, other: Any) -> _Entry:
+        return _Entry(self.value * _plain(other), self.arrays)
+
+    def __truediv__(self, other: Any) -> _Entry:
+        return _Entry(self.value / _plain(other), self.arrays)
+
+    def __rtruediv__(self, other: Any) -> _Entry:
+        return _Entry(_plain(other) / self.value, self.arrays)
+
+    def __neg__(self) -> _Entry:
+        return _Entry(-self.value, self.arrays)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def _plain(value: Any) -> Any:
+    return value.value if isinstance(value, _Entry) else value

@@ -1,0 +1,60 @@
+"""Functions of compiled robots as custom calls of XLA on a CPU: psdmc/frameworks/xla_call.c, compiled once a machine."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from functools import cache
+from pathlib import Path
+
+import jax
+import jaxlib
+
+from psdmc.errors import InternalError, ToolchainError
+from psdmc.toolchain.direct_calls import MOST_ARRAYS, called_from
+
+SOURCE = Path(__file__).with_name("xla_call.c")
+PRODUCT = "psdmc_xla_call.so"
+TARGET = "psdmc_call"
+"""Name of the custom call, for all functions of all robots."""
+
+FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared")
+BITS = 63
+"""Of a function's number, which C compares as a signed one."""
+
+
+def number_of(key: str) -> int:
+    """The number that stands for a function in programs of XLA, the same in each process."""
+    return int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big") >> (64 - BITS)
+
+
+def add(
+    number: int, address: int, can_fail: bool, is_single: bool, theta: int | None, sizes: tuple[int, ...]
+) -> None:
+    """Let XLA call a batch function, whose library must stay open, by a number.
+
+    theta  the place of theta_b among the arrays
+    sizes  entries of each array for one state, of theta_b all: inputs, theta_b, outputs
+    """
+    place, counts = -1 if theta is None else theta, (ctypes.c_int64 * len(sizes))(*sizes)
+    if not _library().psdmc_xla_add(
+        ctypes.c_int64(number), ctypes.c_size_t(address), can_fail, is_single, len(sizes), place, counts
+    ):
+        raise InternalError(
+            f"a function of {len(sizes)} arrays, of {MOST_ARRAYS} at most, or no memory for one"
+        )
+
+
+@cache
+def _library() -> ctypes.PyDLL:
+    words = (*FLAGS, f"-I{jax.ffi.include_dir()}")
+    path = called_from(SOURCE, PRODUCT, words, ("calls from XLA", jaxlib.__version__))
+    try:
+        library = ctypes.PyDLL(str(path))  # its calls hold the GIL, so they come one at a time
+    except OSError as error:
+        raise ToolchainError(
+            f"the library that XLA calls cannot be loaded: {error}", "set CC to a compiler that works here"
+        ) from error
+    capsule = jax.ffi.pycapsule(library.psdmc_xla_call)
+    jax.ffi.register_ffi_target(TARGET, capsule, platform="cpu")
+    return library
