@@ -63,7 +63,11 @@ def jax_robot(
             'call jax.config.update("jax_enable_x64", True) first, or give real="float32"',
         )
     key = repr((found.content_hash, lowering, real, trig, target))
-    return _MADE.setdefault(key, JaxRobot(compiled, key, Coordinates.of(found.mechanism, jnp)))
+    robot, chain = compiled, found.mechanism
+    sizes = Sizes(
+        robot.n, robot.nq, robot.nv, robot.l, len(chain.frames), rows_of_contacts=chain.rows_of_contacts
+    )
+    return _MADE.setdefault(key, JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes))
 
 
 class JaxRobot:
@@ -77,11 +81,13 @@ class JaxRobot:
     its nq entries, and zero along the quaternion.
     """
 
-    def __init__(self, compiled: CompiledRobot[Any], key: str, coordinates: Coordinates) -> None:
+    def __init__(
+        self, compiled: CompiledRobot[Any], key: str, coordinates: Coordinates, sizes: Sizes
+    ) -> None:
         self.compiled = compiled
         """The same robot for NumPy arrays, with the names, sizes, limits and theta_b of the robot."""
         self._key = key
-        self._coordinates = coordinates
+        self._coordinates, self._sizes = coordinates, sizes
         self._kernels: dict[tuple[str, bool], Kernel] = {}
 
     if TYPE_CHECKING:
@@ -135,11 +141,6 @@ class JaxRobot:
     def _kernel(self, function: Signature, theta: bool) -> Kernel:
         """The same object for the same function: JAX compares the parameters of its primitives."""
         return self._kernels.setdefault((function.name, theta), Kernel(self, function, theta))
-
-    @cached_property
-    def _sizes(self) -> Sizes:
-        robot = self.compiled
-        return Sizes(robot.n, robot.nq, robot.nv, robot.l, len(robot.frame_names))
 
 
 THETA = Quantity("theta_b", ("l",))

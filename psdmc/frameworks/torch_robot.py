@@ -122,8 +122,9 @@ class TorchRobot:
 
     def shape(self, quantity: Quantity) -> tuple[int, ...]:
         """Return the axes of an input or output of one state."""
-        model = self.model
-        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+        model, chain = self.model, self.model.mechanism
+        rows = chain.rows_of_contacts
+        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=rows)
         return sizes.shape(quantity.axes)
 
     def operator(self, function: str) -> Any:

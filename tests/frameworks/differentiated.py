@@ -120,6 +120,15 @@ def differentiated(name: str) -> Subject:
     return Subject(derive_model(robot.mechanism, expand=False), reference(robot))
 
 
+def on_its_sole() -> DynamicsModel:
+    """The hopper, whose foot is a surface that touches the ground: a contact of six rows."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "hopper.urdf"
+        path.write_text(HOPPER)
+        robot = load_robot(path, floating=True, contacts=["foot:6"])
+    return derive_model(robot.mechanism, expand=False)
+
+
 def near(found: object, expected: Array, limit: float) -> bool:
     """Whether the largest error is within a share of the largest entry."""
     error = np.abs(np.asarray(found) - expected).max()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from differentiated import QUICK, ROBOTS, RULED, Array, differentiated, near
+from differentiated import QUICK, ROBOTS, RULED, Array, differentiated, near, on_its_sole
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
@@ -130,6 +130,12 @@ def test_functions_without_derivatives_are_called_too() -> None:
     for name in ("frame_jacobian", "mass_matrix_packed", "regressor", "neutral", "integrate", "difference"):
         inputs, _ = differentiated("hopper").drawn(SIGNATURES[name], COUNT)
         assert near(jax.jit(getattr(robot, name))(*inputs), getattr(numpy, name)(*inputs), 1e-13), name
+
+
+def test_a_contact_of_six_rows() -> None:
+    robot, q = psdmc.jax(on_its_sole()), state("hopper")[0]
+    assert robot.contact_jacobian(q).shape == (6, 8)
+    assert near(robot.contact_jacobian(q), robot.compiled.contact_jacobian(q), 1e-13)
 
 
 def test_gradients_by_theta_b() -> None:

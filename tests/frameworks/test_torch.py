@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from differentiated import QUICK, ROBOTS, RULED, Array, differentiated, near
+from differentiated import QUICK, ROBOTS, RULED, Array, differentiated, near, on_its_sole
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
@@ -364,3 +364,11 @@ def test_a_robot_is_one_object() -> None:
     assert same(robot.theta_b, differentiated("scara").model.theta_b, 0.0)
     with pytest.raises(InputError, match="no such file"):
         psdmc.torch("nothing.npz")
+
+
+def test_a_contact_of_six_rows() -> None:
+    model = on_its_sole()
+    robot, q = psdmc.torch(model), torch.tensor(model.neutral())
+    found = robot.contact_jacobian(q)
+    assert found.shape == (6, 8)
+    assert near(found, robot.compiled().contact_jacobian(q.numpy()), 1e-13)
