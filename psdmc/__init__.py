@@ -11,7 +11,9 @@ from psdmc.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from psdmc.calibration.api import calibrate
+    from psdmc.calibration.comparison import compare
     from psdmc.calibration.payload import identify_payload
+    from psdmc.calibration.validation import validate
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
@@ -30,6 +32,7 @@ __all__ = [
     "ToolchainError",
     "__version__",
     "calibrate",
+    "compare",
     "compile",
     "derive",
     "emit_c",
@@ -37,6 +40,7 @@ __all__ = [
     "identify_payload",
     "load",
     "save",
+    "validate",
 ]
 
 _MODULES = {"CompiledRobot": "psdmc.toolchain.call"}
@@ -44,11 +48,13 @@ _MODULES |= {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
 _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
 _MODULES |= {
     "calibrate": "psdmc.calibration.api",
+    "compare": "psdmc.calibration.comparison",
     "export_urdf": "psdmc.export.export_urdf",
     "identify_payload": "psdmc.calibration.payload",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
+    "validate": "psdmc.calibration.validation",
 }
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from psdmc.calibration.campaign_file import plain_logs, read_campaign
@@ -27,7 +26,6 @@ from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.quality import qualities
 from psdmc.calibration.identify.steps import judged
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
@@ -45,7 +43,6 @@ from psdmc.errors import InputError
 from psdmc.model.calibrated import (
     NOT_USABLE_STATUS,
     LogUsed,
-    OrInf,
     OrNaN,
     Remark,
     StepQuality,
@@ -53,7 +50,7 @@ from psdmc.model.calibrated import (
 )
 from psdmc.model.calibrated_json import plain
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.grounds import Ground
+from psdmc.model.grounds import Ground, OrInf
 from psdmc.model.load import model_of
 from psdmc.model.payload import load_map
 from psdmc.progress import Progress, silent
@@ -66,7 +63,7 @@ CHANCE = 1e-3
 logs."""
 NOTICED = 0.5
 """Torque of all changes, as a share of the error that remains, from which they count: some joint's RMS error is then larger
-by an eighth than that of a new fit, on samples that this fit did not use. A smaller change, however certain, does not matter."""
+by an eighth than that of a new fit, on samples that this fit did not use. A smaller change does not matter."""
 MINOR = 0.1
 """The same share for one of several changes to be named."""
 SURE = 3.0
@@ -77,7 +74,15 @@ RESOLVED = 1e-3
 """Share of a load's mass that may be seen as something else."""
 BINS = 10
 """Of speed and time, in which errors are averaged."""
-SAID = ("perhaps_saturated", "late", "sampled_slowly", "few_samples", "starved", "hardly_moving", "lacking_effect")
+SAID = (
+    "perhaps_saturated",
+    "late",
+    "sampled_slowly",
+    "few_samples",
+    "starved",
+    "hardly_moving",
+    "lacking_effect",
+)
 """Doubts of a verdict on a calibration that also matter to a validation."""
 
 
@@ -156,9 +161,7 @@ class LoadChange:
     @property
     def words(self) -> str:
         place = ", ".join("not seen" if math.isnan(value) else f"{value:.3f}" for value in self.com)
-        return (
-            f"a load of {self.mass:+.3g} +- {self.mass_std:.2g} kg on {self.frame!r}, its centre of mass at ({place}) m"
-        )
+        return f"a load of {self.mass:+.3g} +- {self.mass_std:.2g} kg on {self.frame!r}, its centre of mass at ({place}) m"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,11 +210,14 @@ class Validation:
 
     def as_json(self) -> dict[str, Any]:
         """Plain values for a user; numbers that are not finite become null."""
-        values = asdict(replace(self, quality=None)) | {"exit_status": self.exit_status, "schema": 1}
+        values = asdict(replace(self, quality=None)) | {"exit_status": self.exit_status}
         del values["quality"]
         for row, change in zip(values["changes"], self.changes, strict=True):
             row["sigmas"] = change.sigmas
-        codes = {name: [getattr(text, "code", "") for text in getattr(self, name)] for name in ("reasons", "doubts")}
+        codes = {
+            name: [getattr(text, "code", "") for text in getattr(self, name)]
+            for name in ("reasons", "doubts")
+        }
         found: dict[str, Any] = plain(values | {"codes": codes})
         return found
 
@@ -244,7 +250,7 @@ def validate(
     known = reread(model) if isinstance(model, DynamicsModel) else model_of(model)
     found = delivered(known)
     progress("reading logs")
-    read, constants = _logs(found, logs, naming or LogNaming(), progress)
+    read, constants = opened_logs(found, logs, naming or LogNaming(), progress)
     given = torque_constants or constants or found.constants
     try:
         motors = motors_of_logs(
@@ -257,7 +263,7 @@ def validate(
         return Validation(known.mechanism.name, "log not usable", (reason,), logs=logs_used(read))
 
 
-def _logs(
+def opened_logs(
     found: Delivered, given: str | Path | Sequence[str | Path], naming: LogNaming, progress: Progress
 ) -> tuple[list[AnyLog], Mapping[str, float]]:
     """The logs, and a description's torque constants."""
@@ -269,7 +275,9 @@ def _logs(
         if plain_ones is None:
             own = [run.log for run in read_campaign(campaign, names).inertial if run.tool is None]
             if not own:
-                raise InputError(f"{campaign}: no exciting motion without a load", "give logs, not the campaign")
+                raise InputError(
+                    f"{campaign}: no exciting motion without a load", "give logs, not the campaign"
+                )
             return list(own), {}
         paths = list(plain_ones)
     naming.require_bag(paths)
@@ -288,13 +296,14 @@ def _validated(
     record = with_data(linear_record(model, fit, fit.estimate.values, options), logs)
     record = judged_record(record, logs, check=options.check)
     own = verdict_of(
-        with_verdict_on_logs(
-            record, model, regressor, logs, motors, options.filter, VerdictOptions()
-        )
+        with_verdict_on_logs(record, model, regressor, logs, motors, options.filter, VerdictOptions())
     )
     parts = [predicted_rows(found, log, options.check, motors) for log in logs]
     rows = PredictedRows(
-        *(np.concatenate([getattr(p, name) for p in parts]) for name in ("time", "qd", "measured", "predicted"))
+        *(
+            np.concatenate([getattr(p, name) for p in parts])
+            for name in ("time", "qd", "measured", "predicted")
+        )
     )
     test = _Test(found, fit, rows)
     refitted = [figures.r2 for figures in own.joints]
@@ -357,19 +366,21 @@ def _explained(result: Validation, test: _Test, refitted: Sequence[float]) -> Va
     return replace(result, word=word, load=why.load, named=why.named, left=why.left)
 
 
-def _doubts(
-    found: Delivered, result: Validation, grounds: Sequence[Ground], test: _Test
-) -> tuple[str, ...]:
+def _doubts(found: Delivered, result: Validation, grounds: Sequence[Ground], test: _Test) -> tuple[str, ...]:
     kept = found.model.calibrated
     assert kept is not None
     doubts = []
     used = {(log.log, log.rows, log.seconds) for log in kept.logs}
     again = [log.log for log in result.logs if (log.log, log.rows, log.seconds) in used]
     if again:
-        text = f"{listed(again)}: looks like a log that the model was calibrated with: validate with another log"
+        text = (
+            f"{listed(again)}: looks like a log that the model was calibrated with: validate with another log"
+        )
         doubts.append(Remark(text, "used_before"))
     if kept.covariance is None:
-        text = "the file has no covariance, so its parameters count as independent: calibrate again to get one"
+        text = (
+            "the file has no covariance, so its parameters count as independent: calibrate again to get one"
+        )
         doubts.append(Remark(text, "no_covariance"))
     if kept.verdict is not None and not kept.verdict.usable:
         doubts.append(Remark("the verdict on the calibration itself is: not usable", "not_usable"))
@@ -470,7 +481,9 @@ class _Test:
         self.effect: Array = np.sqrt(squares / len(residual))
         seen = np.sum(solved.unseen**2, axis=1) < options.unseen_share
         self.std: Array = np.where(seen, np.sqrt(np.diag(together)), np.inf)
-        self.changes = tuple(self._change(k, float(solved.values[k]), float(self.std[k])) for k in range(len(scale)))
+        self.changes = tuple(
+            self._change(k, float(solved.values[k]), float(self.std[k])) for k in range(len(scale))
+        )
 
     @property
     def chance(self) -> float:
@@ -507,7 +520,9 @@ class _Test:
         A load's ten parameters explain more than one value by chance alone, so each parameter has its price.
         """
         price = float(stats.chi2.isf(CHANCE / len(self.std), 1))
-        singles = {k: self.by_value[:, [k]] for k in range(self.by_value.shape[1]) if self.by_value[:, k].any()}
+        singles = {
+            k: self.by_value[:, [k]] for k in range(self.by_value.shape[1]) if self.by_value[:, k].any()
+        }
         onto = self._load_onto_values()
         blocks = dict(singles)
         if onto is not None:
@@ -548,7 +563,9 @@ class _Test:
             return None
         return np.concatenate([onto, np.zeros((self.by_value.shape[1] - model.l, onto.shape[1]))])
 
-    def _delivered(self, blocks: Mapping[int, Array], chosen: Sequence[int], onto: Array | None) -> _Explanation:
+    def _delivered(
+        self, blocks: Mapping[int, Array], chosen: Sequence[int], onto: Array | None
+    ) -> _Explanation:
         whole = np.zeros(self.by_value.shape[1])
         if not chosen:
             return _Explanation(None, (), whole, self.chi2)
@@ -567,7 +584,10 @@ class _Test:
                 continue
             whole[k] += values[own][0]
             change = self._change(k, float(values[own][0]), float(std[own][0]))
-            if np.any(self.effect[:, k] * abs(change.change) > MINOR * self.noise) and abs(change.sigmas) > SURE:
+            if (
+                np.any(self.effect[:, k] * abs(change.change) > MINOR * self.noise)
+                and abs(change.sigmas) > SURE
+            ):
                 named.append(change)
         left = self._left(blocks, chosen)
         return _Explanation(load, tuple(named), whole, float(left @ left))

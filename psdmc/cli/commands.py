@@ -14,6 +14,7 @@ from psdmc.cli.loads import payload
 from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
+from psdmc.cli.validating import compare, validate
 from psdmc.version import psdmc_version
 
 app = typer.Typer(
@@ -54,6 +55,8 @@ COMMANDS = (
     (simulate, "write a campaign's logs from a virtual robot"),
     (calibrate, "identify a model's parameters from logs"),
     (payload, "identify the mass of a load from logs"),
+    (validate, "test a calibrated model on other logs"),
+    (compare, "compare two models of one robot"),
     (export_urdf, "write a model as a robot file"),
     (cache, "show or clear the compile cache"),
     (doctor, "list the programs and packages that psdmc can use"),
