@@ -46,6 +46,7 @@ from psdmc.model.calibrated import (
     OrNaN,
     Remark,
     StepQuality,
+    Verdict,
     by_joint,
 )
 from psdmc.model.calibrated_json import plain
@@ -70,6 +71,8 @@ SURE = 3.0
 """Standard deviations that a named change has at least."""
 MOST_NAMED = 8
 """Changes that an explanation may have. More than that is another robot, not a worn one."""
+MOST_WITH_LOAD = 2
+"""Further changes beside a load whose torques look like another unit's."""
 RESOLVED = 1e-3
 """Share of a load's mass that may be seen as something else."""
 BINS = 10
@@ -315,7 +318,6 @@ def _validated(
         chi2=test.chi2,
         freedom=test.freedom,
         chance=test.chance,
-        left=test.chi2,
         logs=logs_used(logs),
         r2_by_log={
             log.name: tuple(q.r2 for q in qualities(p.measured, p.predicted))
@@ -325,45 +327,45 @@ def _validated(
             "All", chain.joint_names, rows.time, rows.measured, rows.predicted, np.zeros(len(rows.time), bool)
         ),
     )
-    against = [ground for ground in own.against if not _is_harmless(ground, result.joints)]
+    has_changed = test.chance < CHANCE and test.noticed
+    why = test.explanation() if has_changed else _Explanation(np.zeros(test.size), left=test.chi2)
+    explained = qualities(rows.measured, rows.predicted + test.torque(why.values))
+    r2 = dict(zip(chain.joint_names, (q.r2 for q in explained), strict=True))
+    against = [ground for ground in own.against if not _is_harmless(ground, own, r2, why)]
     harmless = [ground for ground in own.against if ground not in against]
-    if against:
-        reasons = tuple(Remark(ground.words, ground.code) for ground in (*against, *own.suspected))
-        result = replace(result, word="log not usable", reasons=reasons)
-    else:
-        result = _explained(result, test, refitted)
-    return replace(result, doubts=_doubts(found, result, [*harmless, *own.doubted], test))
-
-
-def _is_harmless(ground: Ground, joints: Sequence[JointError]) -> bool:
-    """Whether a log that is too short or too odd for a new fit is good enough for a test, as the file predicts it."""
-    limits = VerdictOptions()
-    if ground.code == "starved":
-        return all(joint.r2 >= limits.fair_r2 for joint in joints)
-    low = [item["joint"] for item in ground.values.get("items", ())] if ground.code == "low_r2" else []
-    return bool(low) and all(joint.r2 >= limits.poor_r2 for joint in joints if joint.joint in low)
-
-
-def _explained(result: Validation, test: _Test, refitted: Sequence[float]) -> Validation:
-    """The result with what the changes of a robot explain, if it has changed."""
-    if not (result.chance < CHANCE and test.noticed):
-        return result
-    why = test.explanation()
-    r2 = [q.r2 for q in qualities(test.rows.measured, test.rows.predicted + test.torque(why.values))]
-    limits = VerdictOptions()
-    lost = [
-        error.joint
-        for error, own, best in zip(result.joints, r2, refitted, strict=True)
-        if own < limits.poor_r2 and best >= limits.fair_r2
+    reasons = [
+        Remark(ground.words, ground.code) for ground in (*against, *(own.suspected if against else ()))
     ]
-    if lost:
+    if not reasons and any(
+        low < VerdictOptions().poor_r2 <= best for low, best in zip(r2.values(), refitted, strict=True)
+    ):
         text = (
-            f"the model does not predict joint(s) {listed(lost)}, and no {MOST_NAMED} changed values or a load explain "
-            "why: is the log another robot's, or has the robot been rebuilt? If so, calibrate again"
+            f"no {MOST_NAMED} changed values and no load explain why the model does not predict the log: is the log another "
+            "robot's, or has the robot been rebuilt? If so, calibrate again"
         )
-        return replace(result, word="log not usable", reasons=(Remark(text, "another_robot"),))
-    word: Word = "drifted" if why.load is None else "changed load"
-    return replace(result, word=word, load=why.load, named=why.named, left=why.left)
+        reasons = [Remark(text, "another_robot")]
+    result = replace(result, left=why.left)
+    doubts = _doubts(found, result, [*harmless, *own.doubted], test)
+    if reasons:
+        return replace(result, word="log not usable", reasons=tuple(reasons), doubts=doubts)
+    if has_changed:
+        word: Word = "drifted" if why.load is None else "changed load"
+        result = replace(result, word=word, load=why.load, named=why.named)
+    return replace(result, doubts=doubts)
+
+
+def _is_harmless(ground: Ground, own: Verdict, r2: Mapping[str, float], why: _Explanation) -> bool:
+    """Whether what makes a log unfit for a calibration leaves it fit for a test: few samples, if the file and the explained
+    changes predict them (r2, by joint), and torques of an odd size, if a load explains them."""
+    limits = VerdictOptions()
+    fair = all(value >= limits.fair_r2 for value in r2.values())
+    if ground.code in ("wrong_gains", "contradicted"):
+        heavy = all(suspect.code == "other_unit" for suspect in own.suspected)
+        return fair and heavy and why.load is not None and why.chosen <= 1 + MOST_WITH_LOAD
+    low = [item["joint"] for item in ground.values.get("items", ())] if ground.code == "low_r2" else []
+    return (fair and ground.code == "starved") or (
+        bool(low) and all(r2[joint] >= limits.poor_r2 for joint in low)
+    )
 
 
 def _doubts(found: Delivered, result: Validation, grounds: Sequence[Ground], test: _Test) -> tuple[str, ...]:
@@ -384,7 +386,10 @@ def _doubts(found: Delivered, result: Validation, grounds: Sequence[Ground], tes
         doubts.append(Remark(text, "no_covariance"))
     if kept.verdict is not None and not kept.verdict.usable:
         doubts.append(Remark("the verdict on the calibration itself is: not usable", "not_usable"))
-    if not result.reasons and result.chance < CHANCE and not test.noticed:
+    if test.noticed and result.chance < CHANCE and stats.chi2.sf(result.left, result.freedom) < CHANCE:
+        text = f"the changes named leave a chi-square of {result.left:.4g}: they do not explain all that is different"
+        doubts.append(Remark(text, "unexplained"))
+    if result.chance < CHANCE and not test.noticed:
         text = (
             f"values differ significantly (chi-square {result.chi2:.4g} of {result.freedom} degrees of freedom), but the "
             "torque of these differences is small compared with the error that a new calibration would leave"
@@ -442,12 +447,14 @@ def _bins(x: Array, error: Array) -> tuple[Bin, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Explanation:
-    """A load and changes of single values; values (u,) of the whole vector, left: the chi-square that remains."""
+    """A load and changes of single values, `chosen` of them; values (u,) of the whole vector; left: the chi-square that
+    remains."""
 
-    load: LoadChange | None
-    named: tuple[Change, ...]
     values: Array
-    left: float
+    load: LoadChange | None = None
+    named: tuple[Change, ...] = ()
+    left: OrNaN = float("nan")
+    chosen: int = 0
 
 
 class _Test:
@@ -470,15 +477,15 @@ class _Test:
         hidden = solved.unseen.shape[1]
         shown = np.linalg.qr(solved.unseen, mode="complete")[0][:, hidden:]
         lower = np.linalg.cholesky(shown.T @ (together / np.outer(scale, scale)) @ shown)
-        self.by_value: Array = np.linalg.solve(lower, shown.T / scale)
+        self.by_value: Array = np.asarray(np.linalg.solve(lower, shown.T / scale))
         self.white: Array = self.by_value @ solved.values
-        self.chi2, self.freedom = float(self.white @ self.white), len(self.white)
+        self.chi2, self.freedom, self.size = float(self.white @ self.white), len(self.white), len(scale)
         left = residual - self.torque(solved.values)
         self.noise: Array = np.maximum(np.sqrt(np.mean(left**2, axis=0)), np.finfo(float).tiny)
         before, after = (np.mean(part[problem.held_out] ** 2, axis=0) for part in (residual, left))
         self.noticed = bool(np.any(before > (1.0 + NOTICED**2) * after))
         squares = sum(np.sum(block.columns**2, axis=0) for block in problem.rows)
-        self.effect: Array = np.sqrt(squares / len(residual))
+        self.effect: Array = np.asarray(np.sqrt(squares / len(residual)))
         seen = np.sum(solved.unseen**2, axis=1) < options.unseen_share
         self.std: Array = np.where(seen, np.sqrt(np.diag(together)), np.inf)
         self.changes = tuple(
@@ -568,7 +575,7 @@ class _Test:
     ) -> _Explanation:
         whole = np.zeros(self.by_value.shape[1])
         if not chosen:
-            return _Explanation(None, (), whole, self.chi2)
+            return _Explanation(whole, left=self.chi2)
         values, covariance = _solved(_joined(blocks, chosen), self.white)
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         load, named, first = None, [], 0
@@ -590,7 +597,7 @@ class _Test:
             ):
                 named.append(change)
         left = self._left(blocks, chosen)
-        return _Explanation(load, tuple(named), whole, float(left @ left))
+        return _Explanation(whole, load, tuple(named), float(left @ left), len(chosen))
 
 
 LOAD = -2
@@ -606,7 +613,7 @@ def _solved(columns: Array, white: Array) -> tuple[Array, Array]:
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0.0] = 1.0
     inverse = np.linalg.pinv(columns / sizes, rcond=1e-9) / sizes[:, None]
-    return inverse @ white, inverse @ inverse.T
+    return np.asarray(inverse @ white), np.asarray(inverse @ inverse.T)
 
 
 def _resolved(columns: Array, k: int) -> bool:
@@ -636,4 +643,4 @@ def _file_covariance(found: Delivered, fit: LinearResult, solved: Estimate) -> A
         own = np.sqrt(np.diag(kept.covariance))
         missing = np.where(own > 0.0, 0.0, believable[:l])
         covariance[:l, :l] = kept.covariance + np.diag(missing**2)
-    return covariance
+    return np.asarray(covariance)

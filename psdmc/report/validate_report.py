@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -88,17 +89,9 @@ def page_of(found: Validation | Comparison) -> PageView:
 
 def validation_page(found: Validation) -> PageView:
     """What the page of a validation shows."""
-    head = [
-        "Joint",
-        "R²",
-        "RMS error",
-        "Largest",
-        "Moving +",
-        "Moving -",
-        "R² refitted",
-        "RMS [A]",
-        "Largest [A]",
-    ]
+    in_amperes = any(math.isfinite(j.rms_current) for j in found.joints)
+    head = ["Joint", "R²", "RMS error", "Largest", "Moving +", "Moving -", "R² refitted"]
+    head += ["RMS [A]", "Largest [A]"] if in_amperes else []
     errors = [
         [
             *(j.joint, r_squared(j.r2), f"{j.rms:.3g} {j.unit}", f"{j.largest:.3g} {j.unit}"),
