@@ -58,6 +58,7 @@ MENU = {
         "how-to/calibration-log",
         "how-to/springs-and-friction",
         "how-to/priors",
+        "how-to/validate",
         "how-to/reproducible-builds",
         "how-to/troubleshooting",
         "how-to/extending",

@@ -12,7 +12,6 @@ from scipy import stats
 
 from psdmc.calibration.columns.columns import Columns
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.predictor import expansion
 from psdmc.calibration.identify.quality import qualities
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.wording import listed
@@ -164,11 +163,10 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Side:
-    """One of the two: base parameters as a's, (l, l) covariance if known; found: what its calibration found."""
+    """One of the two, with its (l, l) covariance if known; found: what its calibration found."""
 
     name: str
     model: DynamicsModel
-    theta_b: Array
     covariance: Array | None
     found: Delivered | None
 
@@ -197,8 +195,8 @@ def compare(
     first = model_of(a)
     second = _like(first, b)
     require_same_robot(first.mechanism, second.mechanism)
-    own = _side(_name(a, first), first, np.eye(first.l))
-    other = _side(_name(b, second), second, _same_values(first, second))
+    _require_same_base_parameters(first, second)
+    own, other = _side(_name(a, first), first), _side(_name(b, second), second)
     parameters, chi2, freedom = _parameters(first, own, other)
     progress("torques over the workspace")
     both = own.found is not None and other.found is not None
@@ -238,7 +236,7 @@ def _like(first: DynamicsModel, given: DynamicsModel | str | Path) -> DynamicsMo
     return replace(first, mechanism=chain, theta_b=theta_b, calibrated=None)
 
 
-def _side(name: str, model: DynamicsModel, onto: Array) -> _Side:
+def _side(name: str, model: DynamicsModel) -> _Side:
     kept = model.calibrated
     if model.theta_b is None:
         raise InputError(
@@ -250,8 +248,7 @@ def _side(name: str, model: DynamicsModel, onto: Array) -> _Side:
         covariance = kept.covariance
         if covariance is None:
             covariance = np.diag(np.where(np.isfinite(kept.std), kept.std, UNKNOWN) ** 2)
-        covariance = onto @ covariance @ onto.T
-    return _Side(name, model, onto @ model.known_theta_b(), covariance, found)
+    return _Side(name, model, covariance, found)
 
 
 UNKNOWN = 1e6
@@ -325,15 +322,13 @@ def _places(chain: Mechanism) -> list[tuple[Placement, Placement]]:
     return [(place, place @ joint.link_frame) for place, joint in zip(found, chain.joints, strict=True)]
 
 
-def _same_values(a: DynamicsModel, b: DynamicsModel) -> Array:
-    """(l, l) a's base parameters of b's; InputError unless one follows from the other."""
-    onto, back = a.B @ expansion(b), b.B @ expansion(a)
-    if a.l != b.l or np.abs(onto @ back - np.eye(a.l)).max() > SAME_PLACE:
+def _require_same_base_parameters(a: DynamicsModel, b: DynamicsModel) -> None:
+    """InputError unless both number the same base parameters: B in echelon form is the same for the same assumptions."""
+    if a.B.shape != b.B.shape or not np.allclose(a.B, b.B, rtol=SAME_PLACE, atol=SAME_PLACE):
         raise InputError(
-            f"the models have {a.l} and {b.l} base parameters that do not follow from each other",
+            f"the models have other base parameters: {a.l} and {b.l}",
             "derive both with the same --drive-inertia, --assume-zero and --unknown",
         )
-    return np.asarray(onto)
 
 
 # Values
@@ -341,12 +336,13 @@ def _same_values(a: DynamicsModel, b: DynamicsModel) -> Array:
 
 def _parameters(first: DynamicsModel, a: _Side, b: _Side) -> tuple[tuple[Difference, ...], float, int]:
     """Base parameters of both, the chi-square of their differences, and its degrees of freedom."""
+    values = [side.model.known_theta_b() for side in (a, b)]
     known = [side.covariance for side in (a, b) if side.covariance is not None]
     together = sum(known[1:], start=known[0]) if known else np.full((first.l, first.l), np.nan)
     std = np.sqrt(np.diag(together)) if known else np.full(first.l, np.inf)
     rows = tuple(
         Difference(
-            f"theta_b[{k}]", row.equation, row.unit, float(a.theta_b[k]), float(b.theta_b[k]), float(std[k])
+            f"theta_b[{k}]", row.equation, row.unit, float(values[0][k]), float(values[1][k]), float(std[k])
         )
         for k, row in enumerate(first.base_parameters)
     )
@@ -354,9 +350,9 @@ def _parameters(first: DynamicsModel, a: _Side, b: _Side) -> tuple[tuple[Differe
         return rows, float("nan"), 0
     shown = np.flatnonzero(std > 0.0)
     size = std[shown]
-    values, axes = np.linalg.eigh(together[np.ix_(shown, shown)] / np.outer(size, size))
-    kept = values > ROUNDING * values.max(initial=0.0)
-    along = axes[:, kept].T @ ((b.theta_b - a.theta_b)[shown] / size) / np.sqrt(values[kept])
+    variances, axes = np.linalg.eigh(together[np.ix_(shown, shown)] / np.outer(size, size))
+    kept = variances > ROUNDING * variances.max(initial=0.0)
+    along = axes[:, kept].T @ ((values[1] - values[0])[shown] / size) / np.sqrt(variances[kept])
     return rows, float(along @ along), int(kept.sum())
 
 

@@ -524,30 +524,35 @@ class _Test:
     def explanation(self) -> _Explanation:
         """Add the load, or the single value, that explains the most, until no other explains more than chance.
 
-        A load's ten parameters explain more than one value by chance alone, so each parameter has its price.
+        A load has more parameters than a single value, which explain more by chance, so each parameter has its price. But
+        what is mounted on a robot changes sooner than a link: if a load is possible, a base parameter costs as much.
         """
-        price = float(stats.chi2.isf(CHANCE / len(self.std), 1))
-        singles = {
-            k: self.by_value[:, [k]] for k in range(self.by_value.shape[1]) if self.by_value[:, k].any()
-        }
+        price = float(stats.chi2.isf(CHANCE / self.size, 1))
+        blocks = {k: self.by_value[:, [k]] for k in range(self.size) if self.by_value[:, k].any()}
         onto = self._load_onto_values()
-        blocks = dict(singles)
-        if onto is not None:
-            blocks[LOAD] = self.by_value @ onto
+        cost = price
+        if onto is not None and self._mass_is_sure(load := self.by_value @ onto):
+            blocks[LOAD] = load
+            cost = price * float(
+                np.linalg.matrix_rank(load / np.maximum(np.linalg.norm(load, axis=0), 1e-300))
+            )
         chosen: list[int] = []
         while len(chosen) < MOST_NAMED:
             left = self._left(blocks, chosen)
-            best, most = -1, 0.0
-            for k, block in blocks.items():
-                if k in chosen:
-                    continue
-                after = self._left(blocks, [*chosen, k])
-                gain = float(left @ left - after @ after) - block.shape[1] * price
-                if gain > most and (k != LOAD or self._mass_is_sure(block)):
-                    best, most = k, gain
-            if best == -1:
+            links = price if LOAD in chosen else cost
+            gains = {
+                k: left @ left - np.sum(self._left(blocks, [*chosen, k]) ** 2)
+                for k in blocks
+                if k not in chosen
+            }
+            gains = {
+                k: gain - (links if k < self.found.model.l else price)
+                for k, gain in gains.items()
+                if gain > price
+            }
+            if not gains:
                 break
-            chosen.append(best)
+            chosen.append(max(gains, key=lambda k: gains[k]))
         return self._delivered(blocks, chosen, onto)
 
     def _left(self, blocks: Mapping[int, Array], chosen: Sequence[int]) -> Array:
