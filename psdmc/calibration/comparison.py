@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import OrInf
 from psdmc.model.load import ROBOT_FILES, model_of
 from psdmc.progress import Progress, silent
+from psdmc.robot.derivable import require_axes
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Limits, Mechanism, Placement
 
@@ -137,7 +138,6 @@ class Comparison:
     joints: tuple[JointDifference, ...]
     curves: tuple[Curve, ...] = ()
     on_log: tuple[OnLog, ...] = ()
-    logs: tuple[str, ...] = field(default=())
 
     @property
     def surely(self) -> tuple[Difference, ...]:
@@ -193,6 +193,9 @@ def compare(
     """
     progress("reading models")
     first = model_of(a)
+    require_axes(first.mechanism, "comparison")
+    if first.mechanism.has_followers:
+        raise InputError("psdmc compares models without joints that follow others", "lock those that do")
     second = _like(first, b)
     require_same_robot(first.mechanism, second.mechanism)
     _require_same_base_parameters(first, second)
@@ -214,7 +217,6 @@ def compare(
         joints=_joints(own, other, both),
         curves=_curves(own, other) if both else (),
         on_log=_on_log(own, other, paths, torque_constants, naming or LogNaming(), progress) if paths else (),
-        logs=tuple(str(path) for path in paths),
     )
 
 
@@ -243,11 +245,9 @@ def _side(name: str, model: DynamicsModel) -> _Side:
             f"{name}: the model's base parameters are unknown", "calibrate it, or derive it with inertias"
         )
     found = None if kept is None or kept.prediction is None else delivered(model)
-    covariance = None
-    if kept is not None:
-        covariance = kept.covariance
-        if covariance is None:
-            covariance = np.diag(np.where(np.isfinite(kept.std), kept.std, UNKNOWN) ** 2)
+    covariance = None if kept is None else kept.covariance
+    if kept is not None and covariance is None:
+        covariance = np.diag(np.where(np.isfinite(kept.std), kept.std, UNKNOWN) ** 2)
     return _Side(name, model, covariance, found)
 
 
@@ -256,18 +256,11 @@ UNKNOWN = 1e6
 
 
 def _doubts(*sides: _Side) -> list[Remark]:
-    old = [
-        side.name
-        for side in sides
-        if side.model.calibrated is not None and side.model.calibrated.covariance is None
-    ]
-    exact = [side.name for side in sides if side.covariance is None]
+    kept = [(side.name, side.model.calibrated) for side in sides]
+    old = [name for name, own in kept if own is not None and own.covariance is None]
+    exact = [name for name, own in kept if own is None]
     bad = [
-        side.name
-        for side in sides
-        if side.model.calibrated is not None
-        and side.model.calibrated.verdict is not None
-        and not side.model.calibrated.verdict.usable
+        name for name, own in kept if own is not None and own.verdict is not None and not own.verdict.usable
     ]
     found = []
     if old:
@@ -288,12 +281,10 @@ def require_same_robot(a: Mechanism, b: Mechanism) -> None:
     """InputError, which says what differs, unless joints, axes, link frames and gravity are the same."""
     hint = "compare two models of one robot, derived with the same --base, --tip, --lock and --gravity"
     if a.joint_names != b.joint_names:
-        lacks = [name for name in a.joint_names if name not in b.joint_names]
-        more = [name for name in b.joint_names if name not in a.joint_names]
-        what = [f"only in the first: {listed(lacks)}"] * bool(lacks) + [
-            f"only in the second: {listed(more)}"
-        ] * bool(more)
-        raise InputError(f"different robots: joints {'; '.join(what) or 'in another order'}", hint)
+        pairs = (("first", a.joint_names, b.joint_names), ("second", b.joint_names, a.joint_names))
+        alone = [(which, [name for name in own if name not in other]) for which, own, other in pairs]
+        what = "; ".join(f"only in the {which}: {listed(names)}" for which, names in alone if names)
+        raise InputError(f"different robots: joints {what or 'in another order'}", hint)
     other = [x.name for x, y in zip(a.joints, b.joints, strict=True) if x.type.word != y.type.word]
     other += [name for name, x, y in zip(a.joint_names, a.parents, b.parents, strict=True) if x != y]
     if other:
@@ -303,10 +294,13 @@ def require_same_robot(a: Mechanism, b: Mechanism) -> None:
     moved = [
         name
         for name, (axis, frame), (axis_b, frame_b) in zip(a.joint_names, _places(a), _places(b), strict=True)
-        if np.abs(axis.rotation[:, 2] - axis_b.rotation[:, 2]).max() > SAME_PLACE
-        or np.abs(np.cross(axis.translation - axis_b.translation, axis.rotation[:, 2])).max() > SAME_PLACE
-        or np.abs(frame.rotation - frame_b.rotation).max() > SAME_PLACE
-        or np.abs(frame.translation - frame_b.translation).max() > SAME_PLACE
+        if max(
+            np.abs(axis.rotation[:, 2] - axis_b.rotation[:, 2]).max(),
+            np.abs(np.cross(axis.translation - axis_b.translation, axis.rotation[:, 2])).max(),
+            np.abs(frame.rotation - frame_b.rotation).max(),
+            np.abs(frame.translation - frame_b.translation).max(),
+        )
+        > SAME_PLACE
     ]
     if moved:
         raise InputError(f"different robots: joint(s) {listed(moved)} have other axes or link frames", hint)

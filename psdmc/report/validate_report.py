@@ -111,7 +111,11 @@ def validation_page(found: Validation) -> PageView:
     tables = [
         TableView("Error of the prediction", head, errors, ERRORS, errors),
         TableView(
-            "R² of each log", ["Log", *(j.joint for j in found.joints)], by_log, "", by_log[1:] and by_log
+            "R² of each log",
+            ["Log", *(j.joint for j in found.joints)],
+            by_log[1:] and by_log,
+            "",
+            by_log[1:] and by_log,
         ),
         TableView("Changes of single values", CHANGE_HEAD, changes, CHANGES, prose=True),
     ]

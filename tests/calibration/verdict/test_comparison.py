@@ -150,6 +150,19 @@ def test_a_robot_file_is_compared_as_exact_and_without_friction(files, table: Pa
     assert wrong.on_log[0].r2[1] < wrong.on_log[0].r2[0]
 
 
+FINGER = """<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0"
+iyz="0"/></inertial></link><joint name="{name}_joint" type="continuous"><parent link="palm"/><child link="{name}"/>
+<axis xyz="0 0 1"/>{mimic}</joint>"""
+GRIPPER = "".join(
+    [
+        '<robot name="gripper"><link name="palm"/>',
+        FINGER.format(name="left", mimic=""),
+        FINGER.format(name="right", mimic='<mimic joint="left_joint"/>'),
+        "</robot>",
+    ]
+)
+
+
 def refused(a: object, b: object) -> str:
     with pytest.raises(InputError) as caught:
         compare(a, b)  # type: ignore[arg-type]
@@ -178,6 +191,8 @@ def test_models_of_different_robots_are_refused_with_what_differs(arm, files, ta
     plain = psdmc.derive(table, assume_zero=["link2:my"])
     assert "the models have other base parameters: 7 and" in refused(files[0], plain)
     assert "base parameters are unknown" in refused(files[0], arm.unknown)
+    (folder / "gripper.urdf").write_text(GRIPPER, encoding="utf-8")
+    assert "without joints that follow others" in refused(psdmc.derive(folder / "gripper.urdf"), table)
 
 
 def test_the_page_and_its_numbers_are_the_result_s(files, folder: Path):
