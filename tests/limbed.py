@@ -14,7 +14,7 @@ from psdmc.backends.options import EmitOptions
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
-from psdmc.lower.limb_frames import possible_groups
+from psdmc.lower.limb_search import usable_groups
 from psdmc.lower.limbs import trace_limbs
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
@@ -24,7 +24,7 @@ from psdmc.program.limb_stages import staged
 from psdmc.program.pipeline import shortened
 from psdmc.robot.mechanism import BASE
 
-FUNCTIONS = ("inverse_dynamics", "nonlinear_effects", "mass_matrix", "forward_dynamics")
+FUNCTIONS = ("inverse_dynamics", "nonlinear_effects", "mass_matrix", "forward_dynamics", "regressor")
 DERIVATIVES = (
     "gravity_derivatives",
     "inverse_dynamics_derivatives",
@@ -88,7 +88,7 @@ def forced(name: str, function: str, seed: int = 1) -> Kernel:
     search = Search(model.mechanism, model.representative, model.theta_b)
     start = next(search.starts(search.geometry.feet[0]))
     straight = trace_dynamics(recipe, start, search.robot)
-    traced = trace_limbs(recipe, start, search.robot, possible_groups(start.reframed.frames)[0])
+    traced = trace_limbs(recipe, start, search.robot, usable_groups(recipe, start, search.robot)[0])
     limbs = LimbProgram(
         traced.groups, staged(shortened(traced.program), traced.groups), products=traced.products
     )

@@ -405,5 +405,9 @@ def test_a_module_that_runs_runs_at_its_end():
     """What stands behind the call of main() would not be defined yet."""
     for _, path in modules():
         body = ast.parse(path.read_text(encoding="utf-8")).body
-        runs = [k for k, node in enumerate(body) if isinstance(node, ast.If) and "__main__" in ast.unparse(node.test)]
+        runs = [
+            k
+            for k, node in enumerate(body)
+            if isinstance(node, ast.If) and "__main__" in ast.unparse(node.test)
+        ]
         assert runs in ([], [len(body) - 1]), path.relative_to(PACKAGE)

@@ -52,6 +52,7 @@ RECIPE = Recipe(
     pinocchio,
     polynomials=Polynomials.REGRESSOR,
     times_theta=True,
+    in_limbs=True,
     default=True,
     benched=True,
 )

@@ -76,5 +76,6 @@ RECIPE = Recipe(
     "crba, computeCoriolisMatrix",
     pinocchio,
     times_theta=True,
+    in_limbs=True,
     default=True,
 )

@@ -6,12 +6,17 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.program.lanes import lanes
 from psdmc.robot.limbs import Limbs, limb_groups
+from psdmc.robot.mechanism import Placement
 
 QUARTER = math.pi / 2
 
@@ -61,6 +66,13 @@ def _pattern_of(frame: Frame) -> Hashable:
     return frame.joint.word, is_own, frame.is_parallel, zeros, frame.offset == 0.0, frame.quarters
 
 
+class LinkFrame(NamedTuple):
+    """A frame on the body of a limb: axes and origin in the joint's frame, with a constant per limb where they differ."""
+
+    rotation: NDArray[Any]
+    translation: NDArray[Any]
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """A joint of the core, or those at one place of all limbs of a group.
@@ -77,6 +89,17 @@ class Place:
     def constant(self, values: Sequence[float]) -> Scalar:
         """One constant, from one for each of the joints."""
         return values[0] if self.group is None else lanes(self.group, values)
+
+    def placed(self, frames: Sequence[Placement]) -> LinkFrame | Placement:
+        """One frame on a body, from one for each joint."""
+        if self.group is None:
+            return frames[0]
+        rotation, translation = np.empty((3, 3), object), np.empty(3, object)
+        for i in range(3):
+            translation[i] = self.constant([frame.translation[i] for frame in frames])
+            for j in range(3):
+                rotation[i, j] = self.constant([frame.rotation[i, j] for frame in frames])
+        return LinkFrame(rotation, translation)
 
     def body(self, bodies: Sequence[Body]) -> Body:
         """One body, from one for each joint."""

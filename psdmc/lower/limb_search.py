@@ -20,9 +20,9 @@ from psdmc.dynamics.solve import SingularMatrix
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.branches import limbs_in
 from psdmc.lower.descent import ROUNDING
-from psdmc.lower.factored import Arrangement
+from psdmc.lower.factored import Arrangement, RobotConstants
 from psdmc.lower.limb_frames import possible_groups
-from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, trace_limbs
+from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, has_columns, have_columns_alike, trace_limbs
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import for_lanes, for_one_state
 from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, Search, distinct
@@ -80,6 +80,16 @@ def weight_of_stages(
     return total
 
 
+def usable_groups(
+    recipe: Recipe, arrangement: Arrangement, robot: RobotConstants
+) -> tuple[tuple[Limbs, ...], ...]:
+    """Ways to see limbs. A function with a column for each base parameter needs limbs that have the same ones."""
+    found = possible_groups(arrangement.reframed.frames)
+    if not has_columns(recipe):
+        return found
+    return tuple(groups for groups in found if have_columns_alike(robot.representative, groups))
+
+
 @dataclass(frozen=True, slots=True)
 class LimbArrangement:
     """An arrangement, the groups of limbs that run in lanes, and what one call costs then (`weight`)."""
@@ -101,7 +111,8 @@ class LimbSearch:
         """The cheapest arrangement with limbs in lanes; None where there is none."""
         if not self.costs.has_vectors or self._is_eliminated(start):
             return None
-        ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]
+        groups_of = usable_groups(self.recipe, start, self.search.robot)
+        ways = [self._arranged(start, groups) for groups in groups_of]
         limit = LIKELY * min((each.weight for each in ways), default=0.0)
         found = [self._descended(each) for each in ways if each.weight <= limit]
         return min(found, key=lambda each: each.weight) if found else None
@@ -132,6 +143,8 @@ class LimbSearch:
 
     def _descended(self, best: LimbArrangement) -> LimbArrangement:
         """The cheapest that exchanges lead to."""
+        if self.recipe.times_theta:  # it has no bodies, and no carriers
+            return best
         budget = BUDGET if best.arrangement.n <= MANY_JOINTS else BUDGET_OF_LARGE
         while budget > 0:
             improved = best

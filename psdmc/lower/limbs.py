@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import accumulate, product
 
+import numpy as np
+
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.free_root import has_free_root
 from psdmc.dynamics.scalar import Scalar
@@ -23,6 +25,7 @@ from psdmc.program.thin_products import Shares, ThinProducts
 from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
 from psdmc.robot.limbs import Limbs
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Placement
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,33 @@ class _Group:
         return LimbGroup(self.number, self.count, tuple(self.inputs), (), tuple(self.outputs))
 
 
+def has_columns(recipe: Recipe) -> bool:
+    """Whether it puts out a matrix with a column for each base parameter."""
+    return any("l" in quantity.axes for quantity in recipe.signature.outputs)
+
+
+def selected(lift: Array) -> dict[int, int]:
+    """The base parameters that are standard ones: column by row of the lift."""
+    rows, columns = np.nonzero(lift == 1.0)
+    return dict(zip(rows.tolist(), columns.tolist(), strict=True))
+
+
+def have_columns_alike(lift: Array, groups: Sequence[Limbs]) -> bool:
+    """Whether each base parameter is a standard one, and those of a group's limbs are the same."""
+    found = selected(lift)
+    if not len(found) == len(set(found.values())) == lift.shape[1] == np.count_nonzero(lift):
+        return False
+    names = range(PARAMETERS_PER_LINK)
+    of_limbs = (
+        {
+            tuple(PARAMETERS_PER_LINK * joint + name in found for joint in limb for name in names)
+            for limb in limbs
+        }
+        for limbs in groups
+    )
+    return all(len(patterns) == 1 for patterns in of_limbs)
+
+
 class _Trace:
     """One trace. Places take the place of joints."""
 
@@ -95,11 +125,31 @@ class _Trace:
             ]
             for axis in ("nq", "nv")
         }
+        if has_columns(recipe):
+            self._select_columns(whole.link_frames)
 
     def _with_sums(self, frame: Frame, place: Place) -> Frame:
         if place.group is None or not place.is_first:
             return frame
         return replace(frame, limbs=partial(self.sums.total, place.group))
+
+    def _select_columns(self, link_frames: Sequence[Placement]) -> None:
+        """Give the recipe the link frames and the standard parameters of the places: those that are base parameters."""
+        self.selected, self.first["l"] = selected(self.robot.representative), [self.robot.sizes.l]
+        kept = [
+            PARAMETERS_PER_LINK * number + name
+            for number, place in enumerate(self.places)
+            for name in self._names(place)
+        ]
+        lift = np.eye(PARAMETERS_PER_LINK * len(self.places))[:, kept]
+        own = tuple(place.placed([link_frames[joint] for joint in place.joints]) for place in self.places)
+        self.reframed = replace(self.reframed, link_frames=own)  # type: ignore[arg-type]  # a Placed is enough
+        sizes = replace(self.robot.sizes, l=len(kept))
+        self.robot = replace(self.robot, representative=lift, sizes=sizes)
+
+    def _names(self, place: Place) -> list[int]:
+        row = PARAMETERS_PER_LINK * place.joints[0]
+        return [name for name in range(PARAMETERS_PER_LINK) if row + name in self.selected]
 
     def recorded(self) -> Mapping[Slot, Scalar]:
         """Return the recipe's outputs by slots whose indices count places."""
@@ -131,7 +181,12 @@ class _Trace:
                 yield self.tracer.symbol(slot)
 
     def _entries(self, place: Place, axis: str) -> list[tuple[int, ...]]:
-        """For each coordinate, or rate, of a place the robot's, limb by limb."""
+        """For each coordinate, rate or base parameter of a place the robot's, limb by limb."""
+        if axis == "l":
+            rows = [
+                [PARAMETERS_PER_LINK * joint + name for joint in place.joints] for name in self._names(place)
+            ]
+            return [tuple(self.selected[row] for row in own) for own in rows]
         first = self.first[axis]
         counts = range(first[place.joints[0] + 1] - first[place.joints[0]])
         return [tuple(first[joint] + k for joint in place.joints) for k in counts]

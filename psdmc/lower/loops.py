@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psdmc.program.cost import cost
-from psdmc.program.products import LARGE, Product, written_out, zero_columns
+from psdmc.program.products import LARGE, Product, lines, written_out, zero_columns
 from psdmc.program.program import Program
 from psdmc.target.costs import Costs
 
@@ -15,11 +15,11 @@ SPAN = 4
 
 
 def in_loops(program: Program, products: tuple[Product, ...], n: int, costs: Costs) -> bool:
-    """Whether loops over n x n matrices pay: these are LARGE, or large enough and hardly an entry is always zero."""
+    """Whether loops over n x n matrices pay: lines would be too many, or hardly an entry is always zero."""
     if not products or n < costs.loops_from:
         return False
     widths = [n - zero_columns(program, product) for product in products]
-    if n >= LARGE:
+    if n >= LARGE and sum(lines(program, product) for product in products) > len(products) * LARGE**3:
         return min(widths) >= SPAN
     dense = sum(n * n * width for width in widths)
     written = cost(written_out(program, products)).mul - cost(program).mul

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isqrt
+from operator import mul
 
 from psdmc.program.program import Program, Slot
 from psdmc.program.replay import Value, replayed
 from psdmc.program.trace import Tracer
 
 LARGE = 12
-"""Rows from which products are always loops, over entries that are always zero too, and states go one after the other: each
-entry in a line takes gcc minutes (18 rows, written out for one state and for lanes: more than one, and 600 MiB)."""
+"""Rows from which products with more than LARGE^3 lines are loops, over entries that are always zero too, and states go one
+after the other: lines take gcc minutes (18 rows, written out for one state and for lanes: more than one, and 600 MiB). A
+hand of four fingers has few lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,15 @@ def _multiplied(product: Product, values: dict[Slot, Value]) -> list[tuple[Slot,
                 total = total + values[Slot(product.left, i * n + k)] * values[Slot(product.right, j * n + k)]
             found.append((Slot(product.output, i * n + j), -total))
     return found
+
+
+def lines(program: Program, product: Product) -> int:
+    """Multiplications of the product where it is written out: none by entries that are zero at every state."""
+    stored = {slot: program.body[i].value != 0.0 for slot, i in program.outputs}
+    n = isqrt(sum(slot.vector == product.right for slot in stored))
+    left = [sum(stored[Slot(product.left, i * n + k)] for i in range(n)) for k in range(n)]
+    right = [sum(stored[Slot(product.right, j * n + k)] for j in range(n)) for k in range(n)]
+    return sum(map(mul, left, right))
 
 
 def zero_columns(program: Program, product: Product) -> int:

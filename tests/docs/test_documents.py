@@ -27,6 +27,7 @@ DOCS = ROOT / "docs"
 LONG = [
     DOCS / "how-to" / "plan-campaign.md",
     DOCS / "tutorials" / "controller.md",
+    DOCS / "tutorials" / "quadruped.md",
     DOCS / "how-to" / "embedded.md",
 ]
 """They plan the motion of six joints, or build packages: as long as all other documents together."""
