@@ -285,7 +285,7 @@ def require_same_robot(a: Mechanism, b: Mechanism) -> None:
         alone = [(which, [name for name in own if name not in other]) for which, own, other in pairs]
         what = "; ".join(f"only in the {which}: {listed(names)}" for which, names in alone if names)
         raise InputError(f"different robots: joints {what or 'in another order'}", hint)
-    other = [x.name for x, y in zip(a.joints, b.joints, strict=True) if x.type.word != y.type.word]
+    other = [x.name for x, y in zip(a.joints, b.joints, strict=True) if x.type is not y.type]
     other += [name for name, x, y in zip(a.joint_names, a.parents, b.parents, strict=True) if x != y]
     if other:
         raise InputError(

@@ -50,6 +50,7 @@ def validate(
     joint_map: JointMap = None,
 ) -> None:
     """Test a calibrated model on other logs; exit 5: the robot has drifted or carries a load, 6: log not usable."""
+    from psdmc.calibration.validation import CHANGED_STATUS
     from psdmc.calibration.validation import validate as run
     from psdmc.model.load import load
     from psdmc.report.calibrate_commands import CompiledWhenAsked
@@ -66,9 +67,9 @@ def validate(
             progress=progress,
         )
     _deliver(found, report, as_json)
-    if found.word == "changed load":
+    if found.load is not None:
         say_next("payload", calibrated, *logs, "-o", "load.toml")
-    elif found.word == "drifted":
+    elif found.exit_status == CHANGED_STATUS:
         say_next("calibrate", calibrated, *logs, "-o", f"{calibrated.stem}_new.npz")
     if found.exit_status:
         raise typer.Exit(found.exit_status)
