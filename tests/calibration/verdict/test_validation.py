@@ -14,10 +14,10 @@ from test_ur10 import model as ur10_model  # noqa: F401  a fixture
 from worn_arm import CONSTANTS, VISCOUS, Worn, changed, recorded
 
 import psdmc
-from psdmc.calibration import validation
 from psdmc.calibration.logs.log_files import read_log, write_log
 from psdmc.calibration.plant.virtual_robot import Payload
 from psdmc.calibration.validation import Validation, validate
+from psdmc.calibration.verdict import changes
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -165,7 +165,7 @@ def test_more_changes_than_a_worn_robot_has_are_another_robot_s(
 ):
     """Eight values explain any arm of two links, so that fewer are allowed here."""
     log = recorded(folder, "heavy", Worn(seed=15, load=Payload(1.5, LOAD.com)), table)
-    monkeypatch.setattr(validation, "MOST_NAMED", 0)
+    monkeypatch.setattr(changes, "MOST_NAMED", 0)
 
     found = validate(file, log)
 
@@ -208,6 +208,8 @@ def test_a_model_that_was_not_calibrated_and_a_missing_log_are_refused(arm, file
         validate(arm.model, folder / "first.csv")
     with pytest.raises(InputError, match=r"none\.csv"):
         validate(file, folder / "none.csv")
+    with pytest.raises(InputError, match="torque constants"):
+        validate(file, folder / "first.csv", {"shoulder": 3.0})
 
 
 def test_a_campaign_s_model_predicts_a_plain_log_with_its_friction(noisy, plant_log, tmp_path: Path):
