@@ -24,7 +24,7 @@ IN_0_1 = frozenset(
     ]
 )
 
-UNRELEASED = frozenset(["operational_space_inertia"])
+UNRELEASED = frozenset(["operational_space_inertia", "tangent_map"])
 """Functions that the next release brings."""
 
 HEAD = "| function | what it does | inputs | outputs | `_theta` | default | since | Pinocchio's function |"

@@ -10,6 +10,7 @@ from typing import Any
 import typer.main
 
 import psdmc
+import psdmc.mujoco
 from psdmc.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
@@ -60,6 +61,8 @@ def python() -> str:
         parts += [f"## psdmc.{name}", _described(item, name)]
         if inspect.isclass(item) and not issubclass(item, Exception):
             parts += _members(item)
+    for name in ("to_qpos", "from_qpos", "to_qvel", "from_qvel"):
+        parts += [f"## psdmc.mujoco.{name}", _described(getattr(psdmc.mujoco, name), name)]
     parts += ["## Methods of a compiled robot", "Of what `psdmc.compile(model)` returns."]
     parts.append(_fenced((ROOT / METHODS).read_text(encoding="utf-8"), "python"))
     return "\n\n".join(parts) + "\n"

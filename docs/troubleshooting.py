@@ -235,8 +235,8 @@ PACKAGES = (
     ),
     Entry(
         "there is no adapter",
-        "The only adapter of `--with` is for CasADi.",
-        "Write `--with casadi`.",
+        "The adapters of `--with` are for CasADi.",
+        "Write `--with casadi` or `--with casadi_theta`.",
         "emit-c arm.npz --with acados",
     ),
     Entry(

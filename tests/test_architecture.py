@@ -37,6 +37,7 @@ MAY_IMPORT |= {
     "export": {"robot", "dynamics", "friction", "model", "links"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
+    "mujoco": {"robot", "model"},
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
 }
 
@@ -86,6 +87,7 @@ OUTSIDE = {
     "export": {"numpy", "mujoco"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
+    "mujoco": {"numpy"},
     "cli": {"typer", "rich", "numpy"},
 }
 

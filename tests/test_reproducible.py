@@ -44,6 +44,7 @@ DECISIONS = {
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",
+    "functions/tangent_map.py": "Pinocchio's side of a comparison",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",
     "functions/frame_velocity_derivatives.py": "Pinocchio's side of a comparison",
     "lower/carriers.py": "thresholds with margins of decades",

@@ -304,7 +304,11 @@ def emit(
     ] = False,
     adapters: Annotated[
         list[str] | None,
-        typer.Option("--with", metavar="NAME,...", help="also write a library for another program: casadi"),
+        typer.Option(
+            "--with",
+            metavar="NAME,...",
+            help="also write a library for another program: casadi, casadi_theta",
+        ),
     ] = None,
     target: Annotated[
         str,
@@ -317,7 +321,7 @@ def emit(
 ) -> None:
     """Write a model's package in a language of choice: sources, build files, self-test."""
     from psdmc import compiler
-    from psdmc.backends.c.adapters import lacking
+    from psdmc.backends.c.adapters import remarks
     from psdmc.backends.protocol import back_end
     from psdmc.backends.write import require_own_folder
     from psdmc.cli.next_step import one_line
@@ -362,10 +366,9 @@ def emit(
         print(f"note: the {language.language} name of '{one_line(asked)}' is {written_as}")
     elif output is None and asked != folder.name:
         print(f"note: the {language.named} is {asked}; --name changes it")
-    for reason in lacking(found.mechanism, names(adapters)):
-        work = ", ".join(kernels.wanted(wanted, found.mechanism))
-        print(f"note: {reason} (the C code is not affected); CasADi can call, without derivatives: {work}")
-    ending = "; CasADi's files do not have them" if "casadi" in names(adapters) else ""
+    for remark in remarks(found.mechanism, names(adapters), kernels.wanted(wanted, found.mechanism)):
+        print(f"note: {remark}")
+    ending = "; write --with casadi_theta to call them in CasADi" if names(adapters) == ("casadi",) else ""
     for note in run_time_only(found, wanted):
         print(f"note: {note}{ending}")
     for what in beyond_friction(found):

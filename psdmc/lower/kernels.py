@@ -20,6 +20,7 @@ from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbArrangement, LimbSearch
 from psdmc.lower.loops import in_loops
 from psdmc.lower.packed import packed
+from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
@@ -223,8 +224,14 @@ class _Lowered:
 
     def _limb_arrangement(self, recipe: Recipe) -> LimbArrangement | None:
         if recipe.name not in self._limbs:
-            start = self._arrangement(recipe, False)
-            self._limbs[recipe.name] = self._limb_search(recipe).best(start)
+            search = self._limb_search(recipe)
+            self._limbs[recipe.name] = (
+                search.best(self._arrangement(recipe, False))
+                if recipe.signature.theta
+                else search.among(
+                    self._with_digits([self.geometry.reframed(feet) for feet in self.geometry.feet])
+                )
+            )
         return self._limbs[recipe.name]
 
     def _limb_search(self, recipe: Recipe) -> LimbSearch:
@@ -272,9 +279,13 @@ class _Lowered:
         frames = [geometry.reframed(feet) for feet in geometry.feet]
         traced = [trace_geometry(recipe, each, search.robot) for each in frames]
         if recipe.times_theta and not all(search.keeps_digits(frames[k]) for k in self._cheapest(traced)):
-            kept = [each for each in frames if search.keeps_digits(each)] or [geometry.unmoved]
-            traced = [trace_geometry(recipe, each, search.robot) for each in kept]
+            traced = [trace_geometry(recipe, each, search.robot) for each in self._with_digits(frames, theta)]
         yield from traced
+
+    def _with_digits(self, frames: Sequence[Reframed], theta: bool = False) -> Sequence[Reframed]:
+        """Those in which a regressor keeps its digits."""
+        search = self._search(theta)
+        return [each for each in frames if search.keeps_digits(each)] or [self.geometry.unmoved]
 
     def _cheapest(self, programs: Sequence[Program]) -> set[int]:
         """Choose the cheapest programs, for one state and for lanes."""

@@ -111,11 +111,23 @@ class LimbSearch:
         """The cheapest arrangement with limbs in lanes; None where there is none."""
         if not self.costs.has_vectors or self._is_eliminated(start):
             return None
-        groups_of = usable_groups(self.recipe, start, self.search.robot)
-        ways = [self._arranged(start, groups) for groups in groups_of]
+        ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]
         limit = LIKELY * min((each.weight for each in ways), default=0.0)
         found = [self._descended(each) for each in ways if each.weight <= limit]
         return min(found, key=lambda each: each.weight) if found else None
+
+    def among(self, geometries: Iterable[Reframed]) -> LimbArrangement | None:
+        """The cheapest of these for a function without bodies, with limbs in lanes; None where there is none."""
+        if not self.costs.has_vectors:
+            return None
+        starts = [self.search.uncarried(each) for each in geometries]
+        groups_of = [usable_groups(self.recipe, each, self.search.robot) for each in starts]
+        ways = [
+            self._weighed(start, groups)
+            for start, found in zip(starts, groups_of, strict=True)
+            for groups in found
+        ]
+        return min(ways, key=lambda each: each.weight, default=None)
 
     def within(self, shared: LimbArrangement) -> LimbArrangement:
         """The cheapest choices of this function within an arrangement that was found for another one."""
@@ -143,8 +155,6 @@ class LimbSearch:
 
     def _descended(self, best: LimbArrangement) -> LimbArrangement:
         """The cheapest that exchanges lead to."""
-        if self.recipe.times_theta:  # it has no bodies, and no carriers
-            return best
         budget = BUDGET if best.arrangement.n <= MANY_JOINTS else BUDGET_OF_LARGE
         while budget > 0:
             improved = best

@@ -185,11 +185,11 @@ class Search:
             least = min(others, default=error)
             if least >= error:
                 frames = [*(each.reframed for each in firsts), self.geometry.unmoved]
-                return min([best, *map(self._uncarried, frames)], key=error_of)
+                return min([best, *map(self.uncarried, frames)], key=error_of)
             best, error = others[least], least
         return best
 
-    def _uncarried(self, reframed: Reframed) -> Arrangement:
+    def uncarried(self, reframed: Reframed) -> Arrangement:
         """Return the arrangement in which each parameter is separate. Which of them may stand for others is found by
         columns of all joints' torques together, of which a small joint's are a small part: on robots of many scales its
         digits are lost there."""
@@ -198,7 +198,7 @@ class Search:
 
     def keeps_digits(self, reframed: Reframed) -> bool:
         """Whether torques computed on these frames are accurate enough; True where no base parameters are known."""
-        return self.accuracy is None or self.accuracy.error(self._uncarried(reframed)) <= LIMIT
+        return self.accuracy is None or self.accuracy.error(self.uncarried(reframed)) <= LIMIT
 
     def _admits(self, accurate: Arrangement | None, recipe: Recipe) -> Callable[[Arrangement], bool]:
         accuracy = self.accuracy

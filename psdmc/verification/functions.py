@@ -61,7 +61,7 @@ def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvabl
         return "the mass matrix is singular"
     # From positions to positions, or to the way between them.
     places = not recipe.signature.theta and all(
-        q.axes in (("nq",), ("nv",)) for q in recipe.signature.outputs
+        q.axes in (("nq",), ("nv",), ("nv", "nq")) for q in recipe.signature.outputs
     )
     if robot.follows and places:
         return "Pinocchio's positions are of every joint, followers included"

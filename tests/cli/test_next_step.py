@@ -51,7 +51,7 @@ def test_what_casadi_does_not_get_is_said(tmp_path: Path) -> None:
     done = typed("emit-c", "unknown.npz", *words, cwd=tmp_path)
 
     assert done.returncode == 0
-    assert "argument: gravity_theta; CasADi's files do not have them\n" in done.stdout
+    assert "argument: gravity_theta; write --with casadi_theta to call them in CasADi\n" in done.stdout
 
 
 def test_a_xacro_files_model_is_called_as_its_robot(tmp_path: Path) -> None:

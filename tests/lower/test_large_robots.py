@@ -87,7 +87,7 @@ def test_an_arrangement_that_gives_other_torques_is_a_bug_and_no_code(monkeypatc
 
     monkeypatch.setattr(Search, "starts", spoilt)
     monkeypatch.setattr(Search, "_exchanges", lambda self, found: iter(()))
-    monkeypatch.setattr(Search, "_uncarried", lambda self, _: next(self.starts(self.geometry.feet[0])))
+    monkeypatch.setattr(Search, "uncarried", lambda self, _: next(self.starts(self.geometry.feet[0])))
     found = Search(model.mechanism, model.representative, model.theta_b, BUDGET)
 
     with pytest.raises(InternalError, match="inverse_dynamics"):

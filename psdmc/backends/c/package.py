@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from psdmc.backends.c.adapters import chosen
 from psdmc.backends.c.bodies_view import BodiesView
 from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
@@ -280,7 +279,7 @@ def package_view(
         )
     robot = identifier(info.name)
     functions = function_views(kernels, info.sizes, robot, options, info.base_frame)
-    package = PackageView(robot, info, options, functions, None, chosen(adapters))
+    package = PackageView(robot, info, options, functions, None, tuple(adapters))
     if references is None:
         return package
     vectors, takes_theta = (

@@ -24,9 +24,7 @@ def package_files(package: PackageView) -> dict[str, str]:
         for name in ("reference", "layouts", "compare"):
             files[f"test/{name}.h"] = render(f"{name}.h.jinja", package=package)
     for adapter in package.adapters:
-        files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](
-            package.robot, package.real, package.kernels, package.info.nq > package.info.nv
-        )
+        files |= ADAPTERS[adapter](package)
     files = {path: licensed(path, text) for path, text in files.items()}
     files["manifest.json"] = _manifest(package, files)
     return files

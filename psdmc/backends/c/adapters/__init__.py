@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from psdmc.backends.c.adapters import casadi
-from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
-ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView], bool], str]] = {"casadi": casadi.source}
-"""By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
-package's real type, its kernels and whether q is longer than the rates. The file includes the library's sources and
-becomes a shared library of its own, lib<robot>_<name>."""
+ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
+    "casadi": casadi.files,
+    "casadi_theta": casadi.files_by_theta,
+}
+"""By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
-NEEDS = {"casadi": casadi.needed}
+NEEDS = {"casadi": casadi.needed, "casadi_theta": casadi.needed_by_theta}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
-LACKS = {"casadi": casadi.lacking}
-"""By name, the function that says what an adapter cannot have of a robot."""
+REMARKS = {"casadi": casadi.remark, "casadi_theta": casadi.remark}
+"""By name, the function that says what users should know of an adapter's functions of a robot."""
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
@@ -37,7 +38,7 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
     return list(found)
 
 
-def lacking(robot: Mechanism, adapters: Sequence[str]) -> tuple[str, ...]:
-    """What these adapters cannot have of a robot, one clause each."""
-    found = (LACKS[adapter](robot) for adapter in chosen(adapters))
-    return tuple(reason for reason in found if reason is not None)
+def remarks(robot: Mechanism, adapters: Sequence[str], functions: Sequence[str]) -> tuple[str, ...]:
+    """What users should know of these adapters' functions of a robot, one clause each."""
+    found = (REMARKS[adapter](robot, functions) for adapter in chosen(adapters))
+    return tuple(dict.fromkeys(reason for reason in found if reason is not None))

@@ -1,11 +1,11 @@
-"""CasADi's external functions: the emitted functions under its calling convention, with exact Jacobians.
+"""CasADi's external functions: the emitted functions under its calling convention, with exact derivatives.
 
 The convention is CasADi's documented one (user guide, "Using the generated code"; Function::jacobian): beside f itself a
 library exports what f_n_in, f_sparsity_out and so on return, and jac_f: inputs of f, then its outputs (not read: empty
 patterns), to one block per output and input. Matrices are column by column, nonzeros only.
 
-CasADi differentiates by the entries of q, psdmc's derivatives are along the tangent. Where q is longer than the rates the
-two differ in size: such robots' functions have no Jacobians here.
+CasADi differentiates by the entries of q. Where q has quaternions, CasADi's f is the emitted one at q with its quaternions
+divided by their lengths, and its derivative is the emitted one, along the tangent, times d tangent / dq.
 """
 
 from __future__ import annotations
@@ -15,14 +15,27 @@ from dataclasses import dataclass
 from math import prod
 
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
+from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
+from psdmc.backends.info import PackageInfo
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
+from psdmc.program.signature import Q
+from psdmc.recipes.recipe import Polynomials
 from psdmc.robot.mechanism import Mechanism
 
-DERIVATIVES, GRADIENT = "_derivatives", "_vjp"
-"""Endings of function names: a function that puts out d output / d input as d<output>_d<input>, and one that reads a
-cotangent last and puts out grad_<input>."""
+DERIVATIVES, GRADIENT, DIRECTION = "_derivatives", "_vjp", "_jvp"
+"""Endings of function names: a function that puts out d output / d input as d<output>_d<input>; one that reads a
+cotangent last and puts out grad_<input>; and one that reads d<input> after all inputs and puts out d<output>."""
+
+PARAMETERS, THETA = "_parameters", "theta_b"
+"""What follows GRADIENT where the gradient by theta_b, the last output, is among them; and the name of theta_b."""
+
+LINEAR = (Polynomials.TORQUE, Polynomials.GRAVITY, Polynomials.SOLVED)
+"""Torques that are the regressor times theta_b, and accelerations of such torques."""
+
+MAP, REGRESSOR = "tangent_map", "regressor"
+"""Functions that derivatives by the entries of q, and by theta_b, need."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +48,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output in CasADi's order; `at` is its place among the called function's outputs, in reals."""
+    """An input or output in CasADi's order; `at` is its place in the work vector, in reals."""
 
     name: str
     pattern: str
@@ -46,23 +59,29 @@ class Argument:
 class External:
     """One external function.
 
-    name     that CasADi looks for
-    inputs   all of them
-    read     numbers of those that are passed on to the called function
-    called   the emitted function
-    starts   place of each output among the called function's outputs, in reals
-    work     number of reals for those
-    fails    whether it returns a status
+    name      that CasADi looks for
+    inputs    all of them
+    called    the emitted function
+    given     what it is called with, as C
+    work      number of reals for results and what leads to them
+    fails     whether it returns a status
+    restored  what is made a position of the robot before: C of q, and where to
+    before    C statements before the call, and
+    after     behind it
+    symbols   emitted functions that are called, `called` first
     """
 
     name: str
     inputs: tuple[Argument, ...]
     outputs: tuple[Argument, ...]
     called: str
-    read: tuple[int, ...]
-    starts: tuple[int, ...]
+    given: str
     work: int
     fails: bool
+    restored: tuple[tuple[str, str], ...]
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+    symbols: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,23 +89,41 @@ class CasadiView:
     """What templates/adapters/casadi.c.jinja prints.
 
     robot    identifier that every symbol starts with
+    library  ending of the library's name
     hidden   emitted functions whose names CasADi's take: they are compiled under others
-    wide     whether q is longer than the rates, so that there are no Jacobians
     zeros    length of the longest input: what is not given to a function is zero
+    units    parts of q, from an entry to before another, that are made of length one, and
+    nq       length of q, where there are such parts, and
+    nv       number of rates, and
+    map      entries of d tangent / dq that may differ from zero: row and column
+    spoils   whether results become NaN where a function fails
+    helpers  C functions of casadi_calls.h.jinja that are called
     """
 
     robot: str
+    library: str
     externals: tuple[External, ...]
     patterns: tuple[Pattern, ...]
     hidden: tuple[str, ...]
     sources: tuple[str, ...]
     zeros: int
-    wide: bool
+    units: tuple[tuple[int, int], ...]
+    nq: int
+    nv: int
+    map: tuple[tuple[int, int], ...]
+    spoils: bool
+    helpers: frozenset[str]
 
 
-def needed(functions: Sequence[str], wide: bool) -> list[str]:
-    """Functions that compute derivatives of these; none where q is longer than the rates."""
-    return [name + DERIVATIVES for name in functions if not wide and _has_blocks(name)]
+def needed(functions: Sequence[str], wide: bool, theta: bool = False) -> list[str]:
+    """Functions that compute derivatives of these. `wide`: q is longer than the rates; `theta`: also by theta_b."""
+    found = [name + DERIVATIVES for name in functions if _has_blocks(name)]
+    return found + [MAP] * wide + [REGRESSOR] * (theta and bool(found))
+
+
+def needed_by_theta(functions: Sequence[str], wide: bool) -> list[str]:
+    """The same for functions that take theta_b."""
+    return needed(functions, wide, theta=True)
 
 
 def _has_blocks(name: str) -> bool:
@@ -99,45 +136,71 @@ def _has_blocks(name: str) -> bool:
     return all(f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
-def source(robot: str, real: str, kernels: Sequence[KernelView], wide: bool) -> str:
-    """The adapter's C file; InputError where CasADi cannot call the package."""
-    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels, wide))
+def files(package: PackageView) -> dict[str, str]:
+    """The adapter's C file; InputError where CasADi cannot call the package. It includes the library's sources and becomes
+    a shared library of its own."""
+    return _files(package, theta=False)
 
 
-def lacking(robot: Mechanism) -> str | None:
-    """Why CasADi gets no derivatives of this robot's functions; None where it gets them."""
+def files_by_theta(package: PackageView) -> dict[str, str]:
+    """The C file of functions that take theta_b as their last input, likewise."""
+    return _files(package, theta=True)
+
+
+def _files(package: PackageView, theta: bool) -> dict[str, str]:
+    view = casadi_view(package, theta)
+    path = f"{view.library}/{view.robot}_{view.library}.c"
+    return {path: render("adapters/casadi.c.jinja", view=view)}
+
+
+def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
+    """What users should know of CasADi's functions of this robot; None where q has an entry for each rate."""
     if robot.nq == robot.nv:
         return None
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
-    what = (
-        "a floating base" if robot.has_free_root else f"joint {wide.name!r}, whose q is longer than its rates"
-    )
-    return f"CasADi derivatives are not available for {what}"
+    whose = "a floating base" if robot.has_free_root else f"joint {wide.name!r}"
+    without = [name for name in functions if not _has_blocks(name)]
+    rest = f"; without derivatives: {', '.join(without)}" if without else ""
+    return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"
 
 
-def casadi_view(robot: str, real: str, every: Sequence[KernelView], wide: bool) -> CasadiView:
-    """What CasADi's adapter prints of these kernels. InputError for float, and where theta_b is unknown."""
-    if real != "double":
+def casadi_view(package: PackageView, theta: bool = False) -> CasadiView:
+    """What CasADi's adapter prints of a package, `theta`: of its functions that take theta_b. InputError for float, and if
+    theta_b is unknown and not taken."""
+    info = package.info
+    if package.real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
-    kernels = {kernel.name: kernel for kernel in every if not kernel.theta}
+    chosen = (kernel for kernel in package.kernels if kernel.theta == (theta and kernel.function.theta))
+    kernels = {kernel.function.name: kernel for kernel in chosen}
     if not kernels:
         raise InputError(
             "CasADi needs the base parameters, and this model's are unknown",
-            "calibrate the model first, or leave out --with casadi",
+            "calibrate the model first, or write --with casadi_theta, which takes theta_b as an input",
         )
-    patterns = _Patterns()
-    others = {} if wide else kernels
-    externals = [one for kernel in kernels.values() for one in _externals(kernel, others, patterns)]
-    used = {external.called for external in externals}
+    made = _Externals(kernels, info)
+    externals = tuple(one for kernel in kernels.values() for one in made.of(kernel))
+    tangent = kernels[MAP].outputs[0] if info.units else None
+    longest = (vector.size for kernel in kernels.values() for vector in kernel.inputs)
     return CasadiView(
-        robot=robot,
-        externals=tuple(externals),
-        patterns=patterns.all,
-        hidden=tuple(sorted(used)),
+        robot=package.robot,
+        library="casadi_theta" if theta else "casadi",
+        externals=externals,
+        patterns=made.patterns.all,
+        hidden=tuple(sorted({symbol for external in externals for symbol in external.symbols})),
         sources=tuple(f"{kernel.function.name}.c" for kernel in kernels.values()),
-        zeros=max((vector.size for kernel in kernels.values() for vector in kernel.inputs), default=1),
-        wide=wide,
+        zeros=max((*longest, info.l if theta else 0), default=1),
+        units=info.units,
+        nq=info.nq,
+        nv=info.nv,
+        map=tuple(divmod(k, info.nq) for k in _nonzeros(tangent)) if tangent else (),
+        spoils=theta or bool(info.units),
+        helpers=frozenset(made.helpers),
     )
+
+
+def _nonzeros(output: OutputView) -> list[int]:
+    zero = frozenset(output.zero)
+    return [k for k in range(output.size) if k not in zero]
 
 
 class _Patterns:
@@ -176,66 +239,197 @@ def _numbers(shape: Sequence[int], zero: frozenset[int]) -> tuple[int, ...]:
     return (rows, columns, *starts, *(row for column in kept for row in column))
 
 
-def _externals(
-    kernel: KernelView, kernels: Mapping[str, KernelView], patterns: _Patterns
-) -> Iterable[External]:
-    """A function, and its Jacobian and its reverse mode where `kernels` have them."""
-    outputs = {output.name: output for output in kernel.outputs}
-    own = [(name, name, patterns.of(output.shape)) for name, output in outputs.items()]
-    yield _external("", kernel, _given(kernel, patterns), own, kernel)
-    other = kernels.get(kernel.name + DERIVATIVES)
-    blocks = {} if other is None else {output.name: output for output in other.outputs}
-    named = {f"jac_{o}_{i.name}": f"d{o}_d{i.name}" for o in outputs for i in kernel.inputs}
-    if other is not None and all(block in blocks for block in named.values()):
-        unread = tuple(Argument(f"out_{o.name}", patterns.unread(o.shape)) for o in outputs.values())
-        shown = [(name, block, _block(blocks[block], patterns)) for name, block in named.items()]
-        yield _external("jac_", kernel, (*_given(kernel, patterns), *unread), shown, other)
-    gradient = kernels.get(kernel.name + GRADIENT)
-    if gradient is not None and len(outputs) == 1:
-        yield _reverse(kernel, gradient, patterns)
+class _Externals:
+    """The external functions of kernels, by the names of their functions."""
+
+    def __init__(self, kernels: Mapping[str, KernelView], info: PackageInfo) -> None:
+        self.kernels, self.info = kernels, info
+        self.patterns = _Patterns()
+        self.helpers: set[str] = set()
+
+    def of(self, kernel: KernelView) -> Iterable[External]:
+        """A function, and its Jacobian, its reverse and its forward mode where there are kernels for them."""
+        patterns, name, call = self.patterns, kernel.function.name, _Call(kernel, kernel, self)
+        own = [(output.name, call.at(output.name), patterns.of(output.shape)) for output in kernel.outputs]
+        yield call.external("", self._inputs(kernel), own)
+        if any(output.axes == Q.axes for output in kernel.function.outputs):
+            return
+        other = self.kernels.get(name + DERIVATIVES)
+        is_known = not kernel.theta or RECIPES[name].polynomials in LINEAR
+        if other is not None and is_known and _has_blocks(name):
+            yield self._jacobian(kernel, other)
+        gradient = self.kernels.get(name + GRADIENT + PARAMETERS * kernel.theta)
+        if gradient is not None and len(kernel.outputs) == 1:
+            yield self._reverse(kernel, gradient)
+        direction = self.kernels.get(name + DIRECTION)
+        if direction is not None and len(kernel.outputs) == 1 and self.info.units and not kernel.theta:
+            yield self._forward(kernel, direction)
+
+    def _inputs(self, kernel: KernelView) -> tuple[Argument, ...]:
+        """The inputs. A matrix has one column per row of ours, so that the numbers have the same order in memory."""
+        found = [
+            Argument(
+                i.name, self.patterns.of(tuple(reversed(_matrix(i.shape))) if len(i.shape) > 1 else (i.size,))
+            )
+            for i in kernel.inputs
+        ]
+        return (*found, *([Argument(THETA, self.patterns.of((self.info.l,)))] if kernel.theta else []))
+
+    def _inputs_and_outputs(self, kernel: KernelView) -> tuple[Argument, ...]:
+        """The inputs, and the outputs, which are not read."""
+        unread = [Argument(f"out_{one.name}", self.patterns.unread(one.shape)) for one in kernel.outputs]
+        return (*self._inputs(kernel), *unread)
+
+    def _jacobian(self, kernel: KernelView, other: KernelView) -> External:
+        call, inputs = _Call(kernel, other, self), self._inputs_and_outputs(kernel)
+        shown = []
+        for output in kernel.outputs:
+            for k, vector in enumerate(kernel.inputs):
+                block = next(one for one in other.outputs if one.name == f"d{output.name}_d{vector.name}")
+                at, shape, zero = call.at(block.name), block.shape, frozenset(block.zero)
+                if call.is_wide(k):
+                    at, shape, zero = call.by_entries(block, k)
+                shown.append((f"jac_{output.name}_{vector.name}", at, self.patterns.of(shape, zero)))
+            if kernel.theta:
+                at, shape = call.by_theta()
+                shown.append((f"jac_{output.name}_{THETA}", at, self.patterns.of(shape)))
+        return call.external("jac_", inputs, shown)
+
+    def _reverse(self, kernel: KernelView, gradient: KernelView) -> External:
+        """The function that takes one cotangent to the gradients by all inputs. CasADi adds them up."""
+        (output,), inputs = kernel.outputs, self._inputs_and_outputs(kernel)
+        call, shown = _Call(kernel, gradient, self), []
+        seed = Argument(f"adj_{output.name}", self.patterns.of(output.shape))
+        for k, name in enumerate([*(vector.name for vector in kernel.inputs), *[THETA] * kernel.theta]):
+            found = next(one for one in gradient.outputs if one.name == f"grad_{name}")
+            at, shape = call.at(found.name), found.shape
+            if call.is_wide(k):
+                at, shape, _ = call.by_entries(found, k)
+            shown.append((f"adj_{name}", at, self.patterns.of(shape)))
+        return call.external("adj1_", (*inputs, seed), shown, [f"given(arg[{len(inputs)}])"])
+
+    def _forward(self, kernel: KernelView, direction: KernelView) -> External:
+        """The function that takes one direction of all inputs to that of the output."""
+        (output,), inputs = kernel.outputs, self._inputs_and_outputs(kernel)
+        call = _Call(kernel, direction, self)
+        directions = tuple(Argument(f"fwd_{one.name}", one.pattern) for one in self._inputs(kernel))
+        seeds = [call.direction(k, f"given(arg[{len(inputs) + k}])") for k in range(len(directions))]
+        shown = [(f"fwd_{output.name}", call.at(f"d{output.name}"), self.patterns.of(output.shape))]
+        return call.external("fwd1_", (*inputs, *directions), shown, seeds)
 
 
-def _reverse(kernel: KernelView, gradient: KernelView, patterns: _Patterns) -> External:
-    """The function that takes one cotangent to the gradients by all inputs. CasADi adds them up."""
-    (output,) = kernel.outputs
-    unread = Argument(f"out_{output.name}", patterns.unread(output.shape))
-    seed = Argument(f"adj_{output.name}", patterns.of(output.shape))
-    sizes = {one.name: one.shape for one in gradient.outputs}
-    shown = [(f"adj_{i.name}", f"grad_{i.name}", patterns.of(sizes[f"grad_{i.name}"])) for i in kernel.inputs]
-    return _external("adj1_", kernel, (*_given(kernel, patterns), unread, seed), shown, gradient)
+class _Call:
+    """A call of an emitted function, and what comes before and behind it. Results, in order, are first in `w`."""
+
+    def __init__(self, kernel: KernelView, called: KernelView, of: _Externals) -> None:
+        self.kernel, self.called, self.of = kernel, called, of
+        self.starts = _starts(called.outputs)
+        self.work = sum(output.size for output in called.outputs)
+        self.before: list[str] = []
+        self.after: list[str] = []
+        self.symbols = [called.prototypes["single"].symbol]
+        self.maps: dict[int, str] = {}
+        self.restored = {k: self._room(of.info.nq) for k in range(len(kernel.inputs)) if self.is_wide(k)}
+        if self.restored:
+            of.helpers.add("restore")
+
+    def is_wide(self, k: int) -> bool:
+        """Whether an input of the function is a position with quaternions."""
+        inputs = self.kernel.function.inputs
+        return bool(self.of.info.units) and k < len(inputs) and inputs[k].axes == Q.axes
+
+    def read(self, k: int) -> str:
+        """C of an input, positions as the called function reads them."""
+        if k in self.restored and not self.called.function.normalizes:
+            return self.restored[k]
+        return f"given(arg[{k}])"
+
+    def at(self, output: str) -> int:
+        return self.starts[output]
+
+    def by_entries(self, block: OutputView, k: int) -> tuple[int, tuple[int, ...], frozenset[int]]:
+        """Where the derivatives by the entries of input k are put, their shape, and what is zero of them, from those along
+        the tangent."""
+        info, place = self.of.info, self._map(k)
+        rows = prod(block.shape[:-1])
+        to = self._room(rows * info.nq)
+        self.after.append(f"by_entries({rows}, w + {self.at(block.name)}, {place}, {to});")
+        self.of.helpers.add("by_entries")
+        zero = frozenset(block.zero)
+        left = {(row, i) for row in range(rows) for i in range(info.nv) if row * info.nv + i not in zero}
+        entries = [divmod(one, info.nq) for one in _nonzeros(self.of.kernels[MAP].outputs[0])]
+        kept = {row * info.nq + j for row in range(rows) for i, j in entries if (row, i) in left}
+        return _offset(to), (*block.shape[:-1], info.nq), frozenset(range(rows * info.nq)) - kept
+
+    def by_theta(self) -> tuple[int, tuple[int, ...]]:
+        """Where the derivatives by theta_b are put, and their shape: those of torques are the regressor's entries."""
+        info, regressor = self.of.info, self.of.kernels[REGRESSOR]
+        names = {vector.name: self.read(k) for k, vector in enumerate(self.kernel.inputs)}
+        names |= {output.name: f"w + {self.at(output.name)}" for output in self.called.outputs}
+        read = [names.get(vector.name, "given(0)") for vector in regressor.inputs]
+        found = self._room(info.nv * info.l)
+        self.symbols.append(regressor.prototypes["single"].symbol)
+        self.after.append(f"{self.symbols[-1]}({', '.join([*read, found])});")
+        if RECIPES[self.kernel.function.name].polynomials is Polynomials.SOLVED:
+            inverse = next(one for one in self.called.outputs if one.name.endswith("_dtau"))
+            to = self._room(info.nv * info.l)
+            sizes = f"{info.nv}, {info.nv}, {info.l}"
+            self.of.helpers.add("multiply")
+            self.after.append(f"multiply({sizes}, -1.0, w + {self.at(inverse.name)}, {found}, {to});")
+            found = to
+        return _offset(found), (info.nv, info.l)
+
+    def direction(self, k: int, given: str) -> str:
+        """C of a direction of input k, along the tangent."""
+        if not self.is_wide(k):
+            return given
+        place, to = self._map(k), self._room(self.of.info.nv)
+        self.of.helpers.add("along_tangent")
+        self.before.append(f"along_tangent({place}, {given}, {to});")
+        return to
+
+    def external(
+        self,
+        prefix: str,
+        inputs: tuple[Argument, ...],
+        shown: Sequence[tuple[str, int, str]],
+        seeds: Sequence[str] = (),
+    ) -> External:
+        """prefix: of CasADi's name; shown: name for CasADi, place, pattern; seeds: C of what is read behind the inputs."""
+        own = [self.read(k) for k in range(len(self.kernel.inputs))]
+        theta = [f"given(arg[{len(own)}])"] * self.called.theta
+        results = [f"w + {start}" for start in self.starts.values()]
+        return External(
+            name=prefix + self.kernel.prototypes["single"].symbol,
+            inputs=inputs,
+            outputs=tuple(Argument(label, pattern, at) for label, at, pattern in shown),
+            called=self.symbols[0],
+            given=", ".join([*own, *seeds, *theta, *results]),
+            work=self.work,
+            fails=self.called.positive is not None,
+            restored=tuple((f"given(arg[{k}])", to) for k, to in self.restored.items()),
+            before=tuple(self.before),
+            after=tuple(self.after),
+            symbols=tuple(dict.fromkeys(self.symbols)),
+        )
+
+    def _room(self, size: int) -> str:
+        """C of the next so many reals of the work vector."""
+        self.work += size
+        return f"w + {self.work - size}"
+
+    def _map(self, k: int) -> str:
+        """C of d tangent / dq of input k."""
+        if k not in self.maps:
+            self.symbols.append(self.of.kernels[MAP].prototypes["single"].symbol)
+            self.maps[k] = self._room(self.of.info.nv * self.of.info.nq)
+            self.before.append(f"{self.symbols[-1]}(given(arg[{k}]), {self.maps[k]});")
+        return self.maps[k]
 
 
-def _given(kernel: KernelView, patterns: _Patterns) -> tuple[Argument, ...]:
-    """The inputs. A matrix has one column per row of ours, so that the numbers have the same order in memory."""
-    return tuple(Argument(i.name, patterns.of(tuple(reversed(_matrix(i.shape))) if len(i.shape) > 1 else (i.size,)))
-                 for i in kernel.inputs)  # fmt: skip
-
-
-def _block(output: OutputView, patterns: _Patterns) -> str:
-    return patterns.of(output.shape, output.zero)
-
-
-def _external(
-    prefix: str,
-    kernel: KernelView,
-    inputs: tuple[Argument, ...],
-    shown: Sequence[tuple[str, str, str]],
-    called: KernelView,
-) -> External:
-    """prefix: of CasADi's name; shown: name for CasADi, name among the called kernel's outputs, pattern."""
-    starts = _starts(called.outputs)
-    count = len(kernel.inputs)
-    last = (len(inputs) - 1,) if len(called.inputs) > count else ()
-    return External(
-        name=prefix + kernel.prototypes["single"].symbol,
-        inputs=inputs,
-        outputs=tuple(Argument(label, pattern, starts[output]) for label, output, pattern in shown),
-        called=called.prototypes["single"].symbol,
-        read=(*range(count), *last),
-        starts=tuple(starts.values()),
-        work=sum(output.size for output in called.outputs),
-        fails=called.positive is not None,
-    )
+def _offset(place: str) -> int:
+    """The number in C of a place in the work vector."""
+    return int(place.removeprefix("w + "))
 
 
 def _starts(outputs: Sequence[VectorView]) -> dict[str, int]:

@@ -1,0 +1,64 @@
+"""How displacements follow from changes of the entries of q: from derivatives along the tangent to those by entries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.manifold import tangent
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    q = g.inputs["q"]
+    columns = [tangent(g.frames, q, [float(i == k) for i in range(len(q))]) for k in range(len(q))]
+    return {"T": list(zip(*columns, strict=True))}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    columns = [tangent(robot.frames, list(q.T), list(unit)) for unit in np.eye(q.shape[-1])]
+    return {"T": entries(list(zip(*columns, strict=True)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """The pseudo-inverse of how coordinates change at unit rates."""
+    rates = [robot.coordinate_rates(given["q"], unit) for unit in np.eye(robot.model.nv)]
+    return {"T": np.linalg.pinv(np.stack(rates, axis=-1))}
+
+
+RECIPE = Recipe(
+    Signature(
+        "tangent_map",
+        226,
+        "T with v = T dq, the displacement that a small change dq of q makes; q may have quaternions of any length, and T "
+        "is zero along them; derivatives along the tangent times T are derivatives by the entries of q",
+        (Q,),
+        (
+            Quantity(
+                "T",
+                ("nv", "nq"),
+                means="row i, column j: derivative of v[i], the displacement, by q[j]; zero along a quaternion",
+                unit="1",
+                powers=(1, -1),
+            ),
+        ),
+        theta=False,
+        summary="Compute the matrix T = dv/dq: dq, a small change of the entries of q, moves the joints by v = T dq.",
+        normalizes=True,
+    ),
+    "map from entries of q to the tangent",
+    trace,
+    reference,
+    "integrate",
+    pinocchio,
+    matters=(),
+)

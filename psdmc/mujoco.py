@@ -1,0 +1,234 @@
+"""Positions and rates between psdmc's conventions, which are Pinocchio's, and MuJoCo's. MuJoCo need not be installed.
+
+                       psdmc, Pinocchio                          MuJoCo
+quaternion             x, y, z, w                                w, x, y, z
+linear rate of a base  along the base's axes                     along the world's axes
+angular rate           along the body's axes                     along the body's axes
+joint that follows     no entry of its own                       entries of its own
+order of joints        the model's `joint_names`                 that of the MjModel
+
+Arrays may have any leading axes, which broadcast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import model_of
+from psdmc.real_arrays import real_array
+from psdmc.robot.coordinates import Following
+from psdmc.robot.joints.quaternion import inverse, rotation_of
+from psdmc.robot.joints.scalars import unit
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import BASE, Mechanism
+
+Array = NDArray[np.float64]
+
+KINDS = ("free", "ball", "slide", "hinge")
+"""MuJoCo's types of joints, by their numbers (mjtJoint)."""
+
+OF_QUATERNION = {"free": (0, 1, 2, 4, 5, 6, 3), "ball": (1, 2, 3, 0)}
+"""Places of a joint's coordinates among MuJoCo's."""
+
+
+def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = None) -> Array:
+    """Return MuJoCo's qpos (..., nq of MuJoCo) of positions q (..., nq).
+
+    model     the model, or the path of its file, whose joints q is of
+    mj_model  MuJoCo's MjModel of the robot, whose joints are found by name. Its other joints are where qpos0 has them.
+              None: MuJoCo has the joints of the model, in the model's order
+
+    Raises InputError if an array has another shape, or if MuJoCo has no such joint.
+    """
+    layout = _Layout.of("to_qpos", model, mj_model)
+    values = layout.checked("q", q, layout.nq)
+    values = layout.following.positions(values) if layout.following else values
+    found = np.broadcast_to(layout.rest, (*values.shape[:-1], len(layout.rest))).copy()
+    found[..., layout.places] = values
+    return found
+
+
+def from_qpos(model: DynamicsModel | str | Path, qpos: ArrayLike, mj_model: Any = None) -> Array:
+    """Return positions q (..., nq) of MuJoCo's qpos (..., nq of MuJoCo). The arguments are those of `to_qpos`.
+
+    Entries of joints that follow others, and of joints that the model has not, are not read.
+    """
+    layout = _Layout.of("from_qpos", model, mj_model)
+    return np.asarray(layout.checked("qpos", qpos, len(layout.rest))[..., layout.places[layout.own_places]])
+
+
+def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_model: Any = None) -> Array:
+    """Return MuJoCo's qvel (..., nv of MuJoCo) of rates qd (..., nv) at positions q (..., nq), in psdmc's convention.
+
+    The other arguments are those of `to_qpos`. Joints of MuJoCo that the model has not are at rest.
+    """
+    layout = _Layout.of("to_qvel", model, mj_model)
+    rates = layout.checked("qd", qd, layout.nv)
+    rates = layout.following.rates(rates) if layout.following else rates
+    here, rates = layout.broadcast(layout.checked("q", q, layout.nq), rates, "qd")
+    found = np.zeros((*rates.shape[:-1], layout.rates))
+    found[..., layout.speeds] = layout.turned(here, rates, back=False)
+    return found
+
+
+def from_qvel(
+    model: DynamicsModel | str | Path, q: ArrayLike, qvel: ArrayLike, mj_model: Any = None
+) -> Array:
+    """Return rates qd (..., nv) of MuJoCo's qvel (..., nv of MuJoCo) at positions q (..., nq), in psdmc's convention.
+
+    The other arguments are those of `to_qpos`. For a state of MuJoCo's, q = from_qpos(model, qpos).
+    """
+    layout = _Layout.of("from_qvel", model, mj_model)
+    here, rates = layout.broadcast(
+        layout.checked("q", q, layout.nq), layout.checked("qvel", qvel, layout.rates), "qvel"
+    )
+    return layout.turned(here, rates[..., layout.speeds[layout.own_speeds]], back=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layout:
+    """Where MuJoCo has what the joints of a model have.
+
+    what        the function that is called, for errors
+    following   how all joints move with the model's coordinates; None where each has its own
+    rest        (nq of MuJoCo,) positions of joints that the model has not
+    rates       nv of MuJoCo
+    places      of all joints' coordinates, and
+    speeds      of all joints' rates
+    own_places  which of these are the model's coordinates, and
+    own_speeds  its rates
+    free        whether the first joint is a free one
+    """
+
+    what: str
+    following: Following | None
+    rest: Array
+    rates: int
+    places: NDArray[np.intp]
+    speeds: NDArray[np.intp]
+    own_places: NDArray[np.intp]
+    own_speeds: NDArray[np.intp]
+    free: bool
+
+    @staticmethod
+    def of(what: str, model: DynamicsModel | str | Path, mj_model: Any) -> _Layout:
+        chain = model_of(model).mechanism
+        kinds = [joint.type.mujoco for joint in chain.joints]
+        _refuse(what, chain, kinds)
+        nq, nv = ([getattr(joint.type, word) for joint in chain.joints] for word in ("nq", "nv"))
+        if mj_model is None:
+            rest, rates = np.zeros(sum(nq)), sum(nv)
+            at, first = np.cumsum([0, *nq[:-1]]), np.cumsum([0, *nv[:-1]])
+        else:
+            joints = _found(what, chain, kinds, mj_model)
+            rest, rates = np.array(mj_model.qpos0, float), int(mj_model.nv)
+            at, first = mj_model.jnt_qposadr[joints], mj_model.jnt_dofadr[joints]
+        orders = [OF_QUATERNION.get(kind, (0,)) for kind in kinds]
+        return _Layout(
+            what,
+            Following.of(chain.coordinates, chain.types) if chain.has_followers else None,
+            rest,
+            rates,
+            _joined(int(start) + k for start, order in zip(at, orders, strict=True) for k in order),
+            _joined(int(start) + k for start, count in zip(first, nv, strict=True) for k in range(count)),
+            _own(chain, nq),
+            _own(chain, nv),
+            kinds[0] == "free",
+        )
+
+    @property
+    def nq(self) -> int:
+        return len(self.own_places)
+
+    @property
+    def nv(self) -> int:
+        return len(self.own_speeds)
+
+    def checked(self, name: str, values: ArrayLike, size: int) -> Array:
+        """The values as an array (..., size)."""
+        array = real_array(f"{self.what}: {name}", values)
+        if array.shape[-1:] != (size,):
+            raise InputError(
+                f"{self.what}: {name} has shape {array.shape}, expected (..., {size})",
+                "give the entries of one state along the last axis; the model's and MuJoCo's numbers may differ",
+            )
+        return array
+
+    def broadcast(self, q: Array, rates: Array, name: str) -> tuple[Array, Array]:
+        try:
+            lead = np.broadcast_shapes(q.shape[:-1], rates.shape[:-1])
+        except ValueError:
+            raise InputError(
+                f"{self.what}: shapes do not broadcast: q {q.shape}, {name} {rates.shape}",
+                "give as many positions as rates, or one of either",
+            ) from None
+        return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
+
+    def turned(self, q: Array, rates: Array, back: bool) -> Array:
+        """Rates with the base's linear ones along the world's axes instead of the base's, or back."""
+        if not self.free:
+            return np.array(rates)
+        quaternion = unit([q[..., k] for k in range(3, 7)])
+        rows = rotation_of(inverse(quaternion) if back else quaternion)
+        linear = [row[0] * rates[..., 0] + row[1] * rates[..., 1] + row[2] * rates[..., 2] for row in rows]
+        return np.concatenate([np.stack(linear, axis=-1), rates[..., 3:]], axis=-1)
+
+
+def _refuse(what: str, chain: Mechanism, kinds: Sequence[str]) -> None:
+    """InputError for joints that MuJoCo has not, or has elsewhere."""
+    for k, (joint, kind) in enumerate(zip(chain.joints, kinds, strict=True)):
+        if kind not in KINDS:
+            raise InputError(
+                f"{what}: joint {shown(joint.name)} {joint.type.verb}, and MuJoCo has no such joint",
+                "replace it in the robot's file by hinges and slides",
+            )
+        place = joint.placement
+        moved = np.any(place.rotation != np.eye(3)) or place.translation.any()
+        if kind == "free" and (k or chain.parents[k] != BASE or moved):
+            raise InputError(
+                f"{what}: joint {shown(joint.name)} is free, but not in the world's frame, as MuJoCo's free joints are",
+                "derive the model with the floating link as root",
+            )
+
+
+def _found(what: str, chain: Mechanism, kinds: Sequence[str], mj_model: Any) -> list[int]:
+    """MuJoCo's numbers of the chain's joints: by name, a free one by its type."""
+    if not hasattr(mj_model, "jnt_qposadr"):
+        raise InputError(
+            f"{what}: a {type(mj_model).__name__} was given where an MjModel is expected",
+            "mujoco.MjModel.from_xml_path(file) gives one",
+        )
+    theirs = [KINDS[number] for number in mj_model.jnt_type]
+    names = {mj_model.joint(j).name: j for j in range(mj_model.njnt)}
+    free = [j for j, kind in enumerate(theirs) if kind == "free"]
+    found = []
+    for joint, kind in zip(chain.joints, kinds, strict=True):
+        number = free[0] if kind == "free" and len(free) == 1 else names.get(joint.name)
+        if number is None or theirs[number] != kind:
+            what_there = (
+                "has no such joint" if number is None else f"has a {theirs[number]} joint of that name"
+            )
+            raise InputError(
+                f"{what}: joint {shown(joint.name)} is a {kind} joint, and the MjModel {what_there}",
+                "give the MjModel of the same robot, with the same names of joints; name all joints in an MJCF file",
+            )
+        found.append(number)
+    return found
+
+
+def _own(chain: Mechanism, counts: Sequence[int]) -> NDArray[np.intp]:
+    """Which of all joints' entries, so many each, are those of joints that follow no other."""
+    starts = np.cumsum([0, *counts])
+    return _joined(starts[i] + k for i in chain.own_joints for k in range(counts[i]))
+
+
+def _joined(numbers: Any) -> NDArray[np.intp]:
+    return np.array(list(numbers), np.intp)
