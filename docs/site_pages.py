@@ -65,6 +65,7 @@ MENU = {
         "how-to/springs-and-friction",
         "how-to/priors",
         "how-to/figures",
+        "how-to/validate",
         "how-to/reproducible-builds",
         "how-to/troubleshooting",
         "how-to/extending",

@@ -284,6 +284,18 @@ LOGS = (
         "Choose another name for `-o`.",
         "calibrate arm.npz words.csv -o arm.npz",
     ),
+    Entry(
+        "holds no calibration that torques can be predicted from",
+        "The model that you gave to `validate` is not calibrated.",
+        "Run `psdmc calibrate` first.",
+        "validate arm.npz words.csv",
+    ),
+    Entry(
+        "different robots:",
+        "The two models of `compare` have other joints, axes or link frames.",
+        "Compare models of one robot.",
+        "compare arm.npz examples/robots/scara.toml",
+    ),
 )
 
 ARRAYS = (

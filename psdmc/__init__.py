@@ -11,7 +11,9 @@ from psdmc.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from psdmc.calibration.api import calibrate
+    from psdmc.calibration.comparison import compare
     from psdmc.calibration.payload import identify_payload
+    from psdmc.calibration.validation import validate
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
@@ -31,6 +33,7 @@ __all__ = [
     "ToolchainError",
     "__version__",
     "calibrate",
+    "compare",
     "compile",
     "derive",
     "emit_c",
@@ -40,6 +43,7 @@ __all__ = [
     "load",
     "save",
     "torch",
+    "validate",
 ]
 
 _MODULES = {"CompiledRobot": "psdmc.toolchain.call"}
@@ -47,6 +51,7 @@ _MODULES |= {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
 _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
 _MODULES |= {
     "calibrate": "psdmc.calibration.api",
+    "compare": "psdmc.calibration.comparison",
     "export_urdf": "psdmc.export.export_urdf",
     "identify_payload": "psdmc.calibration.payload",
     "jax": "psdmc.frameworks.api",
@@ -54,6 +59,7 @@ _MODULES |= {
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
     "torch": "psdmc.frameworks.api",
+    "validate": "psdmc.calibration.validation",
 }
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.columns.columns import Columns
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import names_of
@@ -17,7 +18,6 @@ from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quant
 from psdmc.calibration.identify.physical_load import about_centre, nearest_load
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.quality import qualities
-from psdmc.calibration.identify.steps import step_of
 from psdmc.calibration.identify.visibility import Visibility, visibility
 from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array
@@ -111,17 +111,9 @@ def _of_calibration(
         return np.zeros(model.l), LinearOptions(), None, None
     found = delivered(model)
     std = np.where(np.isfinite(kept.std), kept.std, 0.0)
-    law = found.prediction
-    if not law.is_linear:
-        step = step_of(law.steps["inertial"])
-        return std, replace(LinearOptions(), filter=step.filter), None, found.constants or None
-    options = LinearOptions(
-        filter=step_of(law.steps["all"]).filter,
-        exponents=law.exponents,
-        sign_speed=law.sign_speed,
-        offset=law.offset,
-        coupling=law.coupling,
-    )
+    options = replace(found.linear, columns=Columns())
+    if not found.prediction.is_linear:
+        return std, options, None, found.constants or None
     names = names_of(options.terms)
     friction = np.array([[found.friction[joint, name] for name in names] for joint in model.joint_names])
     return std, options, friction, found.constants or None

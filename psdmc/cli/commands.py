@@ -15,6 +15,7 @@ from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
 from psdmc.cli.sampling import sample
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
+from psdmc.cli.validating import compare, validate
 from psdmc.cli.viewing import figures, view
 from psdmc.version import psdmc_version
 
@@ -59,6 +60,8 @@ COMMANDS = (
     (calibrate, "identify a model's parameters from logs"),
     (figures, "write figures and tables of a calibration"),
     (payload, "identify the mass of a load from logs"),
+    (validate, "test a calibrated model on other logs"),
+    (compare, "compare two models of one robot"),
     (export_urdf, "write a model as a robot file"),
     (cache, "show or clear the compile cache"),
     (doctor, "list the programs and packages that psdmc can use"),

@@ -36,12 +36,13 @@ FILE = (11, 6)
 def step_panels(step: StepQuality) -> tuple[str, ...]:
     """A picture a joint: observed and predicted torque, the residual, held-out stretches shaded."""
     return tuple(
-        svg(partial(_alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
+        svg(partial(alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
         for sample in step.samples
     )
 
 
-def _alone(draw: Callable[[Axes], None], figure: Figure) -> None:
+def alone(draw: Callable[[Axes], None], figure: Figure) -> None:
+    """A figure with one drawing."""
     draw(figure.subplots())
 
 
@@ -84,7 +85,7 @@ def excitation_panels(
     """The exciting motion's positions, speeds and accelerations, with the joints' limits where they are given, and its
     condition beside those of random motions: a picture each."""
     return tuple(
-        svg(partial(_alone, draw), PANEL, f"exciting motion: {says}")
+        svg(partial(alone, draw), PANEL, f"exciting motion: {says}")
         for says, draw in _excitation(found, joint_names, limits)
     )
 

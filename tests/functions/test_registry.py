@@ -34,6 +34,10 @@ NAMES_SEVERAL = {
     "calibration/verdict/record.py": "steps of a calibration, and what the verdict compares",
     "model/dynamics_model.py": "methods with documentation of their own: what E and P are defined by",
     "model_functions.py": "what is computed from E and P where a model has them",
+    "backends/c/adapters/fmu.py": "what an FMU simulates, and its optional outputs",
+    "frameworks/differentiation.py": "which function gives the derivatives of which",
+    "frameworks/jax_robot.py": "what JAX reads of functions that need help",
+    "frameworks/torch_robot.py": "what PyTorch reads of functions that need help",
     "bench/legged.py": "the rows of the table of legged robots, and what rivals compute in their place",
     "report/bench_markdown.py": "the columns of README's table",
 }

@@ -162,7 +162,7 @@ def _rows(
     not."""
     states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
     at = thinned(states, options.filter)
-    late = _Late(states, friction.delay, at)
+    late = Late(states, friction.delay, at)
     known = np.zeros_like(states.q)
     if run.tool is not None:
         known = payload_torque(chain, states.q, run.tool.mass, run.tool.com)
@@ -189,13 +189,13 @@ def _rows(
     )
 
 
-def _late_columns(model: Regressor, late: _Late, motion: tuple[Array, Array, Array]) -> Array:
+def _late_columns(model: Regressor, late: Late, motion: tuple[Array, Array, Array]) -> Array:
     """(rows, n, l) the regressor along a motion, delayed and filtered like a log."""
     columns = model.regressor(*motion)
     return np.stack([late(columns[:, :, j]) for j in range(columns.shape[2])], axis=-1)
 
 
-class _Late:
+class Late:
     """Turns a prediction into what a log would hold: delayed, filtered, one row per independent sample."""
 
     def __init__(self, states: States, delay: float, at: NDArray[np.intp]) -> None:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +21,13 @@ from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.friction import FrictionResult, judge_friction, prepared_runs
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
-from psdmc.calibration.identify.inertial import judge_inertial
+from psdmc.calibration.identify.inertial import Late, judge_inertial
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_columns, names_of
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.identify.state_friction import PARAMETERS
+from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
 from psdmc.calibration.identify.steps import StepOptions, judged, step_of
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
@@ -66,6 +65,27 @@ class Delivered:
     @property
     def theta_b(self) -> Array:
         return self.model.known_theta_b()
+
+    @property
+    def step(self) -> StepOptions:
+        """Filter and split of the whole torque of a fast motion."""
+        steps = self.prediction.steps
+        return step_of(steps["all"] if "all" in steps else steps["inertial"])
+
+    @property
+    def linear(self) -> LinearOptions:
+        """Options of a linear fit with the file's filter and, where its friction has no state, the file's friction."""
+        law, options = self.prediction, LinearOptions(filter=self.step.filter)
+        if not law.is_linear:
+            return options
+        return replace(
+            options,
+            exponents=law.exponents,
+            sign_speed=law.sign_speed,
+            offset=law.offset,
+            coupling=law.coupling,
+            columns=self.columns,
+        )
 
     @property
     def motors(self) -> Motors:
@@ -165,45 +185,63 @@ def _read(found: Delivered, given: Sequence[AnyLog | str | Path]) -> Sequence[An
     return [*logs, *read]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictedRows:
+    """Independent samples of one log: time (N,) s; joint speeds, measured and predicted torque (N, n)."""
+
+    time: Array
+    qd: Array
+    measured: Array
+    predicted: Array
+
+
 def log_parts(
     model: DynamicsModel, log: AnyLog, check: CheckOptions
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Of one log's independent samples, by a model that plain logs calibrated: time (N,), measured torque and the model's
     (N, n), and which are held out (N,)."""
     found = delivered(model)
-    step = step_of(found.prediction.steps["all"])
-    time, measured, predicted = _log_parts(found, log, step, check)
-    return time, measured, predicted, held_out_of(log, len(time), step.split)
+    rows = predicted_rows(found, log, check)
+    return rows.time, rows.measured, rows.predicted, held_out_of(log, len(rows.time), found.step.split)
 
 
 def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) -> StepQuality:
-    chain, step = found.model.mechanism, step_of(found.prediction.steps["all"])
-    parts = [_log_parts(found, log, step, check) for log in logs]
-    time, measured, predicted = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    chain, step = found.model.mechanism, found.step
+    parts = [predicted_rows(found, log, check) for log in logs]
+    time, measured, predicted = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "measured", "predicted")
+    )
     out = np.concatenate(
-        [held_out_of(log, len(part[0]), step.split) for log, part in zip(logs, parts, strict=True)]
+        [held_out_of(log, len(part.time), step.split) for log, part in zip(logs, parts, strict=True)]
     )
     return judged("All", chain.joint_names, time, measured, predicted, out)
 
 
-def _log_parts(
-    found: Delivered, log: AnyLog, step: StepOptions, check: CheckOptions
-) -> tuple[Array, Array, Array]:
-    """Time, measured and predicted torque of one log's independent samples."""
-    parts = []
+def predicted_rows(
+    found: Delivered, log: AnyLog, check: CheckOptions, motors: Motors | None = None
+) -> PredictedRows:
+    """Measured and predicted torque of one log's independent samples; motors instead of the file's."""
+    step, motors, parts = found.step, motors or found.motors, []
+    friction = None if found.prediction.is_linear else _with_state(found)
     for stretch in stretches(
         checked(log, found.model.mechanism, step.filter.cutoff, check), step.filter, check
     ):
         states, at = stretch.states, stretch.at
-        predicted = smoothed_rows(states, at, partial(_torque, found, states))
-        parts.append((states.time[at], found.motors.torque(states.effort)[at], predicted))
-    time, measured, predicted = (np.concatenate(values) for values in zip(*parts, strict=True))
-    return time, measured, predicted
+        if friction is None:
+            predicted = smoothed_rows(states, at, lambda rows, of=states: _torque(found, of, rows))  # type: ignore[misc]
+        else:
+            predicted = _torque_with_state(found, friction, states, at)
+        parts.append((states.time[at], states.qd[at], motors.torque(states.effort)[at], predicted))
+    return PredictedRows(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
 def _torque(found: Delivered, states: States, rows: slice) -> Array:
     """(rows, n) motor torque before the filter: rigid bodies, friction, springs."""
-    q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
+    return linear_torque(found, states.q[rows], states.qd[rows], states.qdd[rows])
+
+
+def linear_torque(found: Delivered, q: Array, qd: Array, qdd: Array) -> Array:
+    """(N, n) motor torque of a file with a linear law: rigid bodies, friction, springs."""
     rigid = recursive.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
     law = found.prediction
     coupling = coupling_of(law.coupling)
@@ -214,6 +252,19 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
         torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
         rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
     return np.asarray(rigid + extra)
+
+
+def _torque_with_state(
+    found: Delivered, friction: FrictionResult, states: States, at: NDArray[np.intp]
+) -> Array:
+    """(rows, n) motor torque after delay and filter, of a friction law with a state, which starts at zero."""
+    model = found.model
+    motion = [states.q, states.qd, states.qdd]
+    torque = recursive.torques(model.mechanism, model.equivalent_parameters(), motion)
+    for k, name in enumerate(model.joint_names):
+        if name in friction.joints:
+            torque[:, k] += friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
+    return Late(states, friction.delay, at)(torque)
 
 
 def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
