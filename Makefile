@@ -93,11 +93,11 @@ TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 $(ADAPTERS)/ready: pyproject.toml
 	$(PYTHON) -m venv --clear $(ADAPTERS)
 	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url $(TORCH_INDEX) \
-	  --editable '.[jax,torch]' '$(TORCH)' pytest pytest-xdist hypothesis example-robot-data mpmath
+	  --editable '.[jax,torch,fmu]' '$(TORCH)' pytest pytest-xdist hypothesis example-robot-data mpmath
 	@touch $@
 
-test-adapters: $(ADAPTERS)/ready ## test robots inside JAX and PyTorch, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
-	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks
+test-adapters: $(ADAPTERS)/ready ## test robots inside JAX, PyTorch, FMPy and pip's wheels, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
+	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks tests/backends/adapters
 
 test-pages: $(READY) ## open bench, calibration and site pages in Chromium at three widths, light and dark; screenshots in generated/pages
 	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[pages]'
