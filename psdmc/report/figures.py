@@ -81,7 +81,8 @@ def require_own_folder(folder: str | Path) -> None:
     """InputError where a folder holds files, but none of `psdmc figures`."""
     table = Path(folder) / TABLE
     try:
-        is_own = table.read_bytes()[: len(MARK)] == MARK.encode()
+        with table.open("rb") as file:
+            is_own = file.read(len(MARK)) == MARK.encode()
     except OSError:
         is_own = False
     if not is_own:

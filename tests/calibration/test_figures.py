@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from calibration.conftest import smooth_log
 from command_line import typed
 
 from psdmc.calibration.calibrate import calibrate
@@ -46,8 +47,6 @@ NASTY = "a_b%$&#{x}~^\\<关节>"
 @pytest.fixture(scope="module")
 def given(arm, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Calibration]:
     """A log and what it calibrates."""
-    from conftest import smooth_log
-
     path = tmp_path_factory.mktemp("figures") / "log.npz"
     write_log(smooth_log(arm), path)
     return path, calibrate(arm.model, path, regressor=arm.regressor)

@@ -43,7 +43,7 @@ def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     if "\n$ psdmc view " in document.read_text(encoding="utf-8"):
         pytest.importorskip("plotly")
     for library in re.findall(
-        r"^>>> import (jax|torch)\b", document.read_text(encoding="utf-8"), re.MULTILINE
+        r"^>>> import (?:psdmc, )?(jax|torch)\b", document.read_text(encoding="utf-8"), re.MULTILINE
     ):
         pytest.importorskip(library)
     (tmp_path / "document").mkdir()

@@ -50,7 +50,7 @@ LIMBED = "four legs of a floating body"
 FLAGS = {LIMBED: ["-march=x86-64-v3"]}
 """Vectors of four lanes: one register for the four legs."""
 
-MOVES = ("neutral", "integrate", "difference")
+MOVES = ("neutral", "integrate", "difference", "tangent_map")
 """Of a chain these are a few stores and additions; all others take sines."""
 
 

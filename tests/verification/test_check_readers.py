@@ -33,6 +33,11 @@ OF_THE_TIP = (
     "derivatives of frame velocities",
     "inverse dynamics with wrenches",
     "operational-space inertia",
+    "contact Jacobian",
+    "contact drift",
+    "Delassus matrix",
+    "constrained forward dynamics",
+    "impulses of an impact",
 )
 """Functions that a frame's place matters to."""
 
