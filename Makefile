@@ -64,7 +64,7 @@ test-accuracy: $(READY) ## measure the accuracy of the compiled C for every robo
 	  tests/toolchain/test_target_machines.py tests/lower/test_expanded.py tests/bench/test_gate.py
 
 test-trees: $(READY) ## test 20 whole robots, 300 random trees and ten seconds of a trotting quadruped, with figures; make test takes a few
-	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py tests/end_to_end/test_trotting.py tests/dynamics tests/functions/test_steps_of_free_robots.py tests/robot/test_floating.py tests/robot/test_errors.py
+	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py tests/end_to_end/test_trotting.py tests/dynamics tests/functions/test_steps_of_free_robots.py tests/functions/test_constrained_forward_dynamics.py tests/robot/test_floating.py tests/robot/test_errors.py
 
 TARGET_PROGRAMS := qemu-aarch64 qemu-s390x qemu-arm aarch64-linux-gnu-gcc s390x-linux-gnu-gcc arm-none-eabi-gcc
 test-targets: $(READY) ## run self-tests for 64-bit Arm, big-endian s390x and Cortex-M in qemu; minutes
