@@ -92,8 +92,10 @@ TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 
 $(ADAPTERS)/ready: pyproject.toml
 	$(PYTHON) -m venv --clear $(ADAPTERS)
-	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url $(TORCH_INDEX) \
-	  --editable '.[jax,torch,fmu]' '$(TORCH)' pytest pytest-xdist hypothesis example-robot-data mpmath
+	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check '$(TORCH)' 2>/dev/null \
+	  || $(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url $(TORCH_INDEX) '$(TORCH)'
+	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --editable '.[jax,torch,fmu]' pytest pytest-xdist hypothesis example-robot-data mpmath
 	@touch $@
 
 test-adapters: $(ADAPTERS)/ready ## test robots inside JAX, PyTorch, FMPy and pip's wheels, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
