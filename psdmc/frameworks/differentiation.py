@@ -7,7 +7,7 @@ entries of q: a framework evaluates f(q with its quaternions normalised), and di
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, Protocol
 
@@ -290,6 +290,15 @@ class Coordinates:
 
     arrays: Any
     joints: tuple[JointType, ...]
+    _runs: tuple[tuple[JointType, int], ...] = field(init=False)
+    """Joints, and how many of one coordinate follow one another; made once, as PyTorch's compiler cannot follow groupby."""
+
+    def __post_init__(self) -> None:
+        runs: list[tuple[JointType, int]] = []
+        for is_plain, joints in groupby(self.joints, lambda joint: joint.about_z):
+            own = tuple(joints)
+            runs += [(own[0], len(own))] if is_plain else [(joint, 1) for joint in own]
+        object.__setattr__(self, "_runs", tuple(runs))
 
     @classmethod
     def of(cls, mechanism: Mechanism, arrays: Any) -> Coordinates:
@@ -345,14 +354,11 @@ class Coordinates:
         """Joint by joint the entries that belong to it, (..., 1) each. Joints of one coordinate in a row come together, as
         one joint whose entry is (..., k)."""
         at = 0
-        for is_plain, joints in groupby(self.joints, lambda joint: joint.about_z):
-            own = tuple(joints)
-            for joint in own[:1] if is_plain else own:
-                count = len(own) if is_plain else joint.nv if rates else joint.nq
-                size = count if is_plain else 1
-                starts = range(at, at + count, size)
-                yield joint, [_Entry(values[..., k : k + size], self.arrays) for k in starts]
-                at += count
+        for joint, together in self._runs:
+            count = together if joint.about_z else joint.nv if rates else joint.nq
+            size = together if joint.about_z else 1
+            yield joint, [_Entry(values[..., k : k + size], self.arrays) for k in range(at, at + count, size)]
+            at += count
 
     def _pairs(self, q: Array, other: Array, rates: bool = False) -> Iterator[tuple[JointType, Any, Any]]:
         parts = zip(self._parts(q), self._parts(other, rates), strict=True)
