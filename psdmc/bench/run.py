@@ -159,7 +159,7 @@ def assemble(
     count: bool,
     progress: Callable[[str], None],
 ) -> tuple[Assembled, ...]:
-    """Compile the libraries for every robot, and yield their functions robot by robot.
+    """Compile the libraries for every robot, and return their functions robot by robot.
 
     functions  names to keep; None: all
     count      whether to count instructions too, for which everything is compiled once more
