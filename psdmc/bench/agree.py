@@ -49,7 +49,8 @@ def disagreement(runner: Runner, states: States) -> float:
 
 
 def relative_error(found: Array, expected: Array) -> float:
-    """Return the relative error of values: infinite if a value is NaN, absolute if all expected values are zero."""
+    """Return the largest relative error of outputs: infinite if a value is NaN, absolute if all expected values are
+    zero."""
     largest = np.max(np.abs(expected), axis=0)
     error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest) or 1.0)
     return float(np.max(error)) if np.isfinite(error).all() else float("inf")

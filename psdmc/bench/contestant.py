@@ -143,8 +143,8 @@ class Runner:
         return self._timed("throughput", self._output, TAIL_BLOCK) - self._clock_cost() / TAIL_BLOCK
 
     def cold(self, calls: int, memory: Array) -> Array:
-        """Measure the times in ns of single calls with empty caches (all of `memory` is read between calls), without
-        reading the clock."""
+        """Measure the times of single calls with empty caches, in ns, without the time of reading the clock. All of
+        `memory` is read between two calls."""
         seconds = np.zeros(min(calls, self._states.count))
         loop = getattr(self._library, f"{self.contestant.symbol}_cold")
         work, sizes = self._work(self._output, len(seconds)), (len(seconds), memory.size)

@@ -97,7 +97,7 @@ class BenchResult:
 
     @property
     def wrong(self) -> tuple[str, ...]:
-        """Functions of libraries that gave wrong results and were therefore not timed, as text."""
+        """Texts on the libraries' functions that gave wrong results and were therefore not timed."""
         return tuple(f"{case.name}: {w.rival}: {w.reason}" for case in self.cases for w in case.wrong)
 
     def to_json(self) -> str:

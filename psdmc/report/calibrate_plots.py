@@ -1,4 +1,4 @@
-"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of Denso-2022."""
+"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper Denso-2022."""
 
 from __future__ import annotations
 

@@ -43,7 +43,8 @@ class TruthView:
 
 
 def truth_view(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> TruthView:
-    """Return these sections for a calibration of the virtual Denso. `true_model` has its true theta_b."""
+    """Return the true parameters and tables for the report of the virtual Denso. `true_model` has the true theta_b, in
+    the record's order."""
     sensors, harness = robot.sensors, robot.harness
     noisy = sensors.current_noise or sensors.position_step
     with_sensors = (

@@ -60,7 +60,7 @@ class PageView:
 
     @property
     def text(self) -> list[str]:
-        """Return the verdict and its reasons as lines of text, doubts first."""
+        """Return the verdict and its reasons as lines of text, with lines of doubt first."""
         said = [(kind == "doubt", f"  {kind}: {text}") for kind, text in self.lines]
         doubts = [text.strip() for is_doubt, text in said if is_doubt]
         return [*doubts, self.head, *(text for is_doubt, text in said if not is_doubt), *self.more]
