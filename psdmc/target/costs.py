@@ -44,8 +44,8 @@ class Costs:
     crowded             code for lanes uses the operation order of the code for one state, unless that order keeps this many
                         times more values alive
     worth_two_bodies    code for lanes gets a function body of its own if it is this factor cheaper
-    worth_sharing       code for one state uses the arithmetic of the code for lanes if it costs at most this factor: then one
-                        body is enough
+    worth_sharing       code for one state uses the arithmetic of the code for lanes if it costs at most this factor: then
+                        one body is enough
     shared_from         additions in a function from which `worth_sharing` is considered
     loops_from          rows from which products of square matrices are loops in code for one state
     worth_limbs         equal limbs are computed in parallel lanes if this is at least this factor cheaper
