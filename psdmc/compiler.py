@@ -421,7 +421,7 @@ class _Request:
         return robot
 
     def opened(self) -> DynamicsModel:
-        """The model."""
+        """Return the model of this request, which a pickled request stores as compressed bytes."""
         if isinstance(self.model, bytes):
             return load_bytes(zlib.decompress(self.model), Path("(model of a pickled robot)"))
         return self.model

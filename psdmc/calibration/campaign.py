@@ -127,7 +127,7 @@ def _toml_text(text: str) -> str:
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
-    """Return the parameters of the exciting motion (22) and its condition number as plain JSON values."""
+    """Return the parameters of the exciting motion, (22) in Denso-2022, and its condition number as plain JSON values."""
     motion = found.motion
     return {
         "duration_s": motion.duration,

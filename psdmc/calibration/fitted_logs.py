@@ -27,7 +27,7 @@ MOST_NAMED = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogFit:
-    """Data that all records of one linear fit share.
+    """Data that all results (records) of one linear fit share.
 
     physical     whether the user wants a physically consistent record
     consistency  options of the physically consistent estimate

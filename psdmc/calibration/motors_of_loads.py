@@ -98,8 +98,8 @@ def _together(names: Sequence[str], found: MotorResult, given: Mapping[str, floa
 def with_loaded_logs(
     record: Calibration, loaded: LoadedLogs, found: MotorResult, options: LinearOptions
 ) -> Calibration:
-    """Return the record with the quality of the torque constants (column Motor of table 3). It comes from the model's
-    file after it was written and read back."""
+    """Return the record with the quality of the torque constants (column Motor of the report's accuracy table). The
+    quality is computed from the model's file after the file was written and read back."""
     load = loaded.load
     used = LoadUsed(
         float(load.mass),

@@ -37,7 +37,7 @@ class Friction:
 
     @property
     def by_position(self) -> bool:
-        """Whether the torque depends on the joints' positions."""
+        """Whether the friction torque depends on the joints' positions."""
         return any("q" in term.reads for term in self.terms)
 
     def by_speed(self, qd: Array) -> Array:

@@ -80,5 +80,5 @@ class Costs:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether code with one state per lane differs from code for one state."""
+        """Whether code that computes one state per SIMD lane differs from code for one state."""
         return self.angles_per_sincos > 1

@@ -54,7 +54,7 @@ MUJOCO = "MuJoCo's mj_inverse"
 
 @dataclass(frozen=True, slots=True)
 class CheckRow:
-    """One comparison.
+    """The result of one comparison between the model and a reference.
 
     name     what was compared
     against  the function of Pinocchio, or other reference, that it was compared with

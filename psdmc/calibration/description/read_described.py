@@ -253,8 +253,10 @@ NEIGHBOURS = 4
 
 
 def without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tuple[Array, RowStore]:
-    """Return the rows at which all columns have a value. Column k of a row is taken `delays[k]` (s) later. Raises
-    InputError if time does not increase.
+    """Return the rows of a log without the delays of its columns: column k of a row is interpolated `delays[k]` (s)
+    later.
+
+    Only rows at which all columns have a value are returned. Raises InputError if time does not increase.
 
     time   (N,);  store  N rows of len(delays) columns
     """

@@ -25,9 +25,9 @@ LARGEST_CONDITION = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Joints that are driven by the same number of motors together: q_joint = matrix q_motor.
+    """Joints that several motors drive together, with as many motors as joints: q_joint = matrix q_motor.
 
-    quantities  those whose columns are values of the motors
+    quantities  quantities whose columns in the log are values of the motors
     """
 
     joints: tuple[str, ...]

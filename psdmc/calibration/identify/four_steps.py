@@ -40,7 +40,7 @@ class Runs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourSteps:
-    """The results of the four steps; `motor` is None if the logs hold torques."""
+    """The results of the four steps motors, gravity, friction and inertia; `motor` is None if the logs hold torques."""
 
     motor: MotorResult | None
     motors: Motors

@@ -1,9 +1,9 @@
 """Fits the seven LuGre parameters of one joint, in the two steps of Denso-2022 and a final refinement.
 
 The first step fits F_c, F_v, d_v to fast samples, where bristles do not matter, by trust-region least squares. The
-second step fits the other parameters by Nelder-Mead over a simulation of (12). The refinement fits all by trust
-region, which also gives the standard deviations. A run has three more unknowns: the joint's inertia in that pose (the
-paper neglects it), a constant torque, and the time between position and current.
+second step fits the other parameters by Nelder-Mead over a simulation of the LuGre equation (12). The refinement fits
+all by trust region, which also gives the standard deviations. A run has three more unknowns: the joint's inertia in
+that pose (the paper neglects it), a constant torque, and the time between position and current.
 
 Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, inertia, offset, delay.
 """

@@ -145,7 +145,10 @@ class _Solved:
         )
 
     def estimate(self, covariance: Array | None) -> Estimate:
-        """The solution with its covariance; `covariance` (k, k) is that of the quantities considered, None without any."""
+        """Return the solution with its covariance.
+
+        covariance  (k, k) of the uncertain quantities in Consider; None if there are none
+        """
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
         sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))

@@ -68,7 +68,8 @@ class LinearProblem:
 
     @property
     def limits(self) -> Array:
-        """(k, l + n f + m) rows whose products with the vector of unknowns may not be negative either."""
+        """(k, l + n f + m) rows of linear inequalities: their products with the vector of unknowns may not be
+        negative."""
         return limits_of(self.columns, self.plain, self.l)
 
 

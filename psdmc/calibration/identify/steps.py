@@ -1,4 +1,4 @@
-"""Inputs and results that the four steps share: runs, options, qualities."""
+"""Data classes that the four steps of the calibration share: runs, options, and the quality of predictions."""
 
 from __future__ import annotations
 

@@ -185,7 +185,7 @@ def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> 
 
 
 def require_rosbags() -> None:
-    """InputError if rosbags is not installed."""
+    """Raise InputError if the package rosbags is not installed."""
     try:
         import rosbags.typesys  # noqa: F401
     except ImportError as error:

@@ -96,7 +96,7 @@ class TomlTable:
         return ""
 
     def word(self, key: str, words: tuple[str, ...], default: str | None = None) -> str:
-        """Return one of the given words. A missing key is a fault if there is no default."""
+        """Return the text of a key, which must be one of `words`. A missing key is a fault if there is no default."""
         if key not in self.content and default is not None:
             return default
         value = self.content.get(key)

@@ -1,6 +1,6 @@
 """Measures how well a motion distinguishes the parameters of a fit, with derivatives. Smaller values are better.
 
-The Gram matrix of the fit's columns is the product of their transpose and themselves.
+Most functions need the Gram matrix of the fit's columns A, which is A^T A.
 """
 
 from __future__ import annotations

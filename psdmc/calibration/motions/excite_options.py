@@ -32,7 +32,7 @@ def chosen_objective(condition: bool, log_det: bool) -> Objective:
 
 @dataclass(frozen=True, slots=True)
 class ExciteOptions:
-    """What is searched, and for how long.
+    """Which motions are searched, and for how long.
 
     duration       s, the period of the motion
     harmonics      multiples of 1/duration that each joint's sines have

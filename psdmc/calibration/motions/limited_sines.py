@@ -43,8 +43,8 @@ class Placed:
 
 
 class LimitedSines:
-    """The coordinates of motions. For each joint: weights of sines and cosines, the share of its limits, the place of
-    the centre."""
+    """The coordinates that describe a motion: for each joint the weights of sines and cosines, the used share of its
+    limits, and the position of its centre."""
 
     def __init__(self, chain: Mechanism, options: ExciteOptions) -> None:
         limits = [joint.limits for joint in chain.joints]

@@ -134,8 +134,8 @@ class Changes:
 
     @property
     def chance(self) -> float:
-        """Probability that an unchanged robot gives a chi-square as large as this, or a single value with a change as
-        large."""
+        """Probability that an unchanged robot gives a chi-square at least as large, or a single value with at least as
+        large a change."""
         sizes = np.linalg.norm(self.by_value, axis=0)
         alone = (self.by_value.T @ self.white) / np.where(sizes > 0.0, sizes, np.inf)
         single = len(sizes) * stats.chi2.sf(np.max(alone**2, initial=0.0), 1)

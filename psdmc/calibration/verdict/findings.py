@@ -1,4 +1,5 @@
-"""Computes the figures for a verdict's reasons and doubts, joint by joint, from a calibration's record and its log."""
+"""Computes the figures for a verdict's reasons and doubts, joint by joint, from a calibration's result (record) and
+its log."""
 
 from __future__ import annotations
 
