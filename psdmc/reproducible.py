@@ -1,9 +1,9 @@
 """Arithmetic that gives the same digits on every processor and with any number of threads.
 
-The sums of BLAS, LAPACK and einsum depend on the processor: on its order of terms and on fused multiply-adds.
-Vectorised sines and exponentials depend on it, too. So psdmc computes all numbers in models and packages with the
-functions of this module. They use only NumPy's elementwise operations, which IEEE 754 defines to the last bit, in an
-order that depends on shapes and zeros alone. Results have the precision of the arguments.
+BLAS, LAPACK and einsum order their sums, and fuse products with sums, differently on different processors. Vectorised
+sines and exponentials differ, too. So psdmc computes all numbers in models and packages with the functions of this
+module. They use only NumPy's elementwise operations, which IEEE 754 defines to the last bit, in an order that depends
+on shapes and zeros alone. Results have the precision of the arguments.
 """
 
 from __future__ import annotations

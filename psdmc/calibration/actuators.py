@@ -19,8 +19,8 @@ from psdmc.model.calibrated import Calibrated, by_joint
 
 @dataclass(frozen=True, slots=True)
 class ActuatorView(StateLawView):
-    """The data for the templates of this C code. Every joint has friction; torque constants (N m/A) may be missing for
-    all joints."""
+    """The data for the templates of the C code of friction and motors. Every joint has friction; torque constants (N
+    m/A) may be missing for all joints."""
 
     robot: str = "robot"
     joint_names: tuple[str, ...] = ()

@@ -51,7 +51,7 @@ class Reduced:
 def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> Reduced:
     """Return the triangular form of all blocks. Only the rows of one block and the triangle are in memory at a time.
 
-    target, weights (N, n);  start (l,) is subtracted from the unknowns; None: zero
+    target, weights (N, n);  start (l,) values from which the unknowns are counted; None: zero
     """
     triangle, noise, l = np.zeros((0, 0)), None, 0
     for block, own in _with_rows(rows):

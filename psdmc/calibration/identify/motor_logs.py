@@ -59,7 +59,8 @@ MOST_POSES = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRows:
-    """The rows of this problem, with separate friction for logs with the load and a column for each torque constant.
+    """The rows of the fit of torque constants, with separate friction for logs with the load and a column for each
+    constant.
 
     problem    rows of all logs, without these columns
     with_load  (N,)    samples that were recorded with the load

@@ -26,7 +26,7 @@ class Sandwich:
 
     slope  (n,)  factor for B: mean(psi') / mean(w)
     level  (n,)  factor for C: mean(psi^2) / mean(w), in the weighted residual's unit, squared
-    unit   the fit's weighted sum of squares times this is in variances, for all joints together: level / slope^2
+    unit   variance per unit of the fit's weighted sum of squares, for all joints together: level / slope^2
     """
 
     slope: Array

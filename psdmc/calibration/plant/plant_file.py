@@ -159,12 +159,12 @@ class Plant:
 
 
 def read_plant(path: Path) -> Plant:
-    """Return a plant from its file. Raises InputError with the table and key that is missing or wrong."""
+    """Return a plant (virtual robot) from its file. Raises InputError with the table and key that is missing or wrong."""
     return plant_of(read_toml(path, WHAT), path)
 
 
 def plant_of(content: dict[str, Any], path: Path) -> Plant:
-    """Return the plant from the content of its file; `path` is the path of that file."""
+    """Return the plant (virtual robot) from the content of its file; `path` is the path of that file."""
     faults: list[str] = []
     table = TomlTable(content, "plant", KEYS, faults)
     where = path.parent / table.text("robot")
@@ -199,7 +199,7 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
 
 
 def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
-    """Return the bytes on which a plant depends: those of its own file and of the robot file."""
+    """Return the bytes on which a plant (virtual robot) depends: those of its own file and of the robot file."""
     path = Path(path)
     robot = path.parent / str(read_toml(path, WHAT).get("robot"))
     return _bytes_of(path), _bytes_of(robot, LARGEST_URDF)

@@ -1,7 +1,8 @@
 """Measures how well a calibrated model file predicts logs. All figures are computed from the content of the file, and
 none from the fit.
 
-If one log was fitted, torques come from the Newton-Euler algorithm on the file's theta_b, and not from the regressor.
+For a calibration from plain logs, torques come from the Newton-Euler algorithm on the file's theta_b, and not from the
+regressor.
 """
 
 from __future__ import annotations
@@ -128,8 +129,8 @@ def sprung(found: Delivered) -> Callable[[States, NDArray[np.intp]], Array] | No
 
 
 def beside(found: Delivered, held: NDArray[np.bool_]) -> Callable[[States, NDArray[np.intp]], Array] | None:
-    """Return the same function as `sprung` for the columns selected by the mask `held` (m,), which do not depend on
-    the load."""
+    """Return a function of states and rows that computes the torque (rows, n) of the springs and friction values
+    selected by the mask `held` (m,), filtered like a log's. None of them depends on the load."""
     if not held.any():
         return None
     values = np.where(held, found.extra, 0.0)

@@ -86,8 +86,8 @@ def _line(evidence: Evidence, by_file: Array, k: int) -> _Line:
 
 
 def nuisance(evidence: Evidence, k: int) -> Array:
-    """Return the other columns (N, 3 or 4) of this regression for joint k: Coulomb and viscous friction, offset, and
-    acceleration if the file has no drive inertia."""
+    """Return the columns (N, 3 or 4) besides the file's torque in the regression of joint k's gain: Coulomb and
+    viscous friction, offset, and acceleration if the file has no drive inertia."""
     columns = [evidence.sign[:, k], evidence.qd[:, k], np.ones(len(evidence))]
     drive = evidence.model.mechanism.parameters[k, DRIVE]
     if not drive > 0:

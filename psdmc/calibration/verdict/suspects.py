@@ -63,8 +63,8 @@ class Hypothesis:
         return swaps + sum(-1 in both for both in zip(self.signs, self.effort_signs, strict=True))
 
     def worth(self, stated: Hypothesis) -> float:
-        """Return the number of changes that the improvement over the log as it is (`stated`) justifies, minus the
-        number made."""
+        """Return how many changes the improvement over the log as it is (`stated`) justifies, minus the number of
+        changes in this hypothesis."""
         gained = self.score - stated.score
         left = max(len(self.signs) - self.score, 1e-12)
         fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
