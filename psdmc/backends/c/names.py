@@ -1,7 +1,7 @@
-"""Untrusted text on its way into C: names become identifiers, the rest is escaped.
+"""Conversion of untrusted text to C: names become identifiers, and all other text is escaped.
 
-A robot file may name its robot `a; system("x")`. Nothing of such a name may leave the identifier, the string
-or the comment that it is put into.
+A robot file may name its robot `a; system("x")`. No part of such a name may leave the identifier, the string or the
+comment into which it is written.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ RESERVED = _listed()
 
 
 def is_reserved(word: str) -> bool:
-    """Whether a robot of this very name would meet somebody else's."""
+    """Whether a robot with exactly this name would collide with a name of C, C++ or a library."""
     return word in RESERVED or DEVICE.fullmatch(word) is not None
 
 
