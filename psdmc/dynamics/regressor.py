@@ -110,7 +110,7 @@ def _plain(place: Placed) -> tuple[Matrix, Vector]:
 
 
 def unit_wrench(name: int, motion: LinkMotion) -> tuple[Vector, Vector]:
-    """Return the force and moment of a body whose standard parameter `index` (into PARAMETER_NAMES) is one, and whose
+    """Return the force and moment of a body whose standard parameter number `name` (in PARAMETER_NAMES) is one, and whose
     others are zero."""
     (ax, ay, az), (u, d) = motion
     if name == 0:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The momentum of the links' own bodies. Bodies that stand for theta_b have the same torques, but not the same
-    momentum."""
+    """Compute the momentum of the links' real bodies. Bodies that represent theta_b have the same torques, but not the
+    same momentum."""
     bodies = g.link_bodies()
     linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
     axes, origin = g.root
