@@ -235,8 +235,11 @@ class Numbers(NamedTuple):
 
 
 def last_digit_effect(chain: Mechanism, x: Array, states: States) -> Array:
-    """Largest change (n,) of each joint's torque if all numbers of the robot change by LAST, up or down at random. It
-    is relative to that joint's largest torque, or absolute if that is zero."""
+    """Compute how sensitive each joint's torque is to rounding of the robot's numbers, (n,).
+
+    This is the largest change of the torque if all numbers change by LAST, up or down at random. It is relative to that
+    joint's largest torque, or absolute if that is zero.
+    """
     rng = np.random.default_rng(DIGIT_SEED)
     numbers = _numbers(chain, x, _as_it_is, np.dtype(np.float64))
     torques = _torques(chain, numbers, states)

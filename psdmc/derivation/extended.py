@@ -91,8 +91,12 @@ def has_small_entries(robot: Scaled) -> bool:
 
 
 def is_of_many_scales(robot: Scaled) -> bool:
-    """Check if all lengths outward of some joint are small but not all zero, or all lengths are small compared with
-    sliding joints. An example is a finger of millimetres on an arm of metres."""
+    """Whether some joint only moves lengths that are tiny compared with the robot, such as a finger of millimetres on
+    an arm of metres.
+
+    All lengths after this joint must be small, but not all zero. True also if all lengths are small compared with the
+    motion of sliding joints.
+    """
     if robot.unit < MANY_SCALES and any(joint.length_order for joint in robot.types):
         return True
     reach = [_length(place.translation) for place in robot.link_frames]

@@ -132,7 +132,7 @@ class _Sampler:
         return values
 
     def per_parameter(self, qd: Array, qdd: Array, gravity_scale: float) -> Array:
-        """(parameters, n, cells) torques on the grid at fixed rates, for each parameter alone."""
+        """Sample the torques on the grid at fixed rates, for each parameter alone: (parameters, n, cells)."""
         q = self.grid()
         speeds, accelerations = np.broadcast_to(qd, q.shape), np.broadcast_to(qdd, q.shape)
         return np.stack(

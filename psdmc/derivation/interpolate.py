@@ -42,7 +42,7 @@ def nodes(joint: JointType) -> Array:
 
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
-    """(len(q), size) values of the joint's factors at each q."""
+    """Evaluate the factors of degree two of a joint's basis at each q: (len(q), size)."""
     rows = (q, sine(q), cosine(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
 

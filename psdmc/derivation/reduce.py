@@ -65,7 +65,7 @@ def row_space(blocks: Iterable[Terms], columns: int) -> Array:
 
 
 def triangular(rows: Array) -> Array:
-    """The factor R of rows = Q R."""
+    """Return the triangular factor R of rows = Q R."""
     factor: Array = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
     return factor
 

@@ -97,8 +97,8 @@ def _rotated(body: Body, rows: Matrix) -> Body:
 
 
 def shifted(body: Body, offset: Vector) -> Body:
-    """Move the reference point of a body from `offset` to the origin. Its moments become h + m p and S + h p^T + p h^T
-    + m p p^T."""
+    """Move the reference point of a body from `offset` p to the origin. The moments become h + m p and S + h p^T + p
+    h^T + m p p^T."""
     px, py, pz = offset
     hx, hy, hz = body.moment
     xx, yy, zz, xy, xz, yz = body.second
@@ -121,7 +121,7 @@ def joined(a: Body, b: Body) -> Body:
 
 
 def handed_body(frame: Frame, body: Body) -> Body:
-    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that it
-    represents."""
+    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that the
+    frame represents."""
     (mass,), moment = handed_on(frame, [body.mass]), handed_vector(frame, body.moment)
     return Body(mass, moment, tuple(handed_on(frame, body.second)))

@@ -222,7 +222,8 @@ _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Articulated(NamedTuple):
-    """Articulated inertia of a frame: force = linear a + mixed alpha, moment = mixed^T a + angular alpha.
+    """The articulated inertia of a frame: force = linear a + mixed alpha, moment = mixed^T a + angular alpha, with the
+    accelerations a and alpha of the frame.
 
     linear   kg, symmetric
     mixed    kg m

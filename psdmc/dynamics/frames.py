@@ -128,7 +128,7 @@ class Rotation(NamedTuple):
 
 
 def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
-    """Plain-float copy of a 3 x 3 array."""
+    """Return a copy of a 3 x 3 array with Python floats."""
     rows = tuple(tuple(float(x) for x in row) for row in values)
     return rows  # type: ignore[return-value]
 
@@ -192,7 +192,7 @@ def leaves(frames: Sequence[Frame]) -> tuple[bool, ...]:
 
 
 def base_acceleration(chain: Mechanism) -> Vector:
-    """Gravity as an upward acceleration of the base, m/s^2 in the base frame."""
+    """Return gravity as an upward acceleration of the base, m/s^2 in the base frame."""
     gx, gy, gz = chain.gravity.tolist()
     return (-gx, -gy, -gz)
 
@@ -238,7 +238,7 @@ def joint_angle(frame: Frame, q: Scalar) -> Angle:
 
 
 def joint_offset(frame: Frame, q: Scalar) -> Vector:
-    """Origin of the frame in its parent's, m."""
+    """Return the origin (m) of the frame in its parent's frame, at joint position q."""
     if not frame.joint.about_z:
         moved = frame.joint.way(q)
         return frame.translation if moved is None else add(frame.translation, to_previous(frame, moved))

@@ -77,7 +77,7 @@ def moved_to(composite: Composite, offset: Vector) -> Composite:
 
 
 def along_parent(frame: Frame, composite: Composite) -> Composite:
-    """Rotate from the axes before a joint's motion to the axes of the link before it."""
+    """Rotate a composite from the axes before a joint's motion to the axes of the link before the joint."""
     if frame.is_parallel:
         return composite
     second, first = composite.momenta

@@ -25,7 +25,7 @@ def unit_twists(joint: JointType) -> list[tuple[int, bool]]:
 
 
 def to_z(v: Vector, axis: int) -> Vector:
-    """Permute x, y, z cyclically so that the axis becomes z."""
+    """Permute the entries x, y, z of a vector cyclically so that the given axis becomes z."""
     return (v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis])
 
 

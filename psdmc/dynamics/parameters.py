@@ -38,7 +38,7 @@ def _on_diagonal(value: Array) -> Array:
 
 
 def inertia_matrix(x: Array) -> Array:
-    """(3, 3, ...) inertia matrix, kg m^2, from standard parameters of one link (10 or 11, ...)."""
+    """Return the inertia matrix, (3, 3, ...), kg m^2, from standard parameters of one link (10 or 11, ...)."""
     matrix = np.zeros((3, 3, *np.shape(x)[1:]), np.asarray(x).dtype)
     for (row, column), value in zip(_INERTIA_ENTRIES, x[4:BODY_PARAMETERS], strict=True):
         matrix[row, column] = matrix[column, row] = value
@@ -46,7 +46,7 @@ def inertia_matrix(x: Array) -> Array:
 
 
 def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
-    """(10, ...) standard parameters of a body; moment and inertia about the same frame."""
+    """Return the (10, ...) standard parameters of a body. Moment and inertia are about the same frame."""
     return np.array([mass, *moment, *(inertia[entry] for entry in _INERTIA_ENTRIES)])
 
 

@@ -1,7 +1,7 @@
-"""The joint-torque regressor: torques as a matrix times the standard parameters.
+"""The joint-torque regressor: the matrix that gives the joint torques when it is multiplied by the standard parameters.
 
-Each body's wrench is linear in its parameters. A column of the regressor is the wrench for one parameter alone, dotted
-with the twist of each joint that carries the body, moved into the body's frame.
+Each body's wrench is linear in the body's parameters. An entry of the regressor is the wrench for one parameter of one,
+dotted with the twist of a joint that carries the body. The twist is moved into the body's frame before.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Twist = tuple[Vector, Vector]
 
 
 class Placed(Protocol):
-    """The placement of one frame in another: a Placement, or one in another precision."""
+    """The placement of one frame in another, as a Placement or in another floating-point precision."""
 
     @property
     def rotation(self) -> NDArray[Any]: ...

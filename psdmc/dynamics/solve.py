@@ -79,7 +79,7 @@ def _is_zero(entry: Scalar) -> bool:
 
 
 def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """x of L^T D L x = right."""
+    """Solve L^T D L x = right for x, with the factors of a symmetric matrix."""
     load = list(right)
     solution = list(right)
     for k in reversed(range(len(load))):
@@ -98,7 +98,7 @@ def projected(factors: Factors, rows: Sequence[Sequence[Scalar]]) -> list[list[S
 
 
 def half_products(factors: Factors, halves: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    """Y D^-1 Y^T, both triangles, from the rows of Y."""
+    """Compute Y D^-1 Y^T, both triangles, from the rows of Y and the factor D."""
     found: list[list[Scalar]] = [[0.0] * len(halves) for _ in halves]
     for i, half in enumerate(halves):
         own = _nonzero(half)
@@ -128,7 +128,7 @@ def rest_solved(factors: Factors, half: Sequence[Scalar]) -> list[Scalar]:
 
 
 def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    """a . b, of vectors of equal length."""
+    """Return the inner product a . b of vectors of equal length."""
     total: Scalar = 0.0
     for x, y in zip(a, b, strict=True):
         total = total + x * y

@@ -1,4 +1,4 @@
-"""Forward dynamics and the gradient of its weighted accelerations (reverse mode)."""
+"""Forward dynamics, and the gradient of a weighted sum of its accelerations (reverse mode)."""
 
 from __future__ import annotations
 

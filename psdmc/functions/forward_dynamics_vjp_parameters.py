@@ -1,4 +1,4 @@
-"""Forward dynamics and the gradient of its weighted accelerations, by theta_b too (reverse mode)."""
+"""Forward dynamics, and the gradient of a weighted sum of its accelerations, also by theta_b (reverse mode)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gravity's torques and their derivatives by joint positions."""
+"""The gravity torques and their derivatives by joint positions."""
 
 from __future__ import annotations
 

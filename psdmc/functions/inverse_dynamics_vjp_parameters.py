@@ -1,4 +1,4 @@
-"""Inverse dynamics and the gradient of its weighted torques, by theta_b too (reverse mode)."""
+"""Inverse dynamics, and the gradient of a weighted sum of its torques, also by theta_b (reverse mode)."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's momentum about the centre of mass, moved to the base's origin: L_O = L_C + c x p."""
+    """Return Pinocchio's momentum about the centre of mass c, moved to the base's origin: L_O = L_C + c x p."""
     import pinocchio as pin
 
     def moved(model: Any, data: Any, q: Array, qd: Array) -> Array:

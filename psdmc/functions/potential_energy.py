@@ -1,4 +1,4 @@
-"""Potential energy, zero at q = 0: torques do not determine its constant."""
+"""The potential energy in gravity, which is zero at q = 0. Torques do not determine its constant."""
 
 from __future__ import annotations
 

@@ -37,7 +37,8 @@ from psdmc.robot.mechanism import Array, Mechanism, Placement
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotConstants:
-    """The parts of a model that every trace needs.
+    """The data of a model that are needed to record any function: the robot, its sizes, and how theta_b gives the
+    parameters.
 
     representative  (11 n, l)  theta_b to standard parameters about the link frames
     theta_b         (l,)       None: an input of the PROGRAM

@@ -35,7 +35,7 @@ class Geometry:
         return tuple(seen)
 
     def reframed(self, feet: tuple[Foot, ...]) -> Reframed:
-        """The frames with their origins on these feet."""
+        """Return the robot's frames with their origins on these feet of common normals."""
         if feet not in self._reframed:
             self._reframed[feet] = reframe(self.chain, feet)
         return self._reframed[feet]

@@ -109,7 +109,7 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class JointQuality:
-    """Fit and held-out quality of one joint in one step."""
+    """The quality of the fit of one joint in one calibration step, on fitted and on held-out data."""
 
     fit: Quality
     held_out: Quality
@@ -269,7 +269,7 @@ class Verdict:
 
     @property
     def exit_status(self) -> int:
-        """Exit status of the command line: 0 for both usable verdicts."""
+        """The command line's exit status for this verdict: 0 if the calibration is usable, with or without doubts."""
         return 0 if self.usable else NOT_USABLE_STATUS
 
     @property

@@ -19,7 +19,7 @@ _FRAMES = {"urdf": "URDF", "standard": "standard DH", "modified": "modified DH"}
 
 
 class Model(ModelParts, Protocol):
-    """The parts of a model that are shown."""
+    """The attributes of a model that the summary shows."""
 
     @property
     def p(self) -> int | None: ...
@@ -32,7 +32,7 @@ class Model(ModelParts, Protocol):
 
 
 def text(model: Model) -> str:
-    """The model in lines: robot, joints, gravity, sizes, certificate, source."""
+    """Return a summary of the model in lines of text: robot, joints, gravity, sizes, certificate, source."""
     return "\n  ".join([_title(model.mechanism), *_facts(model)])
 
 

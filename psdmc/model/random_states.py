@@ -16,7 +16,7 @@ RANGES = (np.pi, 3.0, 5.0)
 
 
 def random_states(rng: np.random.Generator, *shape: int) -> tuple[Array, Array, Array]:
-    """q, qd and qdd, arrays of this shape each."""
+    """Return three random arrays of this shape: q, qd and qdd."""
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, shape) for limit in RANGES)
     return q, qd, qdd
 

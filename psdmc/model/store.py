@@ -45,7 +45,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class Model(ModelParts, Protocol):
-    """The parts of a model that a file holds."""
+    """The attributes of a model that a model file contains."""
 
     @property
     def expansion(self) -> Expansion | None: ...

@@ -34,8 +34,8 @@ class Term:
     of         the standard parameter
     is_minus   whether it is subtracted
     number     decimal digits; None: one
-    times      lengths that it is multiplied by
-    over       lengths that it is divided by
+    times      lengths in the numerator
+    over       lengths in the denominator
     """
 
     of: Symbol

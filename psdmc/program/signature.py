@@ -50,7 +50,7 @@ class Sizes:
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:
-        """The sizes of a robot whose joints have one coordinate each."""
+        """Return the sizes of a robot whose joints have one coordinate each."""
         return Sizes(n, n, n, l, frames)
 
     def shape(self, axes: Sequence[str]) -> tuple[int, ...]:

@@ -141,8 +141,8 @@ class Recipe:
     matters      fields of Choices that make a difference to it
     polynomials  which part of the torques' polynomials it is; None: it has no expanded lowering
     times_theta  whether its outputs times theta_b are torques and are compared as such: `pinocchio` returns these torques
-    gradient     name of its output that is the gradient, by theta_b, of a number linear in theta_b. The gradient times theta_b
-                 is compared with that number, which `pinocchio` returns
+    gradient     name of its output that is the gradient, by theta_b, of a number linear in theta_b. Multiplied by
+                 theta_b, the gradient is compared with that number, which `pinocchio` returns
     beside       name of a function if outputs are differences of that function's values: errors are relative to those
     needs        what the model must have; left out: a positive definite mass matrix if the signature factorises one
     in_limbs     whether its algorithms mark sums over limbs (Frame.limbs), so that limbs can run in SIMD lanes

@@ -40,7 +40,7 @@ class VectorWidth:
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose `lanes` vectors of `lanes` reals."""
+        """The steps of a transposition, in registers, of a square block: `lanes` vectors of `lanes` reals."""
         distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
         return tuple(transpose_stage(self.lanes, distance) for distance in distances)
 
@@ -51,7 +51,7 @@ class VectorWidth:
 
     @property
     def piece_stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose each square of `piece` vectors and lanes."""
+        """The steps of the transpositions, in registers, of square blocks of `piece` vectors and `piece` lanes."""
         return tuple(stage for stage in self.stages if stage.distance < self.piece)
 
 

@@ -65,7 +65,7 @@ class LimbWidth:
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose each square of `piece` vectors and lanes."""
+        """The steps of the transpositions, in registers, of square blocks of `piece` vectors and `piece` lanes."""
         return tuple(transpose_stage(self.lanes, distance) for distance in (1, 2) if distance < self.piece)
 
     @property

@@ -33,14 +33,14 @@ def is_reserved(word: str) -> bool:
 
 
 def identifier(name: str) -> str:
-    """A C and C++ identifier for `name`, never a word of RESERVED."""
+    """Return a C and C++ identifier for `name`, which is never a word of RESERVED."""
     return identifier_of(name, is_reserved)
 
 
 def c_string(text: str) -> str:
-    """A C string literal of `text` as UTF-8: plain ASCII stays readable, everything else is an octal escape.
+    """Return a C string literal of `text` as UTF-8: plain ASCII stays readable, and everything else is an octal escape.
 
-    Octal escapes end after three digits whatever follows; '?' is escaped too, so that no trigraph can form.
+    Octal escapes end after three digits, whatever follows. '?' is escaped too, so that no trigraph can form.
     """
     plain = {ord('"'): '\\"', ord("\\"): "\\\\", ord("?"): "\\?"}
     body = "".join(
@@ -50,9 +50,10 @@ def c_string(text: str) -> str:
 
 
 def c_comment(text: str) -> str:
-    """`text` as it may stand inside a C comment: one line of ASCII that neither ends nor nests a comment.
+    """Return `text` in a form that is safe inside a C comment: one line of ASCII that neither ends nor nests a comment.
 
-    A '\\' could join lines, '/' beside '*' could open or close, '??' could be a trigraph: each is broken up.
+    A '\' could join lines, '/' next to '*' could open or close a comment, and '??' could begin a trigraph. Each of
+    these is broken up.
     """
     ascii_text = "".join(chr(byte) if 32 <= byte < 127 else f"<{byte:02x}>" for byte in utf8(text))
     for dangerous, harmless in (("\\", "<5c>"), ("*/", "* /"), ("/*", "/ *"), ("??", "? ?")):

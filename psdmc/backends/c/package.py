@@ -173,7 +173,7 @@ class PackageView:
 
     @property
     def version(self) -> str:
-        """psdmc's version as the three numbers that CMake and pkg-config compare."""
+        """psdmc's version as three numbers. CMake and pkg-config compare versions in this form."""
         found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
         return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
 

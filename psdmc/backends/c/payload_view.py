@@ -1,4 +1,4 @@
-"""The functions that add a load to theta_b, as templates print them."""
+"""The functions that add a load to theta_b, in the form that templates print."""
 
 from __future__ import annotations
 

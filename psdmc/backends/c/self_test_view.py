@@ -48,7 +48,7 @@ class SelfTestView:
 
     @property
     def given_otherwise(self) -> bool:
-        """Whether some input is not a vector with one entry per joint."""
+        """Whether some input of the tested functions is not a vector with one entry per joint."""
         return not all(vector.of_joints for vector in self.given)
 
     @property

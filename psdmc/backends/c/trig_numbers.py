@@ -8,7 +8,7 @@ from psdmc.backends.trig_numbers import NUMBERS, Real
 
 
 def c_number(value: float, real: Real) -> str:
-    """A C99 literal that reads back exactly: hexadecimal, without trailing zeros."""
+    """Return a C99 literal that reads back as exactly the same number: hexadecimal, without trailing zeros."""
     mantissa, _, exponent = value.hex().partition("p")
     head, _, digits = mantissa.partition(".")
     digits = digits.rstrip("0")

@@ -51,7 +51,7 @@ def place(slot: Slot, shapes: Mapping[str, Sequence[int]]) -> str:
 
 
 def number(value: float) -> str:
-    """A literal that reads back as the same number."""
+    """Return a Rust literal that reads back as the same number."""
     if math.isnan(value):
         return "f64::NAN"
     if math.isinf(value):

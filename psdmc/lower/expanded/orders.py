@@ -1,4 +1,5 @@
-"""The orders in which the expanded lowering takes the rows of E."""
+"""The orders in which the expanded lowering takes the rows of E, the matrix of exponents. The order determines the
+number of operations."""
 
 from __future__ import annotations
 

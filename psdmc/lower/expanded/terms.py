@@ -1,4 +1,4 @@
-"""The expanded lowering's input: outputs as sums of monomials, read from E, P and theta_b."""
+"""The input of the expanded lowering: a function's outputs as sums of monomials, read from E, P and theta_b."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def baked_torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -
 
 
 def regressor_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """Y[i, k] as output i * l + k, over rows of E."""
+    """Return the regressor's entries Y[i, k], as output i * l + k, as terms over rows of E."""
     expansion = _expanded(model)
     terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     output = terms.output * model.l + parameter
@@ -138,12 +138,12 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
 
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
-    """h[i]: the terms of tau[i] without joint accelerations."""
+    """Return the nonlinear effects h[i] as terms: the terms of tau[i] without joint accelerations."""
     return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).qdd].any(axis=0)))
 
 
 def gravity_terms(torque: Terms, n: int) -> Terms:
-    """g[i]: the terms of tau[i] without joint rates and accelerations."""
+    """Return the gravity torques g[i] as terms: the terms of tau[i] without joint rates and accelerations."""
     return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).rates].any(axis=0)))
 
 
