@@ -132,8 +132,8 @@ class Recipe:
     signature    its name, inputs and outputs
     title        its name in prose
     trace        records its arithmetic on symbols, with the algorithms of psdmc.dynamics
-    reference    the same in NumPy on the MODEL's own frames and bodies, without lowering: (robot, given) to the values of all
-                 outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
+    reference    the same in NumPy on the MODEL's own frames and bodies, without lowering: (robot, given) to the values of
+                 all outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
     against      name of Pinocchio's function with which it is compared
     pinocchio    the values of Pinocchio's function: (model on arrays, given)
     starts       name of the function whose search chooses the positions of frames and the unit of length
