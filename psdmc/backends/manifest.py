@@ -53,8 +53,11 @@ def manifest(
 
 
 def renamed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return pairs of symbols in an older package and their new names: `R_*` for all symbols if the robot's name
-    changed, and functions that psdmc renamed. The older manifest may be forged."""
+    """Return pairs of symbols in an older package and their new names.
+
+    If the robot's name changed, the pair `R_*` stands for all symbols. Further pairs are functions that psdmc renamed.
+    The older manifest may be forged.
+    """
     old, new = before.get("robot"), after["robot"]
     if not isinstance(old, str) or not NAME.fullmatch(old):
         return []

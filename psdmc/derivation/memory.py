@@ -127,8 +127,8 @@ def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None
 
 
 def available_memory() -> int:
-    """Return the bytes that an expansion may use: most of the machine's free memory, or of the rest of its control
-    group's limit, if that is less."""
+    """Return the bytes that an expansion may use: most of the machine's free memory. If the process has a memory limit
+    (control group), it is most of what the limit leaves, if that is less."""
     return int(HEADROOM * min(_machine_memory(), _group_memory()))
 
 

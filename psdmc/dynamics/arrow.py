@@ -40,8 +40,7 @@ class Limb:
     shares: Matrix
 
     def reduced(self, right: Sequence[Scalar]) -> list[Scalar]:
-        """Return y_c - T^T y_l and Q y_l (see the module) for a right side y that contains only this limb's part, in
-        all rows."""
+        """Return y_c - T^T y_l and Q y_l (see the module) for a right side y of this limb alone."""
         own, found = [right[k] for k in self.rates], list(right)
         for k, column in zip(self.carriers, zip(*self.shares, strict=True), strict=True):
             found[k] = found[k] - inner_product(column, own)
@@ -111,8 +110,8 @@ class Arrow:
         return found
 
     def thin(self, matrix: Matrix) -> list[list[Scalar]]:
-        """Return the factors of - M^-1 D, if no two limbs have common entries in D: E in the rows of the core, Y in
-        those of limbs.
+        """Return two factors of - M^-1 D: E in the rows of the core, and Y in those of limbs. No two limbs may have
+        common entries in D.
 
         - M^-1 D is then x = - V E in the rows of the core, and Y - T x in those of a limb. Y is zero in other limbs'
         columns.
@@ -135,8 +134,8 @@ class Arrow:
 
     @property
     def thin_factors(self) -> list[list[Scalar]]:
-        """One matrix with two factors of M^-1: V in the rows of the core and T in those of limbs, both in the columns
-        of the core."""
+        """Two factors of M^-1 in one matrix: V in the rows of the core, and T in those of limbs. Both are in the
+        columns of the core."""
         n = len(self.pivots)
         found: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
         for k, row in zip(self.core, inverse(self.factors), strict=True):

@@ -58,8 +58,11 @@ def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None)
 
 
 def spun(body: Body, turn: Turn | None) -> Body:
-    """Compute the same as `turned` with nested products: with t = s (xx - yy) + 2 c xy, xx decreases by s t, and xy
-    becomes c t - xy. This takes four operations fewer, in a longer dependency chain."""
+    """Compute the same as `turned` with nested products, which take four operations fewer, but in a longer dependency
+    chain.
+
+    With t = s (xx - yy) + 2 c xy, xx decreases by s t, and xy becomes c t - xy.
+    """
     if turn is None:
         return body
     xx, yy, zz, xy, xz, yz = body.second

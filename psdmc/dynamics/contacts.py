@@ -27,8 +27,11 @@ Rows = Sequence[Sequence[Scalar]]
 def contact_jacobian(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[Scalar]]:
-    """Compute the rows of all contacts, nv entries each, along the base's axes: linear velocity of the contact's
-    origin, and for a surface contact also the angular velocity."""
+    """Compute the Jacobian's rows of all contacts, nv entries each, along the base's axes.
+
+    The first three rows of a contact are the linear velocity of its origin. A surface contact has three more rows, its
+    angular velocity.
+    """
     found = zip(named, frame_jacobians(frames, named, q, root), strict=True)
     return [row for each, rows in found for row in rows[: each.rows]]
 

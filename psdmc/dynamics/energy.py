@@ -50,8 +50,8 @@ def potential_energy(
 
 @on_coordinates()
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:
-    """Return the total mass times the centre of mass, kg m, about the origin and along the axes of the base frame of
-    these joint frames."""
+    """Return the total mass times the centre of mass, kg m. The centre is given in the base frame of these joint
+    frames."""
     own = positions(frames, q)
     masses, moments = [body.mass for body in bodies], [body.moment for body in bodies]
     total = ZERO

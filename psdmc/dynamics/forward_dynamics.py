@@ -222,8 +222,8 @@ _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Articulated(NamedTuple):
-    """The articulated inertia of a frame: force = linear a + mixed alpha, moment = mixed^T a + angular alpha, with the
-    accelerations a and alpha of the frame.
+    """The articulated inertia of a frame. For the accelerations a and alpha of the frame, force = linear a + mixed
+    alpha, and moment = mixed^T a + angular alpha.
 
     linear   kg, symmetric
     mixed    kg m

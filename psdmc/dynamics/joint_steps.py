@@ -1,5 +1,5 @@
-"""Two quantities of each joint for the recursion of derivatives: the motion of the link before the joint, and the step
-from the joint to its parent."""
+"""For each joint, the motion of the link before it, and the step from the joint to its parent. The recursion of
+derivatives (derivatives.py) needs both."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ class Axis(NamedTuple):
 
 
 class Row(NamedTuple):
-    """The vectors A, B and C of a joint in the derivatives of its torque (derivatives.py), about the origin to which
-    they have been carried."""
+    """The vectors A, B and C that give the derivatives of a joint's torque (derivatives.py), about the current origin
+    of the recursion."""
 
     a: Vector
     b: Vector

@@ -1,7 +1,7 @@
 """The joint-torque regressor: the matrix that gives the joint torques when it is multiplied by the standard parameters.
 
-Each body's wrench is linear in the body's parameters. An entry of the regressor is the wrench for one parameter of one,
-dotted with the twist of a joint that carries the body. The twist is moved into the body's frame before.
+Each body's wrench is linear in the body's parameters. An entry of the regressor belongs to one joint and one parameter.
+It is the body's wrench for this parameter alone, with the value one, dotted with the joint's twist in the body's frame.
 """
 
 from __future__ import annotations

@@ -21,10 +21,11 @@ class Spin(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Angular rates of one frame along its axes: angular velocity w, derivative dw_r of the reference angular velocity,
-    and the reference angular velocity w_r.
+    """Angular rates of one frame along its axes.
 
-    w_r   None: there is one velocity, w
+    w     angular velocity
+    dw_r  derivative of the reference angular velocity
+    w_r   reference angular velocity; None: there is one velocity, w
     """
 
     w: Vector

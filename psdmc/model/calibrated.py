@@ -129,8 +129,8 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepQuality:
-    """The fit quality of one calibration step, a column of table 3: one entry per joint name, and samples for plots,
-    which are not stored in files."""
+    """The fit quality of one calibration step, a column of table 3, by joint name. It also has samples for plots, which
+    files do not store."""
 
     step: str
     joints: dict[str, JointQuality]
@@ -139,8 +139,10 @@ class StepQuality:
 
 @dataclass(frozen=True, slots=True)
 class FrictionRunConstants:
-    """Constants of a joint's friction run (a log for friction only) that are not friction: inertia in that pose (kg
-    m^2), constant torque (N m), and the time between position and current (s)."""
+    """Constants other than friction that a joint's friction run (a log for friction only) determines.
+
+    They are the inertia in that pose (kg m^2), a constant torque (N m), and the time between position and current (s).
+    """
 
     inertia: float
     offset: float
@@ -149,8 +151,10 @@ class FrictionRunConstants:
 
 @dataclass(frozen=True, slots=True)
 class StepUsed:
-    """The filter and the validation split of a calibration step: cut-off (Hz), order and settling periods of the
-    low-pass, share and blocks that are held out."""
+    """The low-pass filter and the validation split of a calibration step.
+
+    They are the filter's cut-off (Hz), order and settling periods, and the share and blocks of data that are held out.
+    """
 
     cutoff: float
     order: int = 8

@@ -1,5 +1,8 @@
-"""Division of a PROGRAM of core and limbs into stages: first what the core computes before the limbs, then what the
-limbs compute, then what the core computes from their sums, and so on."""
+"""Division of a PROGRAM of core and limbs into stages, each of which is computed by the core or by one group of limbs.
+
+First come the core's values that do not depend on limbs, then what the limbs compute, then what the core computes from
+sums over limbs, and so on.
+"""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ so many roundings: 7.1e-15 in float64, 3.8e-6 in float32. That of arms with too 
 
 
 def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], Scalar]:
-    """Return the inverse of a symmetric matrix, and a sign: 1 if the matrix is positive definite, -1 if it is not, or
-    if it is singular within rounding.
+    """Return the inverse of a symmetric matrix, and a sign: 1 if the matrix is positive definite, else -1. A matrix
+    that is singular within rounding has the sign -1, too.
 
     Rounding gives a singular matrix pivots of any sign, but its inverse is large, in whatever order it is eliminated.
     The comparison x < x + 1 is false if x is so large that the 1 is lost in rounding. All comparisons with NaN are

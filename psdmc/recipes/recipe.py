@@ -1,5 +1,5 @@
-"""The recipe of a generated function: the data in a file of psdmc/functions that say how the function is computed and
-with what it is compared."""
+"""The recipe of a generated function. It says how the function is computed and with what it is compared. Each file of
+psdmc/functions contains one."""
 
 from __future__ import annotations
 

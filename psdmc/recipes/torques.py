@@ -20,8 +20,8 @@ def torques(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """Return n joint torques M qdd + C(q, qd) qd_r, for this acceleration of the base, minus the torques of external
-    wrenches on the links. Without qd_r, qd_r = qd."""
+    """Return n joint torques M qdd + C(q, qd) qd_r, for this acceleration of the base. Without qd_r, qd_r = qd. The
+    torques of external wrenches on the links are subtracted."""
     q = g.inputs["q"]
     return inverse_dynamics(
         g.frames, g.bodies, g.drives, q, qd, qdd, base_acceleration, g.choices, qd_r, external

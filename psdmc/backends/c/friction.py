@@ -79,8 +79,11 @@ class FrictionView:
 
     @property
     def speeds(self) -> tuple[str, ...]:
-        """The joint speeds at which the self-test compares friction, as C text: zero, a tenth of the speed over which
-        friction changes sign, speeds in both directions, and speeds that are constants of a friction law."""
+        """The joint speeds at which the self-test compares friction, as C text.
+
+        They are zero, a tenth of the speed over which friction changes sign, speeds in both directions, and speeds that
+        are constants of a friction law.
+        """
         return self._printed(self._states)
 
     @property

@@ -20,7 +20,7 @@ MADE_BY = {2: "pairs", 3: "triples", 4: "rows"}
 
 @dataclass(frozen=True, slots=True)
 class StoreView:
-    """The C statements of one store, or of the stores for all limbs.
+    """The C statements of one store of outputs, or of one such store for each limb.
 
     vectors  whose rows the lines store: four that are transposed, or two or three that are interleaved; empty: none
     count    number of limbs

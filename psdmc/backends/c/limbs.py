@@ -188,8 +188,8 @@ class StageView:
 
 @dataclass(frozen=True, slots=True)
 class SharesView:
-    """One group's part of the matrix products of a function with limbs: the C vector of the factor T, where its rows
-    begin in an output, and C text of the product with x."""
+    """One group's part of the matrix products of a function with limbs. It has the C vector of the factor T, where its
+    rows begin in an output, and C text of the product with x."""
 
     vector: str
     width: int

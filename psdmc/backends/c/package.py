@@ -235,7 +235,7 @@ class PackageView:
         return call_views(frozenset(found))
 
     def limb_calls(self, count: int) -> tuple[CallView, ...]:
-        """The macro operations that stages with `count` limbs use."""
+        """The operations that are C macros in code for `count` equal limbs, such as four legs."""
         views = [kernel.limbs for kernel in self.kernels if kernel.limbs]
         stages = [stage for view in views for stage in view.stages if stage.count == count]
         return call_views(frozenset(op for stage in stages for op in stage.body.calls))

@@ -26,8 +26,8 @@ class ReferenceTable:
 
 @dataclass(frozen=True, slots=True)
 class LoadView:
-    """The self-test's load as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and the rows of `added`, what the
-    load adds to theta_b."""
+    """The self-test's load as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and rows `added`. The rows are what
+    the load adds to theta_b."""
 
     mass: str
     com: str

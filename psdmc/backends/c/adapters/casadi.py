@@ -41,8 +41,11 @@ MAP, REGRESSOR = "tangent_map", "regressor"
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A sparsity pattern in CasADi's form: number of rows, number of columns, and then either 1 for a dense matrix, or
-    where each column starts and the row of each nonzero."""
+    """A sparsity pattern in CasADi's form: number of rows, number of columns, and the positions of the nonzeros.
+
+    For a dense matrix, the positions are the number 1. Otherwise, they are where each column starts, and the row of
+    each nonzero.
+    """
 
     name: str
     numbers: tuple[int, ...]

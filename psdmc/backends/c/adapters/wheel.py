@@ -50,8 +50,8 @@ class WheelKernel:
 
 @dataclass(frozen=True, slots=True)
 class WheelArray:
-    """An input or output array of a Python function: its meaning, its shape per state in memory, and the shape per
-    state that a caller sees."""
+    """An input or output array of a Python function, with its meaning and two shapes per state: in memory, and as a
+    caller sees it."""
 
     name: str
     tail: tuple[int, ...]
