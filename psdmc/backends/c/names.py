@@ -52,7 +52,7 @@ def c_string(text: str) -> str:
 def c_comment(text: str) -> str:
     """Return `text` in a form that is safe inside a C comment: one line of ASCII that neither ends nor nests a comment.
 
-    A '\' could join lines, '/' next to '*' could open or close a comment, and '??' could begin a trigraph. Each of
+    A '\\' could join lines, '/' next to '*' could open or close a comment, and '??' could begin a trigraph. Each of
     these is broken up.
     """
     ascii_text = "".join(chr(byte) if 32 <= byte < 127 else f"<{byte:02x}>" for byte in utf8(text))
