@@ -38,9 +38,9 @@ def reduction_link_by_link(robot: Scaled) -> Reduction:
 def links_together(robot: Scaled) -> NDArray[np.int64]:
     """(n,) for each link, the first of the links whose columns are eliminated together with its own.
 
-    A link moves the joints before it in the same way as the link that carries it. If that carrying link has all its
-    parameters, later links add nothing there, and links are eliminated one by one. Links attached to a link with fewer
-    parameters are treated alike: one of them may have in full what another has only a small part of.
+    Any effect of a link on the joints before it could also come from the link that carries it. If that carrying link
+    has all its parameters, later links add nothing there, and links are eliminated one by one. Links attached to a link
+    with fewer parameters are treated alike: one of them may have in full what another has only a small part of.
     """
     parents = [frame.parent for frame in robot.frames]
     own = robot.leads[robot.leads % PARAMETERS_PER_LINK != DRIVE] // PARAMETERS_PER_LINK

@@ -1,8 +1,8 @@
 """Derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and also M = d tau / d qdd.
 
 When joint j turns by a small angle, every point of the bodies that it carries moves along t_j = z_j x r. Relative to
-these bodies, the motion of the link before the joint turns the other way. With z' = w x z and z'' = U z of that link
-and a the acceleration of the joint's origin, a joint i beyond j (or j itself) needs the additional torque
+these bodies, the motion of the link before the joint turns by the opposite angle. With z' = w x z and z'' = U z of that
+link and a the acceleration of the joint's origin, a joint i that j carries (or j itself) needs the additional torque
 
     d tau_i / d q_j   = A_i . z_j'' + B_i . z_j' + C_i . (a_j x z_j)
     d tau_i / d qd_j  = 2 A_i . z_j' + B_i . z_j

@@ -34,7 +34,8 @@ def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequen
 def rates_bent(
     frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
 ) -> list[Scalar]:
-    """Return the changes per second of `coordinate_rates` at constant rates, while q moves at the nv rates `way`."""
+    """Return the changes per second of `coordinate_rates`, for constant joint rates `rates`, while q moves at the joint
+    rates `way`."""
     both = zip(_joints(frames, q, rates), _joints(frames, q, way), strict=True)
     return [x for (joint, here, own), (_, _, moved) in both for x in joint.rates_bent(here, own, moved)]
 

@@ -27,7 +27,7 @@ class Structure(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SymmetricMatrix:
-    """A symmetric matrix that must be positive definite, or the function has no result.
+    """A symmetric matrix that a function factorises. If it is not positive definite, the function has no result.
 
     name       the matrix's name in sentences
     structure  which entries are zero

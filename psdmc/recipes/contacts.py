@@ -61,7 +61,7 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 class Held(NamedTuple):
-    """Which rows of the contacts are active, that is, whose accelerations the world prescribes; and the regularisation.
+    """The contacts' active rows, that is, the rows whose accelerations the world prescribes, and the regularisation.
 
     named   the named frames
     active  an entry for each contact
