@@ -25,9 +25,10 @@ from psdmc.version import psdmc_version
 class JointInfo:
     """A joint's name, type, units and limits. Unknown limits are infinite.
 
-    nq, nv       number of its coordinates, and of its rates
-    coordinates  names of the coordinates if there are several
-    parent       the link to which the joint is attached, untrusted text; empty in a serial chain
+    nq           number of its entries in q
+    nv           number of its entries in qd
+    coordinates  names of the entries in q if there are several
+    parent       link to which the joint is attached, untrusted text; empty in a serial chain
     """
 
     name: str
@@ -112,7 +113,8 @@ class PackageInfo:
 
     @property
     def is_wide(self) -> bool:
-        """Whether some joint has several coordinates, so that q, rates and tables of joints differ in length."""
+        """Return whether some joint has several coordinates. Then q, the rates and the tables of joints have different
+        lengths."""
         return any(joint.nq > 1 for joint in self.joints)
 
     @property
@@ -122,7 +124,8 @@ class PackageInfo:
 
     @property
     def sizes(self) -> Sizes:
-        """The numbers of joints, rates, frames and so on that the signatures' axes stand for on this robot."""
+        """Return the lengths of array axes for this robot: numbers of joints, entries of q, rates, base parameters,
+        frames and contacts."""
         rows = tuple(rows for _, rows in self.contacts)
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames), rows_of_contacts=rows)
 
@@ -140,11 +143,11 @@ def package_info(
     friction: bool = False,
     bodies: bool = False,
 ) -> PackageInfo:
-    """Return the metadata of a MODEL. `name` replaces the robot's own name. The options `payload`, `friction` and
-    `bodies` add the data for functions that add loads, compute friction, or compute theta_b from bodies.
+    """Return the metadata of a model for a package. `name` replaces the name of the robot. The options `payload`,
+    `friction` and `bodies` add the data for further functions: adding loads, friction, and base parameters from bodies.
 
-    Raises InputError if the model's assumptions do not admit every load or body, or if friction is wanted and the model
-    was not calibrated from plain logs.
+    Raises InputError if the model was derived under an assumption that excludes some loads or bodies. Also raises
+    InputError if friction is wanted and the model was not calibrated from plain logs.
     """
     chain = model.mechanism
     joints = tuple(

@@ -44,7 +44,8 @@ class CodeBesideTemplates(BytecodeCache):
                 bucket.code = marshal.loads(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Store the template's compiled code in the cache; do nothing if the folder is not writable."""
+        """Write the compiled code of a template to a file in the cache. Nothing is written if the folder is not
+        writable."""
         if sys.dont_write_bytecode:
             return
         code = marshal.dumps(bucket.code)

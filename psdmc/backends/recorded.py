@@ -25,8 +25,10 @@ MORE_SOURCES = {name: f"src/{name}.c" for name in ("payload", "friction", "bodie
 class Differences:
     """How a package on disk differs from what psdmc writes now.
 
-    missing, added, changed  paths that the folder lacks, that psdmc no longer writes, and whose bytes differ
-    reasons                  possible reasons, in sentences, from a comparison of the manifests
+    missing  paths of files that the folder lacks
+    added    paths of files that psdmc no longer writes
+    changed  paths of files whose bytes differ
+    reasons  possible reasons, in sentences, from a comparison of the manifests
     """
 
     missing: tuple[str, ...]

@@ -11,8 +11,8 @@ Real = Literal["double", "float"]
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """The numbers of one precision's sincos. For angles up to `limit` (rad), the product of k and each part of pi/2
-    except the last is exact."""
+    """The numbers of the sine and cosine code for float or double. For angles up to `limit` (rad), k (the number of
+    quarter revolutions) times each part of pi/2 except the last is exact."""
 
     two_over_pi: float
     half_pi: tuple[float, ...]

@@ -21,8 +21,8 @@ def native_flags() -> tuple[str, ...]:
 
 
 def counted_flags() -> tuple[str, ...]:
-    """Compiler flags for counting instructions. They allow AVX2 only, as valgrind has no AVX-512 and counts should be
-    the same everywhere."""
+    """Return the compiler flags for counting instructions. They permit AVX2 instructions but no AVX-512, which valgrind
+    does not support. So counts are equal on all machines."""
     return (*find_compiler().portable, *X86_64_V3.flags)
 
 
@@ -53,8 +53,8 @@ def built(
 
 
 def produced(build: Callable[[Path], None], sources: Mapping[str, str], parts: Sequence[str]) -> Path:
-    """Return the folder that `build` fills, from the cache if possible. `parts` lists what it depends on besides the
-    sources."""
+    """Return the folder that `build` fills with compiled files; from the cache if possible. `parts` lists what the
+    files depend on in addition to the sources, such as compiler flags."""
     compiler = find_compiler()
     target = [compiler.target] if any("native" in part for part in parts) else []
     return cached(cache_key(sources, (compiler.version, *target, *parts)), build)

@@ -30,7 +30,8 @@ class Derivation:
 
 
 def derive_fresh(chain: Mechanism) -> Derivation:
-    """Derive a model in a new process. Leave out E and P if they do not fit into memory."""
+    """Return the model of a robot, derived in a new process, with time and memory of the derivation. The matrices E and
+    P are left out if they do not fit into memory."""
     return in_a_new_process(measured_derivation, chain)
 
 

@@ -83,8 +83,13 @@ def measure(
     between: Callable[[], None] = lambda: None,
     cold: bool = False,
 ) -> Measured:
-    """Time every runner once per round, until `rounds` rounds count. `between` is called before each round. If `cold`,
-    also time single calls with empty caches."""
+    """Time every compared function once per round, until `rounds` rounds were made while no other program ran. Returns
+    the times of each function.
+
+    runners  the compared functions, with their states
+    between  function that is called before each round
+    cold     True: also time single calls with empty caches
+    """
     _round(runners)  # caches, branch predictors and the clock speed settle
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
@@ -152,7 +157,8 @@ UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 
 @cache
 def swept_memory() -> Array:
-    """Return memory twice as large as the largest cache, within LEAST and MOST. Reading it empties the caches."""
+    """Return an array twice as large as the largest cache of the machine, within the limits LEAST and MOST (bytes). The
+    benchmark reads this array to empty the caches."""
     largest = max(map(_bytes, CACHES.glob("index*/size")), default=0)
     return np.ones(min(max(2 * largest, LEAST), MOST) // 8)
 
@@ -169,8 +175,9 @@ CODE = frozenset("tTwW")
 
 
 def code_sizes(library: Path) -> dict[str, int]:
-    """Return the size in bytes of each function's machine code, by name; empty if there is no GNU or LLVM nm. Parts that
-    a compiler splits off, such as `name.cold`, count as the function's."""
+    """Return the size in bytes of each C function's machine code in a library, by name; empty if there is no GNU or
+    LLVM nm. A compiler may move part of a function into another symbol, such as `name.cold`; its size is added to that
+    of the function."""
     nm = shutil.which("nm")
     if nm is None:
         return {}

@@ -51,7 +51,8 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """Results for one robot, from `rounds` trials of each function; `idle` if no other program ran meanwhile."""
+    """The results for one robot, from `rounds` timed rounds over all functions. `idle` states whether no other program
+    ran during these rounds."""
 
     name: str
     note: str
@@ -68,7 +69,7 @@ class CaseResult:
     threads: tuple[ThreadTime, ...] = ()
 
     def of(self, function: str, layout: str = "state") -> Iterator[Measurement]:
-        """Return the measurements of one function, in the order of the libraries."""
+        """Return the measurements of one function in one memory layout of states, in the order of the libraries."""
         return (m for m in self.measurements if m.function == function and m.layout == layout)
 
     def best(self, rival: str, function: str, layout: str = "state") -> Measurement | None:
@@ -79,7 +80,11 @@ class CaseResult:
     def ratio(
         self, function: str, layout: str = "state", *, over: str, rival: str = "psdmc factored"
     ) -> float | None:
-        """Return how many times faster `rival` is than the fastest algorithm of `over`, for one state per call."""
+        """Return how many times faster the library `rival` is than the fastest algorithm of the library `over` for one
+        state per call. Return None if one of them was not measured.
+
+        layout  memory layout of the states of `rival`
+        """
         ours, theirs = self.best(rival, function, layout), self.best(over, function)
         return theirs.ns / ours.ns if ours and theirs else None
 

@@ -28,8 +28,8 @@ UNFINISHED = ".psdmc-unfinished"
 
 @contextmanager
 def being_written(folder: str | Path) -> Iterator[None]:
-    """Mark a folder as incomplete while a campaign is written to it. If the process is killed, psdmc may write the
-    folder again."""
+    """Mark a folder as incomplete during a `with` statement that writes a campaign to it. If the process is killed, the
+    mark remains, and psdmc may later write a new campaign to the folder."""
     root = Path(folder)
     make_folder(root)
     write_whole(root / UNFINISHED, "")
@@ -127,7 +127,8 @@ def _toml_text(text: str) -> str:
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
-    """Return the parameters of the exciting motion, (22) in Denso-2022, and its condition number as plain JSON values."""
+    """Return the exciting motion of a campaign as plain JSON values: the parameters of its Fourier series, (22) in
+    Denso-2022, and the condition number of its regressor."""
     motion = found.motion
     return {
         "duration_s": motion.duration,

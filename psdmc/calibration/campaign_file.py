@@ -59,7 +59,8 @@ def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
 
 
 def runs_of(content: dict[str, Any], path: Path) -> tuple[ListedRun, ...]:
-    """Return the runs from the content of a campaign.toml; `path` is the path of that file."""
+    """Return the runs (recordings of one motion each) that the content of a campaign.toml lists. `path` is the path of
+    this file. Raises InputError with all faults."""
     faults: list[str] = []
     tables = TomlTable(content, "campaign", ("run",), faults).items("run")
     if not tables and not faults:
@@ -106,11 +107,13 @@ def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...]
 
 
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
-    """Return all logs of a campaign, by the step of the calibration that uses them.
+    """Read all logs of a campaign, and return them by the step of the calibration that uses them: motor, gravity,
+    friction, inertial.
 
-    joint_names  joints of the robot to calibrate
+    joint_names  joints of the robot to calibrate; None: joints are not checked
 
-    Raises InputError if a log is missing, if a motor run has no counterpart, or if a run names an unknown joint.
+    Raises InputError if a log is missing or a run names an unknown joint. Also raises InputError if a motor run with
+    the load has no run without the load, or the reverse.
     """
     runs = listed_runs(path)
     if joint_names is not None:

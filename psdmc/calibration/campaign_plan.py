@@ -53,8 +53,10 @@ SINE_SHARES = ((1.0, 0.9), (0.5, 0.6), (0.25, 0.4))
 class CampaignOptions:
     """Options for the plan of a campaign.
 
-    load          known load of the motor step: mass (kg) and centre of mass (m, tip frame); None: no motor step, for robots
-                  that log torques
+    sweep         options of slow sweeps; sines, of sine motions for friction; excite, of the exciting motion
+    load          known load with which torque constants are measured: mass (kg) and centre of mass (m, tip frame).
+                  None: for
+                  robots that log torques; no runs with a load are planned
     gravity_runs  number of slow sweeps through the workspace, each forwards and backwards
     repeats       periods of the exciting motion
     one_log       True: plan only the exciting motion, for one linear fit of all base parameters, friction and offsets
@@ -113,9 +115,11 @@ class PlannedRun:
 class Plan:
     """All runs of a campaign, the exciting motion, and notes for the user, one sentence each.
 
+    runs        motions for the robot, in their order
+    found       the exciting motion
     chain       the robot with the limits that the motions keep
     is_cleared  whether collisions of shapes or with a floor were checked
-    looked      what was checked, and what was not
+    looked      sentences on the collisions that were checked, and on those that were not
     remarks     differences from what the user asked for, and values that the campaign cannot determine
     """
 
@@ -134,8 +138,9 @@ def plan_campaign(
     progress: Progress = lambda step: None,
     began: float | None = None,
 ) -> Plan:
-    """Return the runs of the four steps, or of one log. Each motion is checked against limits of joints and torques
-    and for collisions. This includes the search for the exciting motion.
+    """Return the plan of a campaign: the runs for a calibration in four steps, or only the exciting motion for one log.
+    Each motion is checked against joint limits, torque limits and collisions, also during the search for the exciting
+    motion.
 
     began  value of cpu_seconds() from which the time of the search counts; None: now
 
@@ -194,7 +199,8 @@ class _Planner:
         self.remarks: list[str] = []
 
     def motors(self) -> None:
-        """Plan a sweep of each joint on which the load acts, once without and once with the load."""
+        """Plan the runs that determine torque constants. Each joint on which the weight of the known load acts makes
+        two sweeps, without and with the load."""
         load = self.options.load
         if load is None:
             self.remarks.append(

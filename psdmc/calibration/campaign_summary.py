@@ -15,7 +15,8 @@ MIB = 2.0**20
 
 
 def summary(plan: Plan, folder: str | Path) -> tuple[str, ...]:
-    """Return lines of text about the folder of a campaign; sizes are those of its files."""
+    """Return lines of text for the user about a campaign that was written to a folder. They give runs, minutes, loads
+    to mount, and the size of the trajectory files."""
     runs, listed = plan.runs, listed_runs(folder)
     files = sorted({run.trajectory for run in listed if run.trajectory is not None})
     size = sum(path.stat().st_size for path in files) / MIB

@@ -32,7 +32,8 @@ Far = Literal["libm", "nan"]
 
 
 def far_of(trig: Trig) -> Far:
-    """Return what the generated code does with angles outside the range of the inline sincos."""
+    """Return how the generated code computes the sine of an angle outside the range of its own sine function: 'libm'
+    (by the C library) or 'nan' (the result is NaN)."""
     return "nan" if trig == "freestanding" else "libm"
 
 
@@ -42,8 +43,8 @@ SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
 
 @dataclass(frozen=True, slots=True)
 class AnySign:
-    """C test of whether a lane of `*bits` is negative: `c` if the macro `guard` is defined, else `plain` < 0. Without a
-    guard, the test is always `c`."""
+    """C test of whether one lane of the integer vector `*bits` is negative. If the C macro `guard` is defined, the test
+    is `c`, an instruction of the processor. Otherwise, it is `plain` < 0."""
 
     guard: str
     c: str
@@ -61,10 +62,10 @@ class TrigPreamble:
 
 @dataclass(frozen=True, slots=True)
 class ScalarTrig:
-    """View for sincos_scalar.jinja. The type vec is the real type itself; ivec is an unsigned integer of the same size
-    (in vectors: signed).
+    """The data of the template sincos_scalar.jinja. The C type vec is the real type (float or double). ivec is an
+    unsigned integer type of the size of vec (in vectors: signed).
 
-    rounded  integer type to which k is converted
+    rounded  integer type of k, the angle divided by pi/2 and rounded
     """
 
     macro: str
@@ -87,7 +88,8 @@ class ScalarTrig:
 
 @dataclass(frozen=True, slots=True)
 class VectorTrig(ScalarTrig):
-    """View for sincos_vector.jinja and types.jinja: vec has `lanes` reals, ivec has `lanes` signed integers."""
+    """The data of the templates sincos_vector.jinja and types.jinja. The C type vec is a vector of `lanes` real
+    numbers, and ivec is a vector of `lanes` signed integers."""
 
     near_symbol: str
     far_symbol: str
@@ -99,15 +101,17 @@ class VectorTrig(ScalarTrig):
 
 
 def trig_preamble(prefix: str, real: Real, far: Far = "libm") -> TrigPreamble:
-    """Return the view for preamble.jinja. In all views here, prefix is the robot's identifier."""
+    """Return the data of the template preamble.jinja. In this module, `prefix` is the robot's identifier, and `far`
+    says how angles outside the usual range are computed."""
     return TrigPreamble(_macro(prefix), real, far == "libm")
 
 
 def scalar_trig(prefix: str, real: Real, far: Far = "libm", short: bool = False) -> ScalarTrig:
-    """Return the view for sincos_scalar.jinja: the C function <prefix>_sincos_f64 or _f32, which takes pointers to the
-    angle and the results.
+    """Return the data of the template sincos_scalar.jinja, for the C function <prefix>_sincos_f64 or _f32. This
+    function takes pointers to the angle and to the two results.
 
-    short  convert k to int, which is large enough, for machines on which wider integers need a function call
+    short  True: the rounded number of quarter revolutions has the C type int. This avoids a function call on machines
+           without wider integers
     """
     suffix = _suffix(real)
     return ScalarTrig(
@@ -138,9 +142,11 @@ def vector_trig(
     vec: str | None = None,
     ivec: str | None = None,
 ) -> VectorTrig:
-    """Return the view for sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of one of a target's units.
+    """Return the data of the template sincos_vector.jinja, for a C function <prefix>_sincos_f64x8 and so on. `unit` is
+    the kind of SIMD registers that the function uses.
 
-    vec and ivec are names of types in the C file; by default <prefix>_f64x8 and <prefix>_i64x8 of types.jinja.
+    vec, ivec  names of the vector types in the C file; None: <prefix>_f64x8, <prefix>_i64x8 and so on, as in
+               types.jinja
     """
     bits = NUMBERS[real].bits
     lanes = unit.bytes * 8 // bits

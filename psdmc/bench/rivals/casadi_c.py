@@ -1,4 +1,5 @@
-"""C code that CasADi generates from Pinocchio's algorithms: for one state per call, and for one state per SIMD lane."""
+"""C code that CasADi generates from Pinocchio's algorithms, in two variants: each call computes one state, or several
+states at once with one state per SIMD lane."""
 
 from __future__ import annotations
 
