@@ -52,8 +52,8 @@ class Check(NamedTuple):
 
 
 class KernelText(NamedTuple):
-    """One Rust function. `pivots` is Rust text with pairs (number, value) of the pivots of a factorised matrix, in the
-    order in which the function tests that they are positive."""
+    """One Rust function. `pivots` is Rust text with pairs (number, value) of the pivots of a factorised matrix. The
+    function tests in the order of the pairs that the pivots are positive."""
 
     name: str
     parameters: str

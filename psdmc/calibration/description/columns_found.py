@@ -43,11 +43,14 @@ USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A column of a log file: SI value = factor * (number - zero).
+    """A column of a log file that holds one quantity of one joint. The SI value is factor * (number in the column -
+    zero).
 
-    table, place  name of the table, and index of the column from 0
-    says          what the column's unit implies about the joint
-    entry         the entry of the log description about the column
+    table   name of the table that has the column
+    place   index of the column from 0
+    says    what the column's unit implies about the joint: that it rotates or slides, or nothing
+    delay   s by which the column lags behind the time column
+    entry   the entry of the log description about the column
     """
 
     table: str
@@ -103,7 +106,8 @@ def _found(joint: JointEntry, what: What, entry: Entry, tables: Mapping[str, Col
 
 
 def replace_unit(entry: Entry, unit: str) -> Entry:
-    """Return the entry with this unit, or without a unit if `unit` is empty."""
+    """Return a copy of the entry with the unit `unit`. Fields about encoder ticks or currents that contradict this unit
+    are dropped. If `unit` is empty, the entry is returned unchanged."""
     return Entry(unit=unit or None).over(entry)
 
 

@@ -75,11 +75,14 @@ def calibrate_four_steps(
     torque_constants: Mapping[str, float] | None = None,
     file_theta: Array | None = None,
 ) -> FourSteps:
-    """Determine torque constants, gravity, friction and inertia. The last three steps are repeated as often as the
-    options say.
+    """Return torque constants, gravity parameters, friction and inertial parameters from the runs of a campaign. The
+    last three are determined repeatedly, as often as the options say.
 
-    torque_constants  N m/A by joint name, for joints on which no load acts (an axis along gravity)
-    file_theta        (l,)  the file's values, which remain in directions that no run shows; None: zero
+    torque_constants  N m/A by joint name, for joints on which the weight of the load does not act (an axis along
+                      gravity)
+    file_theta        (l,) the l base parameters of the robot file, which remain in directions (linear combinations)
+                      that no
+                      run determines; None: zero
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)
