@@ -151,8 +151,8 @@ Counts = dict[str, dict[str, dict[str, float]]]
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Operation and instruction counts, and the compiler of the instruction counts. `without` says why they are
-    missing."""
+    """Operation and instruction counts of all robots and functions, and the compiler with which instructions were
+    counted. `without` says why instruction counts are missing; None: they are there."""
 
     compiler: str
     counts: Counts

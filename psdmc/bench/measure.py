@@ -84,7 +84,8 @@ def measure(
     cold: bool = False,
 ) -> Measured:
     """Time every compared function once per round, until `rounds` rounds were made while no other program ran. Returns
-    the times of each function.
+    the times of each function. If the machine stays busy for PATIENCE times as many rounds, the times of all rounds are
+    returned.
 
     runners  the compared functions, with their states
     between  function that is called before each round

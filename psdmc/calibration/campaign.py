@@ -127,8 +127,8 @@ def _toml_text(text: str) -> str:
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
-    """Return the exciting motion of a campaign as plain JSON values: the parameters of its Fourier series, (22) in
-    Denso-2022, and the condition number of its regressor."""
+    """Return the exciting motion of a campaign as plain JSON values. They are the parameters of its Fourier series,
+    (22) in Denso-2022, and the condition number of its regressor."""
     motion = found.motion
     return {
         "duration_s": motion.duration,

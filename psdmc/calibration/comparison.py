@@ -151,7 +151,8 @@ class Comparison:
 
     @property
     def surely(self) -> tuple[Difference, ...]:
-        """Values that differ by more than three standard deviations, those with the largest ratio first."""
+        """Return the values that differ by more than three standard deviations. The values with the largest difference,
+        in standard deviations, come first."""
         own = [row for row in (*self.parameters, *self.friction) if abs(row.sigmas) > SURE]
         return tuple(sorted(own, key=lambda row: -abs(row.sigmas)))
 

@@ -1,4 +1,4 @@
-"""Makes the final result of a linear fit of plain logs: without constraints or physically possible, and with all
+"""Makes the final result of a linear fit of plain logs. It is unconstrained or physically possible, and has all
 parameters or only those that the data need."""
 
 from __future__ import annotations

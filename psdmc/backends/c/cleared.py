@@ -33,7 +33,8 @@ def cleared(program: Program, sizes: Mapping[str, int]) -> tuple[Cleared, ...]:
 
 
 def zero_outputs(program: Program, sizes: Mapping[str, int]) -> dict[str, list[int]]:
-    """Return, for each output vector, the entries that the PROGRAM does not store or stores as the constant zero."""
+    """Return, for each output vector, the entries that are zero at every state. The PROGRAM (the list of operations to
+    generate) does not store these entries, or stores the constant zero."""
     values = {slot: program.body[i].value for slot, i in program.outputs}
     return {
         vector: [index for index in range(size) if values.get(Slot(vector, index), 0.0) == 0.0]

@@ -76,8 +76,8 @@ class KernelView:
 
     @property
     def variant(self) -> str:
-        """Return the ending of the kernel's name: '' for compiled-in base parameters, '_theta' if theta_b is an input,
-        '_theta_rows' if each state of a batch has its own theta_b."""
+        """Return the ending of the kernel's name, which says where the base parameters come from. '' stands for
+        compiled-in parameters, '_theta' for an input theta_b, and '_theta_rows' for one theta_b per state of a batch."""
         if self.name.endswith(THETA_ROWS):
             return THETA_ROWS
         return "_theta" if self.theta else ""
@@ -109,8 +109,8 @@ class KernelView:
 
     @property
     def is_mixed(self) -> bool:
-        """Return whether a batch call needs both kinds of storage: registers are written straight into one array, while
-        another output or the pivots are first collected in a block."""
+        """Return whether a batch call needs both kinds of storage. One output is then written straight from registers
+        into the output array, while another output or the pivots are first collected in a block."""
         return self.direct and (
             self.positive is not None or not all(output.direct for output in self.outputs)
         )

@@ -175,8 +175,8 @@ class GroupView(NamedByCount):
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """One stage of a function with limbs (such as legs): a part of the code that is computed either for all limbs of a
-    group at once, or for the core. The core is everything outside limbs.
+    """One stage of the code of a function with limbs (such as legs). A stage is computed for all limbs of a group at
+    once, or for the core, which is everything outside limbs.
 
     count  number of limbs that the stage computes in lanes; 0: the stage belongs to the core
     body   C statements of the stage

@@ -36,7 +36,9 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A C statement `const <V or real> name = text;`, which gives a name to a value."""
+    """A C statement `const V name = text;` or `const real name = text;`, which stores the value of an expression in a C
+    variable. V is a real number or a SIMD vector. If `uniform`, the value is equal for all states of a batch and has
+    the type real."""
 
     name: str
     text: str

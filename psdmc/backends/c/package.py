@@ -1,4 +1,5 @@
-"""The complete C package in the form that templates print, made from the robot's metadata and the kernels."""
+"""The complete C package as data for the templates. It is made from the robot's metadata and the kernels (variants of
+generated functions)."""
 
 from __future__ import annotations
 
@@ -85,8 +86,8 @@ class PackageView:
 
     @property
     def patterns(self) -> tuple[Pattern, ...]:
-        """Return the sparsity patterns (positions of nonzero entries) that the package lists: of matrices that are
-        stored without zeros and, for a tree robot, of all other matrices with zeros."""
+        """Return the sparsity patterns (positions of nonzero entries) that the package lists. Listed are matrices that
+        are stored without zeros. For a tree robot, all other matrices with zeros are listed, too."""
         found = patterns(self.functions)
         return tuple(each for each in found if each.is_packed or (self.info.is_tree and each.is_sparse))
 
@@ -274,7 +275,8 @@ class PackageView:
 
     @property
     def uses_frames(self) -> bool:
-        """Return whether a function of the package has an input or output for the named frames of the robot."""
+        """Return whether a function of the package uses the named frames of the robot: as an input, as an output, or as
+        the place of a load."""
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 

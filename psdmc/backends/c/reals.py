@@ -28,8 +28,8 @@ def c_real(options: EmitOptions) -> CReal:
 
 
 def rounded_out(value: float, real: str) -> float:
-    """Return the value as the C type `real` holds it if it is outside the range of `real`: as infinity or the largest
-    number, or as zero. Any other value is returned unchanged."""
+    """Return the value to which a number outside the range of the C type `real` is rounded: infinity, the largest
+    number, or zero. Any other number is returned unchanged."""
     if real == "double" or math.isnan(value):
         return value
     if abs(value) >= TOO_LARGE:

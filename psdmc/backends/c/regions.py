@@ -26,8 +26,8 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class RegionsView:
-    """The body of a C function that contains loops or calls: declarations of the internal arrays and constants, then
-    the parts of the code in their order."""
+    """The body of a C function that contains loops or calls. First come declarations of the internal arrays and
+    constants, then the parts of the code in their order."""
 
     declarations: tuple[str, ...]
     pieces: tuple[Piece, ...]

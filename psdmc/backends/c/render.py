@@ -17,5 +17,5 @@ def environment() -> Environment:
 
 
 def render(template: str, **view: object) -> str:
-    """Fill a template with its view objects and return the text."""
+    """Fill a C template with the data that its variables name, and return the text."""
     return environment().get_template(template).render(**view)

@@ -1,4 +1,4 @@
-"""The numbers and names of the inline sincos in the generated C: views for `templates/trig/`.
+"""The numbers and names of the inline sincos in the generated C: data for the templates in `templates/trig/`.
 
     q = k pi/2 + r,  k = round(2 q / pi),  |r| <= pi/4        pi/2 in parts whose products with k are exact
     sin r = r - r^3 P(r^2)        cos r = 1 - r^2/2 + r^4 Q(r^2)
@@ -6,12 +6,12 @@
 k mod 4 decides which of the two polynomials gives the sine and which the cosine, and their signs. docs/trigonometry.md
 derives the error bounds. tests/trig/minimax.py computes the coefficients, and a test compares them with these.
 
-A generated C file includes the following templates of `templates/trig/`, each with `trig=` one of these views:
+A generated C file includes the following templates of `templates/trig/`, each with `trig=` the result of one function:
 
     preamble.jinja         trig_preamble(prefix, real, far)       once per C file
     #if HAS_VECTORS                                               (psdmc/target/vectors.py)
     types.jinja            vector_trig(prefix, real, unit, far)   unless the file has such types itself
-    sincos_vector.jinja    the same view                          <symbol>(const vec *x, vec *s, vec *c)
+    sincos_vector.jinja    the same result                        <symbol>(const vec *x, vec *s, vec *c)
     #else
     sincos_scalar.jinja    scalar_trig(prefix, real, far)         <symbol>(const real *x, real *s, real *c)
     #endif
@@ -32,8 +32,8 @@ Far = Literal["libm", "nan"]
 
 
 def far_of(trig: Trig) -> Far:
-    """Return how the generated code computes the sine of an angle outside the range of its own sine function: 'libm'
-    (by the C library) or 'nan' (the result is NaN)."""
+    """Return how the generated code computes the sine of an angle outside the range of its own sine function. 'libm'
+    stands for the C library; 'nan' means that the result is NaN."""
     return "nan" if trig == "freestanding" else "libm"
 
 

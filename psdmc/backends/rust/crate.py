@@ -41,8 +41,9 @@ class Constant(NamedTuple):
 
 
 class Check(NamedTuple):
-    """The comparison of one output in the self-test: its name, the number of rows that are compared separately, the
-    tolerance, and the call for state k. `values` are the expected values, or None if there are none."""
+    """The comparison of one output of a function in the self-test. It has the name of the output, the number of rows
+    that are compared separately, the tolerance, and the call for state k. `values` are the expected values, or None if
+    there are none."""
 
     name: str
     rows: int

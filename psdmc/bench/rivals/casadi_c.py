@@ -1,5 +1,5 @@
-"""C code that CasADi generates from Pinocchio's algorithms, in two variants: each call computes one state, or several
-states at once with one state per SIMD lane."""
+"""C code that CasADi generates from Pinocchio's algorithms, in two variants. A call of the first computes one state; a
+call of the second computes several states, one per SIMD lane."""
 
 from __future__ import annotations
 

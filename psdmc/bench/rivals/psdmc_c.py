@@ -62,8 +62,8 @@ def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailabl
 def contestants(
     case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...]
 ) -> list[Contestant]:
-    """Return psdmc's functions for one robot in three memory layouts: one state per call, many states one after the
-    other (rows), and blocks with one state per SIMD lane."""
+    """Return psdmc's functions for one robot in three memory layouts. The layouts are one state per call, many states
+    one after the other (rows), and blocks with one state per SIMD lane."""
     kernels = kernels_of(case.model, lowering, tuple(functions))
     package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
     library = compiled(package, flags)

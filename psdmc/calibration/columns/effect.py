@@ -54,8 +54,8 @@ class Motion:
 
 
 class Effect(Protocol):
-    """What one entry of a log description, such as a spring, adds to the motor torques: a sum of unknown values, each
-    times its torque per unit."""
+    """What one entry of a log description, such as a spring, adds to the motor torques. It is a sum of unknown values,
+    each times the torque per unit of the value."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]: ...

@@ -31,8 +31,8 @@ def joint_of(table: TomlTable, chain: Mechanism) -> int:
 
 
 def joints_of(value: object, where: str, chain: Mechanism, faults: list[str]) -> tuple[int, ...]:
-    """Return the indices of the joints that a value of a log description selects: all for true, none for false, else
-    those in a list of names. A text is added to `faults` if the value is wrong."""
+    """Return the indices of the joints that a value of a log description selects. The value true selects all joints,
+    false none, and a list selects joints by name. A text is added to `faults` if the value is wrong."""
     if isinstance(value, bool):
         return tuple(range(len(chain))) if value else ()
     if not isinstance(value, list) or any(not isinstance(name, str) for name in value):

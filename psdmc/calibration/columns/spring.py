@@ -32,8 +32,8 @@ def stretch(length: Array, rate: Array, reference: float) -> Array:
 
 
 def rub(length: Array, rate: Array, reference: float) -> Array:
-    """Return the tension per unit of rod friction, which acts against the motion of the rod: about one while the spring
-    becomes longer, minus one while it becomes shorter."""
+    """Return the tension per unit of rod friction, which acts against the motion of the rod. It is about one while the
+    spring becomes longer, minus one while it becomes shorter."""
     return np.asarray(np.tanh(rate / SLIDING))
 
 

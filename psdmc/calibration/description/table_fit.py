@@ -62,8 +62,9 @@ def _given(table: TomlTable, key: str, low: float, high: float) -> float | None:
 
 
 def split_of(shares: Sequence[float]) -> SplitOptions | str:
-    """Return how a log is split for validation, from one number or two: the share that is held out, and the number of
-    blocks into which it is divided. If the numbers are wrong, return a text that says what is expected."""
+    """Return how a log is split for validation, from one number or two. The first is the share that is held out, the
+    second the number of blocks into which it is divided. If the numbers are wrong, return a text that says what is
+    expected."""
     share, blocks = shares[0], shares[1] if len(shares) > 1 else 0.0
     if len(shares) > 2 or not 0.0 <= share <= LARGEST_HELD_OUT:
         return f"{', '.join(f'{x:g}' for x in shares)}: expected a share from 0 to {LARGEST_HELD_OUT:g}"

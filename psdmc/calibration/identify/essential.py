@@ -106,8 +106,8 @@ class _Problem:
         return covariance
 
     def f(self, dropped: NDArray[np.bool_]) -> float:
-        """Return the F statistic: how much the sum of squared residuals (in variances) increases if the dropped
-        parameters keep the prior's values, divided by their number."""
+        """Return the F statistic for the dropped parameters. It is the increase of the sum of squared residuals (in
+        variances) if they keep the prior's values, divided by their number."""
         if not dropped.any():
             return 0.0
         away = self.restricted(dropped)[0] - self.values

@@ -1,6 +1,8 @@
-"""Inputs and results of a linear fit: its options, its prior, and the estimate with its covariance.
+"""Inputs and results of a linear least-squares fit: its options, values before the fit (the prior), and the estimate
+with its covariance.
 
-A direction is a linear combination of unknowns; the data show it (it is seen) or not.
+In this module, a direction is a linear combination of the unknowns. A direction is seen if the data determine it. In an
+unseen direction, the estimate keeps the value of the prior.
 """
 
 from __future__ import annotations

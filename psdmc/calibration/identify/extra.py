@@ -50,8 +50,9 @@ def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Ar
 
 
 def limits_of(columns: Columns, plain: Sequence[tuple[str, str]], l: int) -> Array:
-    """Return k rows of linear inequalities, an array (k, l + n f + m): the product of each row with the vector of
-    unknowns may not be negative. The rows keep the magnitude of a value below another value of its joint.
+    """Return k rows of linear inequalities between the unknowns of a fit, an array (k, l + n f + m). The product of
+    each row with the vector of unknowns may not be negative. The rows keep the magnitude of a value below another value
+    of its joint.
 
     The unknowns are l base parameters, f friction values of each of n joints, and m values of springs and further
     friction.

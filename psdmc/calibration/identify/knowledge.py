@@ -1,4 +1,4 @@
-"""What a user knows of the links before the fit: how accurate the values of the robot file are, and bounds of masses
+"""What a user knows of the links before the fit. It is the accuracy of the robot file's values, and bounds of masses
 and centres of mass. It comes from the tables `prior` and [[bodies]] of a log description."""
 
 from __future__ import annotations

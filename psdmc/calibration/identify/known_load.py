@@ -48,8 +48,8 @@ class KnownLoad:
         return not np.any(self.inertia)
 
     def parameters(self, chain: Mechanism) -> Array:
-        """Return the standard parameters (11 n,) of a robot whose only body is the load: eleven for each of the n
-        joints (mass, first moments, inertia, drive inertia). Raises InputError if no real body has the mass and inertia
+        """Return the standard parameters (11 n,) of a robot with n joints whose only body is the load. Each joint has
+        eleven: mass, first moments, inertia, drive inertia. Raises InputError if no real body has the mass and inertia
         of the load."""
         place = carrying_frame(chain, self.frame)
         alone = np.zeros(PARAMETERS_PER_LINK * len(chain))

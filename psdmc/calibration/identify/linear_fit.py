@@ -30,8 +30,8 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearResult:
-    """The result of a linear fit, one vector: l base parameters, then f friction values (with offset) of each of n
-    joints, then m values of springs and further friction.
+    """The result of a linear fit, one vector of l + n f + m values. They are l base parameters, then f friction values
+    (with offset) of each of n joints, then m values of springs and further friction.
 
     estimate   of the whole vector, without physical constraints
     problem    the rows of the least-squares problem

@@ -47,8 +47,8 @@ class LinearProblem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the names, for messages, of the unknowns after the l base parameters: n f values of plain friction (f
-        for each of n joints), then m values of springs and further friction."""
+        """Return the names, for messages, of the unknowns after the l base parameters. They are f values of plain
+        friction for each of n joints, then m values of springs and further friction."""
         return (*(f"{name} of {joint}" for joint, name in self.plain), *self.columns.names)
 
     @property

@@ -1,9 +1,9 @@
 """The adapter that makes a Python module of the generated functions. `pip install DIR` compiles the module, which then
 needs NumPy only.
 
-An extension in CPython's stable ABI reads arrays as buffers. A Python file converts arguments, checks shapes and
-allocates results. Only batch functions are called: the result for one state then has the same bits alone and in a
-batch.
+A compiled extension in CPython's stable ABI reads arrays as buffers. A Python file converts arguments, checks shapes
+and allocates results. The extension calls only the C functions for many states. So the result for one state has exactly
+equal bits, alone or as part of a batch.
 """
 
 from __future__ import annotations
