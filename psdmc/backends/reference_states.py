@@ -50,10 +50,8 @@ class ReferenceStates:
     """k states of a robot, and the expected outputs of the generated functions there.
 
     given     arrays (k, size) by name: q, qd, qdd and other inputs of functions. tau and tau_theta are the torques at
-              (q, qd,
-              qdd) with the robot's base parameters and with theta_b. thetas are other base parameters for each state,
-              and
-              tau_theta_rows the torques with them; both exist only if a function reads them
+              (q, qd, qdd) with the robot's base parameters and with theta_b. thetas are other base parameters for each
+              state, and tau_theta_rows the torques with them; both exist only if a function reads them
     expected  arrays (k, size) by the name of the output; matrices are stored row by row
     theta_b   (l,) base parameters for the function variants that take them as an input. They differ from those of the
               robot, so that the test finds a function that ignores the input

@@ -55,8 +55,7 @@ class CampaignOptions:
 
     sweep         options of slow sweeps; sines, of sine motions for friction; excite, of the exciting motion
     load          known load with which torque constants are measured: mass (kg) and centre of mass (m, tip frame).
-                  None: for
-                  robots that log torques; no runs with a load are planned
+                  None: for robots that log torques; no runs with a load are planned
     gravity_runs  number of slow sweeps through the workspace, each forwards and backwards
     repeats       periods of the exciting motion
     one_log       True: plan only the exciting motion, for one linear fit of all base parameters, friction and offsets

@@ -51,8 +51,7 @@ def make_body(
     stores_early  True: store a value as soon as it is known (large outputs); False: store all at the end (small
                   outputs)
     in_groups     vectors that the batch variant stores four entries at a time, as soon as the fourth is known; any
-                  other
-                  vector is then stored by the macro STORE_BLOCK
+                  other vector is then stored by the macro STORE_BLOCK
     uniform       vectors that are equal for all states of a batch, such as theta_b
     """
     multiplied = tuple(multiplication(program, product, sizes) for product in products)

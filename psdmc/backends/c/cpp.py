@@ -33,8 +33,7 @@ class CppArrayMethod:
     """A member function that takes and returns std::array.
 
     output  the output that is returned, of type result_type; '' if all outputs are parameters. Outputs are parameters
-            if
-            there are several, or if the C function returns a status
+            if there are several, or if the C function returns a status
     """
 
     name: str

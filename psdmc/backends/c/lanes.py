@@ -17,8 +17,7 @@ class TransposeStage:
 
     distance       difference of the numbers of the two vectors, in lanes of each group
     first, second  C text of the lane numbers that form the new vectors i and i + distance; the lanes of both old
-                   vectors
-                   are numbered from 0 to 2 width - 1
+                   vectors are numbered from 0 to 2 width - 1
     """
 
     distance: int

@@ -19,8 +19,7 @@ class CallView:
     parameters  names of the arguments of its macro and its C functions
     one         C expression for one state; FUNCTION(name) becomes the C library's function for float or double
     many        C expression for SIMD vectors; BLEND(mask, x, y) is x in lanes whose mask is set, else y; '': each lane
-                is
-                computed alone with `one`
+                is computed alone with `one`
     """
 
     op: Op

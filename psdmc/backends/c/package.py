@@ -275,8 +275,8 @@ class PackageView:
 
     @property
     def uses_frames(self) -> bool:
-        """Return whether a function of the package uses the named frames of the robot: as an input, as an output, or as
-        the place of a load."""
+        """Return whether a function of the package needs the named frames of the robot. It may have an input or output
+        for frames, or add a load at a frame."""
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 

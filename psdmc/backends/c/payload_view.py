@@ -17,8 +17,7 @@ class PayloadView:
     """The functions of one robot that add a load to theta_b (the base parameters), as C text for float or double.
 
     matrices  (l, 10) each: factors from the ten inertial parameters of a load to the change of the l base parameters.
-              The
-              first is for a load at the tip, then there is one for each named frame
+              The first is for a load at the tip, then there is one for each named frame
     """
 
     robot: str

@@ -44,8 +44,7 @@ class SelfCheck:
     single         C call for the state with the number `row`
     batch          C call for `count` states, stored one state after the other; '' if there is no batch variant
     lanes          C call for `count` states, stored in blocks [entry][lane] with one state per lane; '' if there is no
-                   such
-                   variant
+                   such variant
     status         whether the calls return a status
     expected       C name of the array of expected values; '' if there are no expected values
     tolerance      largest permitted error, as C text

@@ -100,8 +100,7 @@ def read_columns(
     where    name of the log description, for messages
     offsets  whether plain friction has a constant torque for each joint, unless the tables say otherwise
     folder   folder of the Python files with users' own friction laws; None: no such file is run, for example when the
-             tables
-             come from a model file
+             tables come from a model file
 
     Raises InputError with the first faults.
     """

@@ -79,8 +79,7 @@ class Kind:
     name  the `kind` in an entry [[springs]]
     keys  keys that the entry may have in addition to `kind` and `name`
     read  function that returns the effects on torques of an entry, from its table and the robot. The function adds a
-          text
-          about each fault of the entry to the list `faults` of the table
+          text about each fault of the entry to the list `faults` of the table
     """
 
     name: str

@@ -39,8 +39,7 @@ class Table(Generic[T]):
 
     key      its name in the file
     read     function that returns the value of the key from TOML. It raises no error: it adds a text about each fault
-             to the
-             list `faults` of the Reading
+             to the list `faults` of the Reading
     default  the value if the file does not have the key
     options  function that returns the options of the linear fit, changed by the value of the key
     """

@@ -24,11 +24,10 @@ class FitOptions:
     the data determine it.
 
     method          ols: equal weights; wls: each joint is weighted by its residual; irls: like wls, with less weight
-                    for
-                    outliers (Huber)
+                    for outliers (Huber)
     rounds          number of times that the weights are computed again
-    huber           residual in standard deviations above which irls uses magnitudes instead of squares: 1.345 keeps
-                    95 % of least squares' efficiency for normal errors
+    huber           residual in standard deviations above which irls uses magnitudes instead of squares: 1.345 keeps 95
+                    % of least squares' efficiency for normal errors
     rank_tolerance  relative error of a column in addition to its noise: differentiation and filters cause about 1e-4
     noise_ratio     how many times stronger than the noise of its columns a seen direction is at least. With ten, this
                     noise reduces the result by a tenth at most
@@ -90,8 +89,8 @@ class Estimate:
     scale             (l,)      plausible size of each unknown, from the prior or, if there is none, from the columns
     prior_std         standard deviation of unseen directions, in units of `scale`; zero without a prior
     whitening         (l, l)    W with |W (v - values)|^2 the cost of any values v, in variances. In seen directions it
-                                comes
-                                from the data (their sum of squares over noise_factor^2), in the others from the prior
+                                comes from the data (their sum of squares over noise_factor^2), in the others from the
+                                prior
     identifiable      (l,)      whether the data determine the unknown by itself
     singular_values   (l,)      of the weighted problem with scaled columns, descending
     rank              number r of seen directions

@@ -81,8 +81,7 @@ def calibrate_four_steps(
     torque_constants  N m/A by joint name, for joints on which the weight of the load does not act (an axis along
                       gravity)
     file_theta        (l,) the l base parameters of the robot file, which remain in directions (linear combinations)
-                      that no
-                      run determines; None: zero
+                      that no run determines; None: zero
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)

@@ -42,8 +42,7 @@ class InertialResult:
     identifiable  (l,)    whether the data determine the parameter by itself
     estimate      estimate of the parameters that do not affect gravity torques
     unseen        (l, k)  k directions (combinations of parameters) that no run determines, in SI units. The length of
-                          each
-                          is a plausible change
+                          each is a plausible change
     scale         (l,)    plausible size of each base parameter
     """
 

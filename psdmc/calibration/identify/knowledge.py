@@ -58,8 +58,7 @@ def knowledge_of(
 
     where  name of the log description, for messages
     share  relative standard deviation of every link's mass, radius of gyration and inertia; None: the value in the
-           table
-           `prior`
+           table `prior`
     """
     faults: list[str] = []
     if share is not None and not SHARES[0] <= share <= SHARES[1]:

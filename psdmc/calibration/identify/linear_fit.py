@@ -93,8 +93,7 @@ def calibrate_linear(
 
     l         number of base parameters
     theta_b   (l,) base parameters of the robot file. They remain in directions (linear combinations) that the logs do
-              not
-              determine; None: zero
+              not determine; None: zero
     progress  function that is called with the share of the logs that has been read
     """
     options = options or LinearOptions()

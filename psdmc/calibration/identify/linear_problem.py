@@ -29,8 +29,7 @@ class LinearProblem:
     parameters, f values of plain friction of each of n joints, and m values of springs and further friction.
 
     rows      N samples of the columns of the l + n f + m unknowns, and of the columns that the position sensors' noise
-              alone
-              would give
+              alone would give
     torque    (N, n) measured torques, N m
     held_out  (N,) whether a sample is held out for validation
     terms     plain friction terms of every joint, which have f values together

@@ -118,8 +118,7 @@ def motors_by_load(
     not determine is NaN, with a warning.
 
     theta_b  (l,) the l base parameters of the robot file. They remain in directions (linear combinations) that the logs
-             do
-             not determine; None: zero
+             do not determine; None: zero
 
     Raises InputError if the load acts on no joint, or if all constants are negative.
     """
