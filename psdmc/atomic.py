@@ -1,7 +1,7 @@
-"""Functions that write a file as a whole or not at all. psdmc writes all its files with them.
+"""Functions that write a file completely or not at all. psdmc writes all its files with these functions.
 
-psdmc writes a file under a temporary name in the same folder, flushes it to disk, and renames it. A reader sees the
-old content or the new, even if the writing is interrupted. A process that is killed leaves its temporary file. The
+psdmc writes a file under a temporary name in the folder of the file, flushes it to disk, and renames it. A reader sees
+the old content or the new, even if the writing is interrupted. A process that is killed leaves its temporary file. The
 next process that writes into the folder recognises that file by its name and its released lock, and removes it.
 """
 

@@ -99,7 +99,7 @@ def _places(vector: str, first: int, count: int) -> str:
 
 
 def joint_line(joint: JointInfo) -> str:
-    """Describe a joint and its limits in one line; unknown limits are left out."""
+    """Return one line of text about a joint with its limits; unknown limits are left out."""
     parts = [f"{joint.name} ({joint.kind}{': ' if joint.coordinates else ''}{joint.coordinates})"]
     if math.isfinite(joint.lower) or math.isfinite(joint.upper):
         parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")

@@ -48,22 +48,23 @@ class JointInfo:
 
 @dataclass(frozen=True, slots=True)
 class PackageInfo:
-    """The metadata of one robot for header, manifest and README.
+    """The metadata of one robot for the C header, manifest.json and README.
 
     name        the robot's own name, untrusted text
-    joints      n, from base to tip; in a tree, parents before their children
+    joints      n joints, from base to tip; in a tree, parents before their children
     gravity     m/s^2 in the base frame
-    base, tip   link names
+    base, tip   names of links
     parameters  l base parameters, in the order of theta_b
-    model_hash  content hash of the MODEL
-    options     what the user chose, as printed in header and manifest
+    model_hash  content hash of the model file
+    options     options that the user chose, as printed in header and manifest
     frames      names of the named frames, untrusted text; empty: the tip alone
-    contacts    the frames that can touch the world, with their rows; empty: all frames, as points
-    payload     (l, 10) maps from a load to the change of theta_b, at the tip and at each named frame, if there are any;
-                empty if the package has no function for loads
-    units       slices (start, end) of q whose length must be one
-    bodies      links and the map of their bodies to theta_b; None if the package has no function for it
-    friction    what a calibration from plain logs found; None if the package has no function for it
+    contacts    names of the frames that can touch the world, each with the number of its rows in the contact Jacobian;
+                empty: all frames, as points
+    payload     (l, 10) maps from the ten parameters of a load to the change of the l base parameters: for a load at the
+                tip, then at each named frame. Empty if the package has no function that adds loads
+    units       index ranges (start, end) of q whose length must be one (quaternions)
+    bodies      map from the parameters of all bodies to theta_b; None if the package has no function for the map
+    friction    joint friction from a calibration with plain logs; None if the package has no function for friction
     q_names     names of the nq entries of q, untrusted text
     v_names     names of the nv entries of rates and torques
     base_frame  in words, the frame in which gravity, frames and velocities are given

@@ -1,4 +1,4 @@
-"""The file manifest.json: what the package is, and hashes of its files as psdmc wrote them."""
+"""The file manifest.json, which describes a package and lists the SHA-256 of each file as psdmc wrote it."""
 
 from __future__ import annotations
 

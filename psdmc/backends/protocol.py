@@ -1,7 +1,8 @@
-"""The interface of a back end (C, Rust): it receives metadata, arithmetic and reference values, and returns the text of
-files.
+"""The interface of a back end, which writes packages in one language (C, Rust). A back end receives metadata,
+arithmetic and reference values, and returns the text of files.
 
-Each back end is a folder next to this file. Other code uses only the constant BACK_END of its module `back_end`.
+Each back end is a folder next to this file. Other code uses only the constant BACK_END in the module `back_end` of the
+folder.
 """
 
 from __future__ import annotations

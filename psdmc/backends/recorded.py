@@ -41,8 +41,8 @@ class Differences:
 
 
 def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the options of psdmc.compiler.emit with which a package was generated, from its manifest, which may be
-    forged.
+    """Return the options of psdmc.compiler.emit with which a package was generated. They are read from the manifest of
+    the package, which may be forged.
 
     Raises InputError if the folder holds no package, or if the manifest lacks an option.
     """

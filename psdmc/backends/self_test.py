@@ -1,4 +1,4 @@
-"""What a package's self-test compares: labels, inputs and tolerances, the same in every language."""
+"""What the self-test of a package compares: names of outputs, inputs and tolerances, which are equal in all languages."""
 
 from __future__ import annotations
 

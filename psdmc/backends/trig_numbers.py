@@ -1,5 +1,5 @@
-"""The numbers of the inline sincos for all languages. tests/trig/minimax.py derives these numbers, and a test compares
-them."""
+"""The numbers of the sine and cosine code for all languages. tests/trig/minimax.py derives the numbers, and a test
+compares both."""
 
 from __future__ import annotations
 

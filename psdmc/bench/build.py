@@ -29,10 +29,10 @@ def counted_flags() -> tuple[str, ...]:
 def built(
     product: str, command: Sequence[str], sources: Mapping[str, str], depends: Sequence[str] = ()
 ) -> Path:
-    """Write the source files into a folder, run a command there, and return the path of the file `product` that it
-    makes.
+    """Run a command that makes the file `product` from source files, and return the path of this file. The sources are
+    first written into a folder.
 
-    command  argument list; it does not run if the cache has a result from the same content
+    command  argument list; it does not run if the cache has a result from equal content
     sources  text of each file by its path in the folder
     depends  what else the result depends on, such as versions of libraries
 

@@ -105,10 +105,10 @@ class Case:
 
 
 def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
-    """Return a robot of the given geometry with random physically possible inertias, no drive inertia, and gravity along
-    -z.
+    """Return a robot with the joints and lengths of the given robot and random, physically possible inertias. The robot
+    has no drive inertia, and gravity is along -z.
 
-    As no inertia is zero, no library profits from zeros. The same seed gives the same robot.
+    As no inertia is zero, no library profits from zeros. Equal seeds give equal robots.
     """
     rng = np.random.default_rng(seed)
     n = len(chain)
@@ -150,8 +150,9 @@ def robot_as_numbers(chain: Mechanism) -> str:
     """Return the robot as plain text for the C++ programs of other libraries, so that they need no parser for robot
     files. Raise InputError as refuse_unlike does.
 
-    The text has n and gravity. For each joint follow Pinocchio's name of its type, its parent (0: base, else from 1),
-    its rotation (9, row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
+    The text has the number n of joints, and gravity. Then follow, for each joint: Pinocchio's name of the joint type,
+    the parent (0: base, else from 1), rotation (9, row-major), translation (3), body (10 standard parameters about the
+    joint frame) and drive inertia.
     """
     refuse_unlike(chain)
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]

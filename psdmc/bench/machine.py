@@ -40,7 +40,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """Return the properties of this machine that the system tells."""
+    """Return the properties of this machine on which a time depends, as far as the system reports them."""
     return Machine(
         processor=_cpu_line("model name") or platform.processor() or platform.machine(),
         cores=os.cpu_count() or 1,

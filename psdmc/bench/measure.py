@@ -22,7 +22,11 @@ PATIENCE = 3
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Median, quartiles and smallest value of a time over several trials, ns."""
+    """Median, quartiles and smallest value of the times of one function over several rounds of timing, ns.
+
+    low, high  lower and upper quartile
+    best       smallest time
+    """
 
     median: float
     low: float
@@ -37,8 +41,12 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """Slowest calls, ns per call over blocks of 64 calls, without the time of reading the clock. They limit a control
-    loop."""
+    """The slowest calls of one function, which limit a control loop. The values are times per call in ns, in blocks of
+    64 calls, without the time of reading the clock.
+
+    percentile_99_99  time that one block in 10,000 exceeds
+    blocks            number of blocks
+    """
 
     median: float
     percentile_99_99: float
@@ -48,7 +56,7 @@ class Tail:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """Times of one compared function. Latency, tail and cold are measured only if a call computes one state.
+    """Times of one compared function. The times except throughput are measured only if a call computes one state.
 
     cold  time of single calls with empty caches; None if not measured
     """
@@ -69,7 +77,8 @@ class _Trials:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Times of all compared functions, in the order of the runners, and whether the machine was otherwise idle."""
+    """Times of all compared functions, in the order in which the functions were given. It also states whether the
+    machine was otherwise idle."""
 
     times: tuple[Times, ...]
     rounds: int

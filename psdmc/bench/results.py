@@ -21,13 +21,14 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """Result of one compared function for one robot.
+    """The result of one compared function for one robot.
 
-    layout        'state', 'rows' or 'lanes'
-    error         largest error of the outputs, divided by the largest value of each output
+    layout        how states are passed: 'state' (one per call), 'rows' (one after the other) or 'lanes' (blocks of
+                  states)
+    error         largest error of the outputs, divided by the largest value of each output array
     operations    (multiplications, additions), None if unknown
-    instructions  per state, as callgrind counts them on x86-64-v3; None if not counted
-    code_bytes    size of the machine code for one state; None if the library does not tell
+    instructions  number per state, as callgrind counts them on x86-64-v3; None if not counted
+    code_bytes    size of the machine code for one state; None if the library does not report it
     """
 
     rival: str

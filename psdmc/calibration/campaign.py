@@ -72,7 +72,7 @@ def _count(folder: Path) -> int:
 def write_campaign(
     folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str, *, force: bool = False
 ) -> Path:
-    """Write the folder of a campaign. Return the path of its campaign.toml.
+    """Write the plan and the trajectories of a campaign to a folder. Return the path of its campaign.toml.
 
     force   True: replace the plan and the trajectories of an existing campaign; logs are never changed
 

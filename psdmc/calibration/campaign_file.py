@@ -1,4 +1,5 @@
-"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs."""
+"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs. A run is one motion of the robot
+that is recorded."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ _LOAD_KEYS = ("mass", "com")
 
 @dataclass(frozen=True, slots=True)
 class ListedRun:
-    """One entry [[run]] of a campaign.toml. Its paths are relative to the working directory."""
+    """One entry [[run]] of a campaign.toml: a recorded motion. The paths of the trajectory and the log are relative to
+    the working directory."""
 
     step: Step
     name: str
@@ -52,7 +54,8 @@ def is_campaign(path: Path) -> bool:
 
 
 def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """Return the runs of a campaign.toml (or its folder). Raises InputError with the run and the missing entry."""
+    """Return the runs (recorded motions) that a campaign.toml lists; the path may also name its folder. Raises
+    InputError with the run and the missing entry."""
     path = Path(path)
     path = path / FILE if is_folder(path) else path
     return runs_of(read_toml(path, WHAT), path)

@@ -1,5 +1,5 @@
-"""Plans a calibration campaign: the motions of its runs, checked against limits and collisions, with notes for the
-user."""
+"""Plans a calibration campaign: the motions that the robot makes and records. They are checked against limits and
+collisions, and come with notes for the user."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class CampaignOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedRun:
-    """One run of the robot: a motion of all joints or of one joint, with or without a load."""
+    """One run of the robot in a campaign: a recorded motion of all joints or of one joint, with or without a load."""
 
     step: Step
     name: str

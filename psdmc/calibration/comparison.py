@@ -99,7 +99,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Friction torque of both models against the speed of one joint, while the other joints rest."""
+    """Friction torque of two models against the speed of one joint, while the other joints rest."""
 
     joint: str
     unit: str
@@ -290,8 +290,7 @@ def _doubts(*sides: _Side) -> list[Remark]:
 
 
 def require_same_robot(a: Mechanism, b: Mechanism) -> None:
-    """Raise InputError, which says what differs, unless both robots have the same joints, axes, link frames and
-    gravity."""
+    """Raise InputError unless two robots have equal joints, axes, link frames and gravity. The error says what differs."""
     hint = "compare two models of one robot, derived with the same --base, --tip, --lock and --gravity"
     if a.joint_names != b.joint_names:
         pairs = (("first", a.joint_names, b.joint_names), ("second", b.joint_names, a.joint_names))
@@ -410,8 +409,8 @@ def _states(chain: Mechanism) -> tuple[Array, Array, Array]:
 
 
 def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
-    """Return the friction torque (N, n) without springs. For a law with a state (LuGre) it is the torque in steady
-    sliding."""
+    """Return the friction torque (N samples, n joints) without springs. For LuGre friction, whose state is the
+    deflection of bristles, return the torque in steady sliding."""
     names = found.model.joint_names
     if found.prediction.is_linear:
         still = np.zeros_like(q)

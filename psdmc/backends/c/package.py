@@ -109,7 +109,7 @@ class PackageView:
 
     @property
     def arithmetic_flags(self) -> str:
-        """The compiler flags for the arithmetic of the C code, the same on every machine."""
+        """Return the compiler flags for the arithmetic of the C code, which are equal on every machine."""
         return " ".join(ARITHMETIC)
 
     @property
@@ -180,7 +180,7 @@ class PackageView:
 
     @property
     def version(self) -> str:
-        """psdmc's version as three numbers. CMake and pkg-config compare versions in this form."""
+        """Return psdmc's version as three numbers, the form in which CMake and pkg-config compare versions."""
         found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
         return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
 

@@ -1,4 +1,4 @@
-"""The Jinja templates for C. Their filters `comment` and `string` make untrusted text safe."""
+"""Fills the Jinja templates for C. The filters `comment` and `string` of the templates make untrusted text safe."""
 
 from __future__ import annotations
 

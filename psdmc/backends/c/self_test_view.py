@@ -1,4 +1,4 @@
-"""The package's self-test in the form that its templates print: calls, inputs, and the sizes of its buffers."""
+"""The self-test of a package as data for its templates: function calls, inputs, and the sizes of buffers."""
 
 from __future__ import annotations
 

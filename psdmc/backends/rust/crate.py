@@ -1,4 +1,4 @@
-"""A Rust crate in the form that templates print."""
+"""A Rust crate as data for the templates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The libraries that the benchmark compares, psdmc's own code included, in the order of its tables."""
+"""The libraries that the benchmark compares, including psdmc, in the order of the printed tables."""
 
 from __future__ import annotations
 

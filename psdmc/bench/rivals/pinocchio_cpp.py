@@ -1,5 +1,5 @@
-"""Pinocchio in C++ in two builds: linked to its wheel's library, as users have it, and header-only for this
-processor."""
+"""Pinocchio in C++ in two builds. One is linked to the library of the Python wheel, as users have it; the other is
+compiled from the headers alone for this processor."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ BY_COORDINATES = ("_jacobian", "_vjp", "_vjp_aba", "_vjp_ldl")
 
 
 def variant_of(symbol: str, function: str) -> str:
-    """Return the algorithm's name for tables: the part of the C symbol's name that the function's name does not
-    contain."""
+    """Return the name of an algorithm for tables. It is the part of the C function's name that does not occur in the
+    name of psdmc's function."""
     return symbol.removeprefix(function).strip("_").upper()
 
 
@@ -121,7 +121,8 @@ def is_comparable(case: Case, function: str) -> bool:
 
 
 def incomparable(case: Case, rival: str) -> list[Unavailable]:
-    """Functions of a library that are left out for this robot, with the reason."""
+    """Return the functions of a library that are left out for this robot because they compute something else, with the
+    reason."""
     if not case.has_drive_inertia:
         return []
     return [Unavailable(f"{rival}, regressor", "it has no columns for drive inertia, which this robot has")]

@@ -1,4 +1,4 @@
-"""psdmc's own C packages, called by the same loops as the other libraries."""
+"""psdmc's own C packages. The benchmark calls their functions in the loops that call the functions of other libraries."""
 
 from __future__ import annotations
 

@@ -76,8 +76,8 @@ class JointColumns:
 def joint_columns(
     description: LogDescription, joint_names: Sequence[str], tables: Mapping[str, Columns]
 ) -> tuple[JointColumns, ...]:
-    """Return the columns of every joint of the model, in its order. Raises InputError if a column is missing or
-    ambiguous."""
+    """Return the log columns of every joint, in the order of the model's joints. Raises InputError if a column is
+    missing or ambiguous."""
     said = {joint.name: joint for joint in description.part(JOINTS)}
     found = []
     for name in joint_names:
@@ -157,7 +157,7 @@ def _usual(
 def place_of(
     column: str | int, table: str | None, tables: Mapping[str, Columns], where: str
 ) -> tuple[str, int]:
-    """Return the table and the index (from 0) of a column from its name or number."""
+    """Return the table of a log and the index (from 0) of a column, from the name or number of the column."""
     if table is not None and table not in tables:
         known = f"expected one of {listed([quoted(t) for t in tables])}"
         said = known if tuple(tables) != ("",) else "but its log is one file: expected none"

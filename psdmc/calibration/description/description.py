@@ -1,6 +1,7 @@
-"""A log description (log.toml): it says what the columns of a user's logs are, and how to fit them.
+"""A log description (log.toml): the file says what the columns of a user's logs are, and how to fit them.
 
-Each top-level key of the file is a Table, with a module of its own; `tables.TABLES` lists them.
+Each top-level key of the file is described by an object of the class Table in a separate module; `tables.TABLES` lists
+these objects.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ KEYS = ("name", "logged_as", *UNITS)
 
 @dataclass(frozen=True, slots=True)
 class JointEntry:
-    """The entry of one joint of the model.
+    """The entry of a log description about one joint of the model.
 
     logged_as  name of the joint in the log, if the names of columns contain it
     """

@@ -123,7 +123,7 @@ def _words(table: TomlTable, what: str) -> dict[str, Any]:
 
 
 def column_of(table: TomlTable, key: str) -> str | int:
-    """Return the name of a column, or its number from 1."""
+    """Return the value of a key that names a column: the name of the column, or its number from 1."""
     value = table.content[key]
     if not _is_column(value):
         expected = f"a column's name, or its number from 1 to {LARGEST_COLUMN}"

@@ -30,7 +30,7 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """All logs of a campaign, by the step that uses them."""
+    """All logs of a campaign, sorted by the calibration step that uses them: motor, gravity, friction, inertial."""
 
     motor: Sequence[MotorRun]
     gravity: Sequence[GravityRun]
@@ -55,7 +55,7 @@ class FourSteps:
 
 
 def checked_runs(chain: Mechanism, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
-    """Return all logs of a campaign after checking them. Raises InputError, before the fit, if there are too few runs
+    """Return all logs of a campaign after checking them. Raises InputError if there are too few runs (recorded motions)
     or if a log cannot be used."""
     _require_runs(runs)
     logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]

@@ -90,8 +90,8 @@ def prepared_runs(
     runs: Sequence[FrictionRun],
     options: StepOptions,
 ) -> dict[str, JointRun]:
-    """Return the friction runs by joint, in the order of the robot's joints, each with its gravity torque from
-    theta_b."""
+    """Return the friction runs (recordings in which one joint moves) by joint, in the order of the robot's joints. Each
+    has its gravity torque, which is computed from the base parameters theta_b."""
     places = {name: k for k, name in enumerate(chain.joint_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
     return {

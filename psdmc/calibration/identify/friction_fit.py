@@ -72,7 +72,8 @@ class JointFriction:
 
 
 def unknowns_of(found: JointFriction) -> Array:
-    """Return the unknowns (10,) of a fit at its result: seven of the LuGre law, then inertia, offset and delay."""
+    """Return the ten unknowns of the friction fit at its result: seven of LuGre friction, then inertia, offset and
+    delay."""
     own = [found.inertia, found.offset, found.delay]
     return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 

@@ -1,4 +1,4 @@
-"""Prepares the friction run of one joint and predicts its motor torque."""
+"""Prepares the friction run of one joint, a recording in which this joint alone moves, and predicts the motor torque."""
 
 from __future__ import annotations
 

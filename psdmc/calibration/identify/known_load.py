@@ -78,7 +78,7 @@ class KnownLoad:
 
 def unreached(chain: Mechanism, q: Array, load: KnownLoad) -> dict[str, str]:
     """Return, by joint name, why the weight of a load has (nearly) no effect on the joint in all poses q (N poses, n
-    joints). An example is an axis along gravity. Joints on which the weight acts are left out."""
+    joints). An example is a joint axis along gravity. Joints on which the weight acts are left out."""
     down = chain.gravity / (np.linalg.norm(chain.gravity) or 1.0)
     weight = load.mass * float(np.linalg.norm(chain.gravity))
     still = np.zeros_like(q)

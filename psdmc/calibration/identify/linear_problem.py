@@ -1,4 +1,5 @@
-"""The rows of a linear fit: columns of base parameters, friction and springs, filtered like the measured torques."""
+"""The rows of a linear least-squares problem. The columns of base parameters, friction and springs are filtered as the
+measured torques are."""
 
 from __future__ import annotations
 

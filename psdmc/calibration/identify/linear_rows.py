@@ -1,4 +1,5 @@
-"""Rows of a linear problem in blocks, and the sums over rows that a fit needs. So no fit needs all rows in memory."""
+"""Rows of a linear least-squares problem in blocks of samples, and sums over these rows that a fit needs. So no fit
+needs all rows in memory."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Block:
 
 
 class Rows(Protocol):
-    """The blocks of a problem, in the order of its samples. They can be iterated repeatedly."""
+    """The blocks of samples of a linear least-squares problem, in the order of the samples. They can be read
+    repeatedly."""
 
     def __iter__(self) -> Iterator[Block]: ...
 

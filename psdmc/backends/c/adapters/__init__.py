@@ -1,6 +1,6 @@
 """Adapters: files through which other programs, such as CasADi, call the generated C functions.
 
-Users choose adapters with `emit-c --with`. Each adapter is one module of this folder.
+Users choose adapters with `emit-c --with`. Each adapter is written by one module of this folder.
 """
 
 from __future__ import annotations
