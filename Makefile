@@ -209,6 +209,6 @@ mutate: $(READY) ## put faults into program/ and lower/ and list those that no f
 	$(RUN)/mutmut results
 
 clean: ## remove the environment and all generated files but the reference robot
-	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) $(LEARNING) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
 	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
