@@ -74,10 +74,11 @@ def link_in(root: Path, path: str) -> bool:
 
 
 def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
-    """Return the paths of a package's files that are missing or differ from what psdmc wrote. None if the folder holds
-    no package.
+    """Return the paths of files in a package that are missing or differ from what psdmc wrote. Return None if the
+    folder holds no package.
 
-    The manifest lists all files except itself. Raises InputError if a file cannot be read.
+    The manifest.json of the package lists the digests of all files except itself. Raises InputError if a file cannot be
+    read.
     """
     root = Path(directory)
     try:

@@ -1,4 +1,4 @@
-"""The numbers and names of the inline sincos in the generated C: data for the templates in `templates/trig/`.
+"""The numbers and names in the generated C code of sine and cosine: data for the templates in `templates/trig/`.
 
     q = k pi/2 + r,  k = round(2 q / pi),  |r| <= pi/4        pi/2 in parts whose products with k are exact
     sin r = r - r^3 P(r^2)        cos r = 1 - r^2/2 + r^4 Q(r^2)
@@ -6,7 +6,7 @@
 k mod 4 decides which of the two polynomials gives the sine and which the cosine, and their signs. docs/trigonometry.md
 derives the error bounds. tests/trig/minimax.py computes the coefficients, and a test compares them with these.
 
-A generated C file includes the following templates of `templates/trig/`, each with `trig=` the result of one function:
+A generated C file includes these templates of `templates/trig/`. Each gets the result of one function as `trig`:
 
     preamble.jinja         trig_preamble(prefix, real, far)       once per C file
     #if HAS_VECTORS                                               (psdmc/target/vectors.py)
