@@ -46,12 +46,16 @@ def inertia_matrix(x: Array) -> Array:
 
 
 def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
-    """Return the (10, ...) standard parameters of a body. Moment and inertia are about the same frame."""
+    """Return the (10,) standard parameters of a body: mass, first moment, and inertia matrix as six numbers.
+
+    moment, inertia  about the origin of one frame, along the frame's axes
+    """
     return np.array([mass, *moment, *(inertia[entry] for entry in _INERTIA_ENTRIES)])
 
 
 def moved(x: Array, frame: Placement) -> Array:
-    """Convert ten standard parameters about a frame to those about the frame in which it is placed."""
+    """Convert ten standard parameters of a body from one frame to another. `frame` is the placement of the old frame in
+    the new one."""
     return _moved(x, frame.rotation, frame.translation)
 
 
@@ -76,27 +80,34 @@ def _turned(r: Array, matrix: Array) -> Array:
 
 
 def joint_frame_map(link_frame: Placement) -> Array:
-    """Return the (10, 10) matrix that converts ten standard parameters about a link frame to those about its joint
+    """Return the (10, 10) matrix that converts a link's ten standard parameters from the link frame to the joint
     frame."""
     return moving_map(link_frame.rotation, link_frame.translation)
 
 
 def moving_map(rotation: NDArray[Any], translation: NDArray[Any]) -> NDArray[Any]:
-    """Return the (10, 10) matrix that converts ten standard parameters about a frame to those about the frame in which
-    it is placed, in the arrays' precision."""
+    """Return the (10, 10) matrix that converts ten standard parameters from one frame to another.
+
+    rotation, translation  placement of the old frame in the new one; the matrix has the floating-point precision of
+                           these arrays
+    """
     return _moved(np.eye(BODY_PARAMETERS, dtype=rotation.dtype), rotation, translation)
 
 
 def bodies_of(chain: Mechanism, x: Array) -> tuple[Body, ...]:
-    """Return the bodies about the joint frames, from standard parameters about the link frames.
+    """Return the mass parameters of all n links about the joint frames, from standard parameters about the link frames.
 
-    x   (n, 11) or (11 n,)   SI, none NaN
+    x  (n, 11) or (11 n,)  standard parameters in SI units, none of them NaN
     """
     return bodies_about([joint.link_frame for joint in chain.joints], x)
 
 
 def bodies_about(link_frames: Sequence[Placement], x: Array) -> tuple[Body, ...]:
-    """Return the bodies about any joint frames, from standard parameters about link frames that are placed in these."""
+    """Return the mass parameters of all n links about other frames, from standard parameters about the link frames.
+
+    link_frames  n placements of the link frames in these other frames
+    x            (n, 11) or (11 n,)  standard parameters, SI units
+    """
     rows = np.asarray(x, dtype=np.float64).reshape(len(link_frames), PARAMETERS_PER_LINK)
     return tuple(
         body_from_parameters(times(joint_frame_map(place), row[:BODY_PARAMETERS]).tolist())

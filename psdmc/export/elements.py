@@ -42,15 +42,15 @@ def origin_element(place: Placement) -> Element:
 
 
 def dynamics_element(friction: JointFriction) -> Element:
-    """Return the element <dynamics> with the friction of a joint."""
+    """Return the element <dynamics> with the given damping and constant friction of a joint."""
     return Element("dynamics", damping=exact([friction.damping]), friction=exact([friction.constant]))
 
 
 def limit_element(limits: Limits) -> Element:
-    """Return the element <limit> of a joint.
+    """Return the element <limit> with the given limits of a joint.
 
-    URDF requires effort and velocity. If the robot has no such limit, 1e30 is written: psdmc and Pinocchio would read
-    a zero as a limit of zero.
+    URDF requires effort and velocity. If the robot has no limit of effort or velocity, 1e30 is written: psdmc and
+    Pinocchio would read a zero as a limit of zero.
     """
     given = {"effort": limits.effort, "velocity": limits.speed, "acceleration": limits.acceleration}
     given |= {"lower": limits.lower, "upper": limits.upper}

@@ -1,4 +1,5 @@
-"""Friction of a calibrated model in the form that robot files can hold: a constant against the motion, and damping."""
+"""Friction of a calibrated model in the form that robot files can hold: a constant torque against the motion, and
+viscous damping."""
 
 from __future__ import annotations
 
@@ -31,10 +32,9 @@ class JointFriction:
 
 
 def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
-    """Return the friction by joint name, for the joints that were calibrated. It is empty if the model is not
-    calibrated.
+    """Return the friction of each calibrated joint, by joint name; empty if the model is not calibrated.
 
-    Each friction law states the constant and the damping that are nearest to it, if any.
+    Each friction law gives the constant torque and the damping that are nearest to it, if it has any.
     """
     calibrated = model.calibrated
     if calibrated is None:

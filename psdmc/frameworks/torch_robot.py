@@ -122,7 +122,7 @@ class TorchRobot:
         return None if known is None else torch.tensor(known)
 
     def shape(self, quantity: Quantity) -> tuple[int, ...]:
-        """Return the shape of an input or output for one state."""
+        """Return the shape of a function's input or output for one state."""
         model, chain = self.model, self.model.mechanism
         rows = chain.rows_of_contacts
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=rows)
@@ -219,7 +219,7 @@ class _Operator:
     function: Signature
 
     def registered(self, name: str) -> Any:
-        """Register the operator with PyTorch under this name, and return it."""
+        """Register this generated function with PyTorch as an operator of the given name, and return the operator."""
         given = [f"Tensor {quantity.name}" for quantity in self.function.inputs]
         given += ["Tensor? theta_b=None"] if self.function.theta else []
         returned = ", ".join(["Tensor"] * len(self.function.outputs))
@@ -255,11 +255,11 @@ class _Operator:
         return made[0] if len(made) == 1 else tuple(made)
 
     def differentiable(self, operator: Any) -> Callable[..., Any]:
-        """Return the operator's kernel for autograd. It calls the operator without autograd, and saves what its rule
-        needs.
+        """Return the function that PyTorch calls for differentiable arguments. It calls the operator, and saves the
+        values that the differentiation rule needs.
 
-        PyTorch's custom_op has no forward mode, and torch.compile cannot trace an autograd.Function that has one. An
-        autograd.Function within the operator's own kernel has neither limit (decision 0156).
+        PyTorch's custom_op has no forward mode, and torch.compile cannot trace an autograd.Function with forward mode.
+        An autograd.Function within the operator's own kernel has neither limit (decision 0156).
         """
 
         def forward(*given: Tensor) -> Any:
@@ -277,7 +277,8 @@ class _Operator:
         return kernel
 
     def over_batches(self, operator: Any) -> Callable[..., Any]:
-        """Return the operator's rule for vmap: the batch becomes the first of the leading axes, which broadcast."""
+        """Return the function by which torch.func.vmap calls the operator: the batch axis becomes the first leading
+        axis. Leading axes broadcast."""
         quantities = (*self.function.inputs, THETA_B)
 
         def rule(info: Any, dims: Sequence[int | None], *given: Tensor) -> Any:

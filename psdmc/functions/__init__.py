@@ -39,7 +39,8 @@ DEFAULT_WHERE_WIDE = tuple(
 
 
 def recipe_of(name: str) -> Recipe:
-    """Return the recipe of a function. The name may be that of a variant, such as NAME_theta_rows."""
+    """Return the recipe (specification) of a function that psdmc can generate. The name may be that of a variant, such
+    as NAME_theta_rows, which takes one theta_b per state."""
     return RECIPES[name.removesuffix(THETA_ROWS)]
 
 

@@ -58,8 +58,9 @@ class PhysicalLinks:
     """Standard parameters of links that have the base parameters of the model.
 
     parameters  (n, 11)  standard parameters about the link frames: B @ parameters = theta_b
-    divergence  (n,)     distance of each link from the file's, tr(P0^-1 P) - log det(P0^-1 P) - 4, with the pseudo-inertias
-                         P and P0 (0: equal); NaN if the file does not give the link, or if one of the two is flat
+    divergence  (n,)  distance of each link from the link in the robot file, tr(P0^-1 P) - log det(P0^-1 P) - 4, with
+                      the pseudo-inertias P and P0 (0: equal); NaN if the file does not give the link, or if P or P0 is
+                      singular
     """
 
     parameters: Array
@@ -172,8 +173,8 @@ def _solved(cp: Any, problem: Any) -> bool:
 
 
 def moments(link: Array) -> Array:
-    """Return the matrix (4, 4) of the integrals of r r^T, r and 1 over a link's mass, from its standard parameters; kg
-    and m."""
+    """Return a link's 4 x 4 pseudo-inertia from its standard parameters: the integrals over the mass of the products of
+    x, y, z and 1, in kg and m."""
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = second_moments(inertia_matrix(link))
     matrix[:3, 3] = matrix[3, :3] = link[1:4]
