@@ -99,8 +99,9 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
 
 
 def handed_composite(frame: Frame, composite: Composite) -> Composite:
-    """Return the composite of a joint's frame along the axes of the parent's frame. If the frame represents several
-    equal limbs (such as legs), the composites of all limbs are added."""
+    """Return the composite (several bodies as one) that a joint's frame adds to its parent; the given composite is
+    about the parent's frame. If the frame represents several equal limbs (such as legs), the result is the sum over all
+    limbs."""
     (x, y, z), first = composite.momenta
     second = (handed_vector(frame, x), handed_vector(frame, y), handed_vector(frame, z))
     force, moment = (handed_vector(frame, v) for v in composite.wrench)

@@ -119,18 +119,18 @@ class Law:
 
     name     name of the law, of its file and of its key in the section [friction]
     about    one sentence for documents
-    formula  formula for people; s is the smooth sign
+    formula  formula for people; s is the smooth sign of the speed
     values   the numbers that are fitted for each joint
-    torque   function of (p, at) that returns N m (N); p are the values and `at` is an At. If the law has a number, the
-             arguments are (p, at, number). It is called with floats, arrays and symbols, and uses the functions of
-             psdmc.friction
+    torque   function of (p, at) that returns N m (N); p are the fitted values and `at` is the joint's state, an At. If
+             the law has a number, the arguments are (p, at, number). It is called with floats, arrays and symbols, and
+             uses the functions of psdmc.friction
     against  True: `torque` returns a magnitude that acts against the motion, and psdmc multiplies it by the smooth sign
     number   the number that a user gives, such as an exponent, if any
     word     whether the option --friction accepts the law, which every joint has then
     key      whether the section [friction] accepts the law
-    instead  name of a term of every joint that a joint with this law does not get, unless [friction] asks for it
-    line     function of (p, number, top speed): the constant torque and the damping nearest to the law, and in words what
-             they lack ("": nothing). None: a robot file cannot hold any part of the law
+    instead  name of a term that every joint has; a joint with this law lacks this term, unless [friction] asks for it
+    line     function of (p, number, top speed) that returns three things: the constant torque and the damping nearest
+             to the law, and in words what they leave out. None: a robot file cannot hold any part of the law
     state    how the internal state changes, if the law has one; then the law is not linear in its values
     """
 

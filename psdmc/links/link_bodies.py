@@ -1,5 +1,5 @@
-"""Pseudo-inertias (4 x 4 mass matrices) of links for fits: rows that are zero by the model's assumptions, and the
-bodies near which a fit keeps each link."""
+"""Pseudo-inertias (4 x 4 mass matrices) of links in fits: rows that are zero by assumption, and the bodies near which a
+fit keeps the links."""
 
 from __future__ import annotations
 

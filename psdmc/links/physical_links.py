@@ -173,8 +173,8 @@ def _solved(cp: Any, problem: Any) -> bool:
 
 
 def moments(link: Array) -> Array:
-    """Return a link's 4 x 4 pseudo-inertia from its standard parameters: the integrals over the mass of the products of
-    x, y, z and 1, in kg and m."""
+    """Return a link's 4 x 4 pseudo-inertia in kg and m, from its standard parameters: integrals over the mass of the
+    products of x, y, z and 1."""
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = second_moments(inertia_matrix(link))
     matrix[:3, 3] = matrix[3, :3] = link[1:4]
