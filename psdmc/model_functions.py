@@ -49,7 +49,7 @@ _ADMITTED: WeakKeyDictionary[DynamicsModel, set[str]] = WeakKeyDictionary()
 
 
 def provider() -> Provider:
-    """Return the object through which models compute generated functions."""
+    """Return the object from which models get the generated functions, computed in NumPy."""
     return Provider(lambda: SIGNATURES, function_of)
 
 
@@ -78,9 +78,12 @@ def evaluated(
     theta_b: ArrayLike | None = None,
     out: Any = None,
 ) -> Any:
-    """Compute a generated function at the given states. Return its output, or a named tuple if it has several outputs.
+    """Compute a generated function (such as forward dynamics) at the given states in NumPy. Return its output, or a
+    named tuple if it has several outputs.
 
-    out  arrays into which the results are written
+    inputs   arrays of states, with leading axes that broadcast
+    theta_b  base parameters that replace the model's; optional
+    out      arrays into which the results are written; optional
     """
     signature = recipe.signature
     axes = _axes(model, recipe)

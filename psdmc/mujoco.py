@@ -156,7 +156,8 @@ class _Layout:
         return len(self.own_speeds)
 
     def checked(self, name: str, values: ArrayLike, size: int) -> Array:
-        """Return the values as an array (..., size). Raises InputError if they have another shape."""
+        """Return the values as an array of floats, (..., size). Raises InputError if the last axis has another
+        length."""
         array = real_array(f"{self.what}: {name}", values)
         if array.shape[-1:] != (size,):
             raise InputError(
@@ -176,8 +177,8 @@ class _Layout:
         return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
-        """Rotate the linear rates of a floating base from the base's axes to the world's axes, or back if `back` is
-        true."""
+        """Rotate the linear rates of a floating base from the base's axes to the world's axes. If `back` is true,
+        rotate them from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

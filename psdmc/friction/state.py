@@ -1,5 +1,5 @@
-"""PROGRAMs (lists of operations) for the friction of one joint by a law with an internal state: the torque, the next
-state, and the number of time steps."""
+"""PROGRAMs (lists of operations) for the friction of one joint by a law with an internal state. They compute the
+torque, the next state, and the number of time steps."""
 
 from __future__ import annotations
 

@@ -47,9 +47,9 @@ def common_normal(axis: Array, following: Array, step: Array) -> Array | None:
 
 
 def normal_on_side_of(axis: Array, following: Array, step: Array, x: Array) -> Array:
-    """Return the unit vector of the common normal of a body's axis and a child's axis, with the sign for which the
-    angle to x is less than 90 degrees. Return x itself if the axes coincide. x is the body's x axis, along the normal
-    to its first child."""
+    """Return the unit vector of the common normal of a body's axis and a child's axis. Of its two directions, the one
+    nearer to x is chosen. Return x itself if the axes coincide. x is the body's x axis, along the normal to its first
+    child."""
     own = common_normal(axis, following, step)
     if own is None:
         return x

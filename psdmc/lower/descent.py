@@ -13,8 +13,8 @@ ROUNDING = 1e-6
 
 
 class Descent:
-    """The state of a search: the cheapest arrangement so far (frames, parameters and recursion of generated code), and
-    the number of candidates that may still be tried."""
+    """The state of a search: the cheapest arrangement so far, and the number of candidates that may still be tried. An
+    arrangement is a choice of frames, parameters and recursion."""
 
     arrangement: Arrangement
 

@@ -1,5 +1,5 @@
-"""New joint frames of a model, for each choice of the frames' origins on the joint axes, and the possible carriers
-(nonzero parameters) in these frames. All searches share these results."""
+"""New joint frames of a model, for each choice of their origins on the joint axes, and the possible carriers (nonzero
+parameters). All searches share these results."""
 
 from __future__ import annotations
 

@@ -70,8 +70,8 @@ def _pattern_of(frame: Frame) -> Hashable:
 
 
 class LinkFrame(NamedTuple):
-    """The link frame of a limb's body: its axes and origin in the joint's frame. Numbers that differ between the limbs
-    of a group have one value per limb."""
+    """A frame that is fixed to a limb's body: axes and origin in the joint's frame. Numbers that differ between the
+    limbs of a group have one value per limb."""
 
     rotation: NDArray[Any]
     translation: NDArray[Any]
@@ -79,8 +79,8 @@ class LinkFrame(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A joint of the core (everything outside limbs, such as a trunk), or the joints at one place in all limbs of a
-    group, such as all knees.
+    """A joint outside all limbs (a joint of the core, such as a trunk), or the corresponding joints of all limbs, such
+    as all knees.
 
     joints    number of the one joint, or the numbers limb by limb
     group     number of the group of limbs; None: a joint of the core

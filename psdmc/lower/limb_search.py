@@ -129,8 +129,8 @@ class LimbSearch:
         return min(found, key=lambda each: each.weight) if found else None
 
     def among(self, geometries: Iterable[Reframed]) -> LimbArrangement | None:
-        """Return the cheapest arrangement with limbs in SIMD lanes among these choices of joint frames, for a function
-        that does not depend on masses and inertias. Return None if there is none."""
+        """Return the cheapest arrangement with limbs in SIMD lanes and with one of these choices of joint frames.
+        Return None if there is none. The function must not depend on masses and inertias."""
         if not self.costs.has_vectors:
             return None
         starts = [self.search.uncarried(each) for each in geometries]

@@ -41,7 +41,7 @@ def for_one_state(costs: Costs) -> Scoring:
 
 
 def for_lanes(costs: Costs) -> Scoring:
-    """Return the scoring of code that computes one state per SIMD lane."""
+    """Return the rules for the cost of code that computes one state per SIMD lane (slot of a vector)."""
     return Scoring(costs, 1)
 
 

@@ -1,5 +1,5 @@
-"""Removal of rounding errors from directions, lengths, rotations and placements whose exact values are zeros, ones or
-decimals."""
+"""Removal of rounding errors from directions, lengths, rotations and placements. Numbers that are nearly zero, one or a
+short decimal become exactly so."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def clean_direction(direction: Array) -> Array:
 
 
 def clean_lengths(lengths: Array, scale: float) -> Array:
-    """Return lengths without rounding: zeros become exact and decimal lengths decimal, so that equal lengths stay
-    equal."""
+    """Return lengths without rounding errors. Lengths that are nearly zero become zero. Lengths that are nearly a short
+    decimal become this decimal, so that equal lengths stay equal."""
     return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
 
 
@@ -50,7 +50,8 @@ def exact_rotation(rotation: Array) -> Array:
 
 
 def constant_rotation(rotation: Array) -> Array:
-    """Return the constant rotation between two frames: about x, unless axes are nearly parallel."""
+    """Return the constant rotation between two frames. It is a rotation about x and is made exactly so, unless the
+    joint axes are nearly parallel."""
     turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
     return rotation if turns_x else _about_x(rotation)
 

@@ -19,7 +19,7 @@ _FRAMES = {"urdf": "URDF", "standard": "standard DH", "modified": "modified DH"}
 
 
 class Model(ModelParts, Protocol):
-    """The attributes of a model that the summary shows."""
+    """The attributes of a model that the summary (`text` and `html`) shows."""
 
     @property
     def p(self) -> int | None: ...

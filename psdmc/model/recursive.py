@@ -34,9 +34,9 @@ def mass_matrix(chain: Mechanism, x: Array, q: Array) -> Array:
 
 
 def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> Array:
-    """Compute the regressor Y (states, n, l) at q, qd, qdd (states, n).
+    """Compute the regressor Y (states, n, l), with the torques tau = Y theta_b, at q, qd, qdd (states, n).
 
-    representative  (11n, l)  base parameters to standard ones
+    representative  (11n, l)  matrix from base parameters to standard parameters
     """
     wanted = np.flatnonzero(representative.any(axis=1)).tolist()
     q, qd, qdd = (list(array.T) for array in arrays)

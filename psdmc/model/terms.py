@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Symbol(NamedTuple):
-    """A quantity of one joint: `letters`, followed by the joint's number from 1."""
+    """A quantity of one joint in an equation, such as mx2: letters, and the joint's number from 1."""
 
     letters: str
     number: int
@@ -29,13 +29,13 @@ class Power(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """One term of an equation: number * times * of / over, to be added or subtracted.
+    """One term of an equation of a base parameter: number * times * of / over, to be added or subtracted.
 
-    of         the standard parameter
-    is_minus   whether it is subtracted
-    number     decimal digits; None: one
-    times      lengths in the numerator
-    over       lengths in the denominator
+    of        the standard parameter
+    is_minus  whether the term is subtracted
+    number    decimal digits; None: one
+    times     lengths in the numerator
+    over      lengths in the denominator
     """
 
     of: Symbol
