@@ -1,7 +1,7 @@
-"""Evaluates every generated function of a model in NumPy, without compiling code: from E, P and theta_b, or by the
-NumPy reference of the function. It is slower than a compiled robot.
+"""Evaluates every generated function of a model in NumPy, without compiled code. Torques and similar functions use E, P
+and theta_b; others use the function's reference in NumPy. A compiled robot is faster.
 
-Broadcasting, results, errors and NaN are the same as for compiled robots.
+Broadcasting, results, errors and NaN are as for compiled robots.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ def provider() -> Provider:
 
 
 def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
-    """Return a function of the model by its name, with the same arguments as the method of a compiled robot."""
+    """Return the function of the model with this name. It has the arguments of the compiled robot's method with this
+    name."""
     recipe = RECIPES[name]
 
     def function(*given: Any, **named: Any) -> Any:

@@ -21,7 +21,7 @@ Root = tuple[Matrix, Vector]
 def placed_frames(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[tuple[Vector, Matrix]]:
-    """Compute the origin (m) and the rotation of each named frame in the base frame."""
+    """Compute the origin (m) and the rotation matrix of each named frame, relative to the base frame."""
     joints = _in_base(frames, q, root)
     return [
         (_point(joints[each.joint], each), multiply(joints[each.joint][0], _rotation(each))) for each in named
@@ -51,8 +51,8 @@ def frame_drifts(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Compute six values per named frame: acceleration of its origin, then angular acceleration, at constant joint
-    rates, along the base's axes."""
+    """Compute the drift of each named frame, six values: the acceleration of the origin, then the angular acceleration,
+    at constant joint rates, along the base's axes."""
     joints = _in_base(frames, q, root)
     forward = sweep_outward(frames, q, qd, None, [0.0] * first_rates(frames)[-1], ZERO)
     found = []

@@ -1,5 +1,5 @@
-"""Recursive Newton-Euler: motions outward (motion.py), then wrenches inward. Each joint's torque is the component of
-the wrench along its axis."""
+"""The recursive Newton-Euler algorithm: motions of bodies from base to tip (motion.py), then forces and moments from
+tip to base. Each joint's torque is the component of force and moment along the joint's axis."""
 
 from __future__ import annotations
 

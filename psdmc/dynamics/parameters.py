@@ -1,5 +1,5 @@
-"""Conversion of standard parameters from the robot file's link frames to the joint frames, in which the algorithms
-work."""
+"""Conversion of standard parameters (mass, first moment and inertia of links) from the link frames of the robot file to
+the joint frames. The algorithms use joint frames."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 def second_moments(inertia: Array) -> Array:
-    """Compute the integral of r r^T over the mass, (3, 3, ...), from the inertia matrix about the same point: tr(I) / 2
-    - I."""
+    """Compute the integral of r r^T over the mass of a body, (3, 3, ...), from the inertia matrix I about the same
+    origin: tr(I) / 2 - I."""
     moments: Array = _on_diagonal(0.5 * np.trace(inertia)) - inertia
     return moments
 
 
 def inertia_of(second: Array) -> Array:
-    """Compute the inertia matrix, (3, 3, ...), from the integral of r r^T over the mass: tr(S) - S."""
+    """Compute the inertia matrix, (3, 3, ...), from the integral S of r r^T over the mass of a body: tr(S) - S."""
     matrix: Array = _on_diagonal(np.trace(second)) - second
     return matrix
 
@@ -38,7 +38,7 @@ def _on_diagonal(value: Array) -> Array:
 
 
 def inertia_matrix(x: Array) -> Array:
-    """Return the inertia matrix, (3, 3, ...), kg m^2, from standard parameters of one link (10 or 11, ...)."""
+    """Return the inertia matrix, (3, 3, ...), kg m^2, from the standard parameters of one link, (10 or 11, ...)."""
     matrix = np.zeros((3, 3, *np.shape(x)[1:]), np.asarray(x).dtype)
     for (row, column), value in zip(_INERTIA_ENTRIES, x[4:BODY_PARAMETERS], strict=True):
         matrix[row, column] = matrix[column, row] = value

@@ -23,7 +23,7 @@ def rates(frames: Sequence[Frame], qd: Sequence[Scalar]) -> list[Scalar]:
 
 
 def first_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
-    """Return the index of each joint's first rate, and at the end the total number of rates."""
+    """Return, for each joint, the index of its first rate in qd; after the last joint, the number of all rates."""
     found = [0]
     for frame in leading(frames):
         found.append(found[-1] + frame.joint.nv)

@@ -82,7 +82,7 @@ def _is_zero(entry: Scalar) -> bool:
 
 
 def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """Solve L^T D L x = right for x, with the factors of a symmetric matrix."""
+    """Solve L^T D L x = right for x, with the factors L and D of a symmetric matrix M = L^T D L."""
     load = list(right)
     solution = list(right)
     for k in reversed(range(len(load))):
@@ -143,7 +143,8 @@ def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
 
 
 def inverse(factors: Factors) -> list[list[Scalar]]:
-    """Compute M^-1 = L^-1 D^-1 L^-T from M = L^T D L. One triangle is computed, and both are returned."""
+    """Compute M^-1 = L^-1 D^-1 L^-T from the factors of M = L^T D L. The lower triangle is computed, and both triangles
+    are returned."""
     n = len(factors.pivots)
     columns = _inverse_of_lower(factors.lower)
     scaled = [[entry * factors.inverses[k] for k, entry in enumerate(row)] for row in columns]

@@ -22,7 +22,8 @@ def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
 
 
 def axis_twist(joint: JointType) -> Twist:
-    """Return the twist per unit rate of a joint with one rate. Raises ValueError if the joint has more rates."""
+    """Return the joint's linear and angular velocity per unit rate, for a joint with one rate. Raises ValueError if the
+    joint has more rates."""
     (twist,) = joint.twists
     return twist
 
@@ -49,8 +50,8 @@ def own_rates(joint: JointType, rates: Scalar) -> tuple[Scalar, ...]:
 
 
 def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
-    """Return the component of a force and a moment, about the joint frame's origin, along the joint: N m, or N for a
-    sliding joint."""
+    """Return the component of a force and a moment along the joint's axis: N m, or N for a sliding joint. The moment is
+    about the joint frame's origin."""
     linear, angular = axis_twist(joint)
     return weighted((*linear, *angular), (*force, *moment))
 

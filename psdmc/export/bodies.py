@@ -1,4 +1,5 @@
-"""The robot from which both URDF and MJCF files are written: links and joints, with frames, inertias and friction."""
+"""The robot in the form from which URDF and MJCF files are written: links and joints, with frames, inertias and
+friction."""
 
 from __future__ import annotations
 

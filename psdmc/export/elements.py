@@ -1,4 +1,4 @@
-"""XML elements of a URDF that are used for models from a URDF and for models from other files."""
+"""Functions that make the XML elements of a URDF file, such as <inertial> and <limit>."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ over it."""
 
 
 def inertial_element(body: Body) -> Element | None:
-    """Return the element <inertial>, about the centre of mass along the link's axes; None if the link has no mass."""
+    """Return the element <inertial> of a link, with the inertia about the centre of mass, along the link's axes. Return
+    None if the link has no mass."""
     if body.inertial is None:
         return None
     mass, com, six = body.inertial
@@ -81,8 +82,8 @@ def fixed_link(robot: Element, frame: NamedFrame, parent: str) -> None:
 
 
 def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> None:
-    """Add a fixed joint to the robot. Its name is the child's with `_fixed` appended, and more underscores if that is
-    taken."""
+    """Add a fixed joint to the robot. The joint's name is the child link's name with `_fixed` appended. Underscores are
+    added if another joint has this name."""
     joint = SubElement(robot, "joint", name=free_joint_name(robot, f"{child}_fixed"), type="fixed")
     joint.append(origin_element(place))
     SubElement(joint, "parent", link=parent)
@@ -98,8 +99,8 @@ def free_joint_name(robot: Element, name: str) -> str:
 
 
 def put_on_world(robot: Element, what: Written) -> None:
-    """Attach the base to a new link whose z axis points against gravity, unless the z axis of the base does so
-    already."""
+    """Attach the base to a new link whose z axis points against gravity. Add no link if the z axis of the base already
+    points against gravity."""
     if what.world is None:
         return
     name, used = WORLD, {link.get("name") for link in robot.findall("link")}

@@ -1,5 +1,5 @@
-"""Lets Pinocchio and MuJoCo read a written robot, and returns the largest difference between their torques and the
-model's."""
+"""Compares the torques that Pinocchio and MuJoCo compute from a written URDF or MJCF file with those of the model. The
+result is the largest difference."""
 
 from __future__ import annotations
 

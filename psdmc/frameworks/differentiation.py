@@ -1,8 +1,8 @@
 """Rules by which JAX and PyTorch differentiate a generated function: each rule calls other generated functions.
 
-In this module a derivative by q is a derivative along the tangent at q, with nv entries. `Coordinates` converts it to
-the derivative by the nq entries of q. If q contains quaternions, the derivative is that of f(q with normalized
-quaternions).
+In this module, a derivative by q has one entry for each of the nv joint rates. It is the derivative as q moves at that
+rate ("along the tangent"). `Coordinates` converts it to the derivative by the nq entries of q. If q contains
+quaternions, the derivative is that of f(q with normalized quaternions).
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ class Rule:
 
 
 def rule_of(function: str) -> Rule | None:
-    """Return the rule by which a generated function is differentiated; None if psdmc has no rule for it."""
+    """Return the rule by which JAX and PyTorch differentiate a generated function; None if psdmc has no rule for this
+    function."""
     if f"{function}_vjp" in SIGNATURES and f"{function}_jvp" in SIGNATURES:
         return _gradient(function)
     if "A" in (output.name for output in _outputs(f"{function}_derivatives")):
@@ -72,8 +73,8 @@ def rule_of(function: str) -> Rule | None:
 
 
 def require_rule(function: str) -> Rule:
-    """Return the rule by which a generated function is differentiated. Raises ArgumentError if psdmc has no rule for
-    it."""
+    """Return the rule by which JAX and PyTorch differentiate a generated function. Raises ArgumentError if psdmc has no
+    rule for this function."""
     rule = rule_of(function)
     if rule is None:
         known = ", ".join(name for name in SIGNATURES if rule_of(name))
@@ -320,8 +321,8 @@ class Coordinates:
         return all(joint.about_z for joint in self.joints)
 
     def normalized(self, q: Array) -> Array:
-        """Return q with quaternions, and pairs of cosine and sine, of length one. The result is NaN if such a length
-        is zero."""
+        """Return q with normalized quaternions, and with normalized pairs of cosine and sine. The result is NaN if a
+        quaternion or pair is zero."""
         return self._made([joint.restored(here) for joint, here in self._parts(q)], q)
 
     def tangent(self, q: Array, moved: Array) -> Array:

@@ -55,7 +55,7 @@ def jax_robot(
     trig: Trig | None,
     target: str | Target,
 ) -> JaxRobot:
-    """Return the robot of `psdmc.jax`. Equal requests get the same object."""
+    """Return the robot of a model for JAX. Equal arguments give the same object; `psdmc.jax` explains them."""
     found = model_of(model)
     compiled = compile(found, lowering, real=real, trig=trig, target=target)
     if compiled.dtype == np.float64 and not jax.config.jax_enable_x64:
@@ -74,12 +74,13 @@ def jax_robot(
 class JaxRobot:
     """A robot whose methods, one for each generated function, are functions of JAX. `psdmc.jax` makes such robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy. If
-    the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several results
-    returns a named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy.
+    If the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several
+    results returns a named tuple.
 
-    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
-    its nq entries, and zero along the quaternion.
+    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
+    derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
+    zero.
     """
 
     def __init__(

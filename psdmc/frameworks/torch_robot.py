@@ -74,14 +74,16 @@ def torch_robot(
 
 
 class TorchRobot:
-    """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such robots.
+    """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such
+    robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64, or
-    all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite,
-    the results of this state are NaN. A method with several results returns a named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64,
+    or all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
+    definite, the results of this state are NaN. A method with several results returns a named tuple.
 
-    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
-    its nq entries, and zero along the quaternion. Second derivatives are not available.
+    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
+    derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
+    zero. Second derivatives are not available.
     """
 
     def __init__(self, model: DynamicsModel, options: tuple[Any, ...], key: str) -> None:
@@ -106,7 +108,8 @@ class TorchRobot:
         return f"TorchRobot {self.model.mechanism.name!r}: {self.model.n} joints"
 
     def compiled(self, dtype: Any = torch.float64) -> CompiledRobot[Any]:
-        """Return the CompiledRobot, for NumPy arrays, whose C code the methods call for tensors of this dtype."""
+        """Return the CompiledRobot (functions in C for NumPy arrays) that the methods call for tensors of the given
+        floating-point type."""
         if dtype not in self._compiled:
             lowering, trig, target = self._options
             self._compiled[dtype] = compiled(
@@ -129,7 +132,8 @@ class TorchRobot:
         return sizes.shape(quantity.axes)
 
     def operator(self, function: str) -> Any:
-        """Return PyTorch's operator for a generated function, whose arguments are tensors, and theta_b or None."""
+        """Return PyTorch's operator that calls a generated function. The operator's arguments are tensors, and theta_b
+        or None."""
         return self._operators[function]
 
     def _on_coordinates(self, function: Signature, tensors: Sequence[Tensor]) -> Tensor:
@@ -233,8 +237,8 @@ class _Operator:
         return operator
 
     def compute(self, *given: Tensor) -> Any:
-        """Call the C function with the memory of the tensors. A tensor is copied only if its states are not contiguous
-        rows."""
+        """Compute the results by a call of the C function on the memory of the tensors. A tensor is copied only if its
+        entries are not contiguous for each state."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         pairs = zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
@@ -249,7 +253,8 @@ class _Operator:
         return made[0] if len(made) == 1 else tuple(made)
 
     def without_values(self, *given: Tensor) -> Any:
-        """Return tensors with the shapes of the results but without values. torch.compile calls this function."""
+        """Return tensors with the shapes of the results but without values. torch.compile needs these shapes when it
+        traces a program."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         return made[0] if len(made) == 1 else tuple(made)
@@ -367,9 +372,9 @@ class _Operator:
         return saved[:count], saved[count] if self.function.theta else None, saved[end:]
 
     def checked(self, given: Sequence[Tensor]) -> tuple[list[Tensor], Tensor, tuple[int, ...]]:
-        """Return the inputs, theta_b or None, and the leading axes to which they broadcast.
+        """Return the tensors of the inputs, theta_b or None, and the leading axes to which they broadcast.
 
-        Raises TypeError for another dtype, ArgumentError for another shape.
+        Raises TypeError if a tensor has another dtype, ArgumentError if a tensor has another shape.
         """
         count, name = len(self.function.inputs), self.function.name
         pairs = [

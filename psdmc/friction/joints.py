@@ -39,7 +39,7 @@ class Friction:
 
     @property
     def by_position(self) -> bool:
-        """Whether the friction torque depends on the joints' positions."""
+        """Return whether the friction torque depends on the joints' positions."""
         return any("q" in term.reads for term in self.terms)
 
     def by_speed(self, qd: Array) -> Array:
@@ -49,8 +49,8 @@ class Friction:
         return self._torque(here, np.asarray(qd), 0.0)
 
     def torque(self, qd: ArrayLike, q: ArrayLike = 0.0) -> Array:
-        """Return the friction torque (..., n), N m (N), at speeds and positions (..., n). It adds to the torque of the
-        rigid bodies."""
+        """Return the friction torque (..., n), N m (N), at speeds and positions (..., n). The motor torque is the sum
+        of this torque and the torque of the rigid bodies."""
         return self._torque(self._rows(list(self.values.T)), np.asarray(qd, dtype=np.float64), np.asarray(q))
 
     def program(self) -> Program:
@@ -77,7 +77,8 @@ class Friction:
 
 
 def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return the terms in the order that psdmc uses: terms that act against the motion first, constant torques last."""
+    """Return friction terms in the order that psdmc uses: terms that act against the motion first, constant torques
+    last."""
     return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
 
 

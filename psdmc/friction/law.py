@@ -26,9 +26,9 @@ class At:
     """The state of one joint at an instant, from which a friction law computes its torque.
 
     q, v  position and speed: rad, rad/s (m, m/s)
-    sign  tanh(v / sign speed): the direction of motion, smooth at rest
+    sign  tanh(v / sign speed): the direction of motion, a smooth function of v
     load  N m (N), the torque that the rigid bodies need at the joint
-    z     the internal state of a law that has one
+    z     the internal state, if the law has one
     """
 
     q: Scalar = 0.0
@@ -149,11 +149,12 @@ class Law:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the values of a law that has no number."""
+        """Return the names of the fitted values of a friction law that takes no number, such as an exponent, from the
+        user."""
         return tuple(str(value.name) for value in self.values)
 
     def require(self, p: Array) -> Array:
-        """Return the values unchanged. Raises InputError if a value is outside its bounds."""
+        """Return the values of a friction law unchanged. Raises InputError if a value is outside its bounds."""
         own = dict(zip(self.parameters, p.tolist(), strict=True))
         for value, x in zip(self.values, p.tolist(), strict=True):
             low = max(own[value.above], 0.0) if value.above else min(value.low, 0.0)
@@ -228,7 +229,7 @@ class Term:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the values of this term, such as 'viscous^0.5'."""
+        """Return the names of the fitted values of this friction term, such as 'viscous^0.5'."""
         return tuple(self._text(value.name) for value in self.law.values)
 
     @property
@@ -236,7 +237,8 @@ class Term:
         return self._text(self.law.formula)
 
     def units(self, effort: str = "N m") -> tuple[str, ...]:
-        """Return the units of the values, for a joint whose torque or force has the unit `effort`."""
+        """Return the units of the fitted values of this friction term, for a joint whose torque or force has the unit
+        `effort`."""
         return tuple(unit_of(effort, self._text(value.unit)) for value in self.law.values)
 
     @property
@@ -253,7 +255,7 @@ class Term:
         return self.law.torque(p, at) if self.number is None else self.law.torque(p, at, self.number)
 
     def torque(self, p: Sequence[Scalar], at: At | _Watched) -> Scalar:
-        """Return the torque of this term for one joint, N m (N)."""
+        """Return the torque of this friction term for one joint, N m (N)."""
         size = self.size(p, at)
         return at.sign * size if self.law.against else size
 

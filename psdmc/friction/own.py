@@ -1,7 +1,7 @@
-"""Friction laws that users define in Python files, and how model files store them.
+"""Friction laws that users define in Python files, and how model files store these laws.
 
 A model file holds no Python code. It stores the torque of a law as the text of a PROGRAM (a list of operations). psdmc
-runs Python code only from the file that a log description or a simulated robot names.
+runs Python code only from a file to which the user's log description or simulated robot refers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Finds friction terms by their names in files and options, such as 'viscous^0.5'."""
+"""Functions that find the friction term for a name in files and options, such as 'viscous^0.5'."""
 
 from __future__ import annotations
 

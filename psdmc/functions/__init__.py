@@ -1,4 +1,5 @@
-"""The functions that psdmc can generate. Each file of this folder describes one function by its RECIPE."""
+"""The functions that psdmc can generate. Each file of this folder describes one function by an object RECIPE: inputs,
+outputs and the computation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by articulated bodies."""
+"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by the articulated-body algorithm."""
 
 from __future__ import annotations
 

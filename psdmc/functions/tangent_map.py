@@ -1,5 +1,5 @@
-"""The matrix that maps changes of the entries of q to displacements. It converts derivatives along the tangent to
-derivatives by the entries of q."""
+"""The matrix that maps changes of the entries of q to changes along the joint rates (the tangent). It converts
+derivatives along the tangent to derivatives by the entries of q."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """Finds link masses and inertias that have given base parameters exactly and are nearest to those of the robot file.
-They are for programs that read links and not base parameters."""
+Programs that read links, and not base parameters, need these masses and inertias."""
 
 from __future__ import annotations
 
@@ -68,11 +68,12 @@ class PhysicalLinks:
 
 
 def physical_links(model: DynamicsModel) -> PhysicalLinks:
-    """Return the links that have the model's theta_b and are nearest to those of its robot file.
+    """Return the standard parameters of links that have the model's theta_b and are nearest to those of the robot file.
 
-    The distance is the sum of the divergences between distributions of mass (Lee, Wensing, Park 2020), as in the
-    physically consistent fit. All pseudo-inertias of the result are positive definite, and no drive inertia is
-    negative. If the links of the file fulfil this and have theta_b, they are returned unchanged.
+    The distance is the sum of the divergences (differences between two distributions of mass) of all links (Lee,
+    Wensing, Park 2020). The physically consistent fit uses this distance, too. All pseudo-inertias of the result are
+    positive definite, and no drive inertia is negative. If the links of the file fulfil this and have theta_b, they are
+    returned unchanged.
 
     Raises InputError if theta_b is unknown, NoSuchLinks if no such links exist.
     """

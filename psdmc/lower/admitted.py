@@ -38,7 +38,8 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of all default functions that are possible for the model, and a sentence for each restriction."""
+    """Return the names of all default functions that psdmc can generate for the model, and one sentence for each
+    function left out or restricted."""
     default = default_of(model.mechanism)
     lacking = _lacking(model, default)
     names = tuple(name for name in default if name not in lacking)

@@ -24,8 +24,8 @@ def nearly_parallel(a: Array, b: Array) -> bool:
 
 
 def foot_towards(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
-    """Return the point of the line (point, axis) that is nearest to the other line; None if the lines are nearly
-    parallel."""
+    """Return the point of a line that is nearest to another line; None if the lines are nearly parallel. A line is
+    given by a point and a unit vector."""
     if nearly_parallel(axis, other_axis):
         return None
     normal = cross(axis, other_axis)

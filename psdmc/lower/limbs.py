@@ -81,7 +81,7 @@ class _Group:
 
 
 def has_columns(recipe: Recipe) -> bool:
-    """Whether the function's output is a matrix with a column for each base parameter."""
+    """Return whether an output of the recipe's function has one column for each base parameter."""
     return any("l" in quantity.axes for quantity in recipe.signature.outputs)
 
 

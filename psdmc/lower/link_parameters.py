@@ -1,4 +1,5 @@
-"""A link's parameters in pseudo-inertia form: names, units, costs, and conversions from and to standard parameters."""
+"""A link's parameters in pseudo-inertia form: names, units, costs, and conversions from and to standard parameters.
+This form has the integrals of xx, yy and zz over the mass in place of moments of inertia."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class Search:
 
     @property
     def has_many_joints(self) -> bool:
-        """Whether the robot has so many joints that the search tries fewer candidates."""
+        """Return whether the robot has so many joints that the search tries fewer candidates."""
         return len(self.robot.chain) > MANY_JOINTS
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:

@@ -22,12 +22,12 @@ centimetres would lose digits."""
 
 
 def without_rounding(place: Placement, reach: float) -> Placement:
-    """Return a placement without the rounding of exact zeros and ones."""
+    """Return a placement in which numbers that differ from zero or one only by rounding are exactly zero or one."""
     return Placement(exact_rotation(place.rotation), clean_lengths(place.translation, reach) + 0.0)
 
 
 def clean_direction(direction: Array) -> Array:
-    """Return the unit vector along a direction, with its smallest entries made zero."""
+    """Return the unit vector along a direction. Entries that are only rounding become zero."""
     cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
     return np.asarray(cleaned / length(cleaned))
 
@@ -44,7 +44,8 @@ def _decimal(lengths: Array, scale: float) -> Array:
 
 
 def exact_rotation(rotation: Array) -> Array:
-    """Return a rotation without the rounding of exact zeros and ones."""
+    """Return a rotation matrix in which entries that differ from zero or one only by rounding are exactly zero or
+    one."""
     near = np.round(rotation)
     return np.asarray(np.where(np.abs(rotation - near) < EXACT, near, rotation) + 0.0)
 

@@ -1,4 +1,4 @@
-"""The result of a calibration, in the form in which model files contain it and other parts of psdmc read it."""
+"""The result of a calibration, as model files contain it and as other parts of psdmc read it."""
 
 from __future__ import annotations
 
@@ -287,7 +287,8 @@ class Verdict:
 
     @property
     def exit_status(self) -> int:
-        """The command line's exit status for this verdict: 0 if the calibration is usable, with or without doubts."""
+        """Return the exit status of a psdmc command with this verdict: 0 if the calibration is usable, with or without
+        doubts."""
         return 0 if self.usable else NOT_USABLE_STATUS
 
     @property
@@ -298,15 +299,17 @@ class Verdict:
         return tuple((kind, text) for kind, texts in kinds for text in texts)
 
     def lines(self) -> list[str]:
-        """The verdict as lines of text: first the word, then its reasons."""
+        """Return the verdict as lines of text: first "usable", "usable, with doubts" or "not usable", then the
+        reasons."""
         return [f"verdict: {self.word}", *(f"  {kind}: {text}" for kind, text in self.grounds)]
 
 
 @dataclass(frozen=True, slots=True)
 class LogUsed:
-    """A log of a calibration: name, rows, length in seconds, date, and how it was used.
+    """A log that a calibration used: its name, number of rows, length in seconds, date, and how the calibration used
+    it.
 
-    use  "fit", "validate": held out as a whole, or "with_load": recorded with the known load
+    use  "fit"; "validate" if the whole log was held out; "with_load" if it was recorded with the known load
     """
 
     log: str
@@ -318,7 +321,13 @@ class LogUsed:
 
 @dataclass(frozen=True, slots=True)
 class LoadUsed:
-    """The known load with which a log was recorded: kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass."""
+    """The known load with which a log was recorded.
+
+    mass     kg
+    com      (3,) m, centre of mass in the frame
+    inertia  (6,) kg m^2, about the centre of mass
+    frame    name of the frame that carries the load
+    """
 
     mass: float
     com: tuple[float, ...]
@@ -381,7 +390,8 @@ class Calibrated:
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations of the base parameters; infinite if the data do not determine one by itself."""
+        """Return the standard deviations of the base parameters, (l,); infinite for a parameter that the data do not
+        determine alone."""
         return np.array([row.std for row in self.parameters])
 
     @property
@@ -392,7 +402,7 @@ class Calibrated:
         return tuple(text for text in self.warnings if SAME.get(code_of(text)) not in said)
 
     def kept(self) -> Calibrated:
-        """The part of the result that a model file contains: everything except samples."""
+        """Return the part of the result that a model file contains: everything except samples for plots."""
         values = {each.name: getattr(self, each.name) for each in fields(Calibrated)}
         steps = tuple(StepQuality(step.step, step.joints) for step in self.steps)
         return Calibrated(**values | {"steps": steps})

@@ -1,6 +1,6 @@
 """Conversion of a Mechanism (the robot as read from its file) to plain JSON values and back. Every number stays exact.
 
-JSON has no NaN and no infinity: an unknown parameter and an absent limit are null.
+JSON has no NaN and no infinity. Unknown parameters and missing joint limits therefore become null.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def _frame_from_json(data: object, joints: int) -> NamedFrame:
 
 
 def chain_from_json(data: object) -> Mechanism:
-    """Return the robot from plain values. Raises ValueError that names a wrong value."""
+    """Return the robot (a Mechanism) from plain JSON values. Raises ValueError with the name of the wrong value."""
     listed = entries(part(data, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
     if not listed:
         raise ValueError("the chain has no joints")

@@ -119,7 +119,7 @@ def torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[A
 
 
 def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Array:
-    """Compute the regressor Y (states, n, l), with tau = Y theta_b, at q, qd, qdd (states, n)."""
+    """Compute the regressor Y (states, n, l), with the torques tau = Y theta_b, at q, qd, qdd (states, n)."""
     transposed = [matrix.T.tocsr() for matrix in expansion.P]
 
     def rows(y: Array) -> Array:

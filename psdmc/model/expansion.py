@@ -95,7 +95,8 @@ class Expansion:
 
     @staticmethod
     def of(E: NDArray[Any], P: Sequence[sparse.csr_array]) -> Expansion:
-        """Make an Expansion from E and n matrices P (p, l). Raises ValueError if their shapes differ."""
+        """Return an Expansion from the matrix E and n matrices P (p, l). Raises ValueError if their shapes do not
+        fit."""
         from scipy import sparse
 
         shapes = {matrix.shape for matrix in P}
@@ -122,7 +123,7 @@ class Expansion:
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...]:
-        """The n sparse matrices P (p, l), one per joint. They are made on first access, because SciPy is slow to
+        """Return the n sparse matrices P (p, l), one per joint. They are made on first access, because SciPy is slow to
         import."""
         if not self._matrices:
             self._matrices.extend(self._made())

@@ -124,7 +124,7 @@ def cycles(order: Sequence[int]) -> list[list[int]]:
 
 
 def exchanges(order: Sequence[int]) -> int:
-    """Return the number of pair exchanges that a permutation consists of."""
+    """Return the smallest number of exchanges of two elements that make up a permutation."""
     return sum(len(cycle) - 1 for cycle in cycles(order))
 
 

@@ -1,4 +1,5 @@
-"""The friction of a calibrated model, if its calibration used plain logs and linear friction."""
+"""The friction of a calibrated model, as a sum of terms. The calibration must have used such friction and plain logs,
+not a measurement campaign."""
 
 from __future__ import annotations
 

@@ -69,8 +69,8 @@ class MassCheck:
 
 
 def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
-    """Test the mass matrix M(q) in POSES random poses within the joint limits. The poses are the same in each call.
-    None if the base parameters are unknown."""
+    """Return the result of a test of the mass matrix M(q) in POSES random poses within the joint limits. The poses are
+    equal in each call. The result is None if the base parameters are unknown."""
     if model.theta_b is None:
         return None
     poses, mass, rounding = _drawn(model)

@@ -1,4 +1,4 @@
-"""Random physical parameters for a robot whose real parameters are unknown."""
+"""Random masses and inertias, which could exist physically, for a robot whose real parameters are unknown."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def summary(model: DynamicsModel) -> Summary:
 
 
 def sizes_of(E: NDArray[np.uint8]) -> Sizes:
-    """Count the monomials of E (5n, p) by kind: gravity, acceleration, centrifugal and Coriolis."""
+    """Return the number of monomials in E (5n, p) by kind: gravity, acceleration, centrifugal and Coriolis."""
     rows = RowBlocks.of(E.shape[0] // BLOCKS)
     speeds, accelerations = E[rows.qd], E[rows.qdd]
     accelerating, moving = accelerations.any(axis=0), speeds.any(axis=0)

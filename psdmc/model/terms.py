@@ -1,4 +1,5 @@
-"""Terms of base parameters' equations as data, such as `2 d4 my4` or `mx1/a1`. Text and LaTeX are made from them."""
+"""Terms of the base parameters' equations as objects, such as `2 d4 my4` or `mx1/a1`, from which text and LaTeX are
+made."""
 
 from __future__ import annotations
 
@@ -54,6 +55,6 @@ class Term:
 
 
 def equation(terms: Sequence[Term]) -> str:
-    """Return the terms as one line of text, without a plus before the first one."""
+    """Return the sum of the terms as one line of text, without a plus before the first term."""
     first, *others = terms
     return str(first) + "".join(f" {'-' if term.is_minus else '+'} {term}" for term in others)

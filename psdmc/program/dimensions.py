@@ -58,7 +58,8 @@ _WORDS = {
 
 @cache
 def dimension_of(unit: str) -> Dimension:
-    """Return the dimension of a unit such as 'kg m^2/s' or '1/(J s^2)'. Everything after the slash divides."""
+    """Return the dimension of a unit such as 'kg m^2/s' or '1/(J s^2)'. All units after the slash are in the
+    denominator."""
     total = NUMBER
     for sign, part in zip((1, -1), unit.split("/"), strict=False):
         for factor in part.strip("() ").split():

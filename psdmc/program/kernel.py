@@ -64,7 +64,7 @@ class Kernel:
 
     @property
     def name(self) -> str:
-        """The function's name, with '_theta' if parameters are given at run time."""
+        """Return the function's name, with '_theta' appended if base parameters are an argument at run time."""
         return self.function.name + ("_theta" if self.theta else "")
 
     @property

@@ -23,7 +23,7 @@ def bent(p: Sequence[Scalar], v: Scalar) -> Scalar:
 
 
 def rate(p: Sequence[Scalar], v: Scalar, z: Scalar) -> Scalar:
-    """Return dz/dt, the rate at which the deflection of the bristles changes. Source: Denso-2022, (12)."""
+    """Return dz/dt, the rate of change of the deflection z of the bristles. Source: Denso-2022, (12)."""
     return v - absolute(v) * z / bent(p, v)
 
 
@@ -59,8 +59,8 @@ def pieces(p: Sequence[Scalar], v0: Scalar, v1: Scalar) -> Scalar:
 
 
 def torque(p: Sequence[Scalar], at: At) -> Scalar:
-    """Return the friction torque, N m (N), from the speed and the deflection of the bristles. Source: Denso-2022,
-    (14)."""
+    """Return the friction torque, N m (N), from the fitted values p, the speed and the deflection of the bristles.
+    Source: Denso-2022, (14)."""
     viscous = p[3] * power(absolute(at.v), p[4])
     return p[5] * at.z + p[6] * rate(p, at.v, at.z) + select(at.v, 0.0, -viscous, viscous)
 
