@@ -43,8 +43,8 @@ from psdmc.dynamics.twist import combined
 
 
 class LinkMotion(NamedTuple):
-    """The motion of one body: acceleration of the frame's origin, and angular rates, along the axes of the body's
-    frame."""
+    """The motion of one body: the acceleration of the frame's origin, and the matrix U of the angular rates. A point at
+    r accelerates with a + U r, along the frame's axes."""
 
     acceleration: Vector
     spin: Spin
@@ -63,7 +63,8 @@ class Forward(NamedTuple):
 
     `motions` and `rates` are along the axes of the body's frame, after the joint's rotation. For folded bodies (an
     option in choices.py), `motions` are along the axes before the rotation, and `rates` are those of the parent.
-    `joins` is true if the body's joint is parallel to the parent's joint, so that both rotate by the sum of the angles.
+    `joins` is true if the body's joint is parallel to the parent's joint, and both rotations are computed as one, by
+    the sum of the angles.
     """
 
     states: tuple[JointState, ...]

@@ -51,8 +51,8 @@ def frame_drifts(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Compute the drift of each named frame, six values: the acceleration of the origin, then the angular acceleration,
-    at constant joint rates, along the base's axes."""
+    """Compute the drift of each named frame, that is, the accelerations of the frame at constant joint rates. Each
+    drift has six values along the base's axes: acceleration of the origin, then angular acceleration."""
     joints = _in_base(frames, q, root)
     forward = sweep_outward(frames, q, qd, None, [0.0] * first_rates(frames)[-1], ZERO)
     found = []

@@ -35,10 +35,11 @@ TERMS = 12
 
 
 class StepSlopes(NamedTuple):
-    """Derivatives of a joint's position at the end of a step, along the tangent, as two nv x nv matrices.
+    """Derivatives of a joint's position at the end of a step, as two nv x nv matrices. Rows and columns belong to small
+    displacements along the joint's nv rates.
 
-    by_start  by the position at the start
-    by_way    by the joint's rates times the duration
+    by_start  by the position at the start of the step
+    by_way    by the joint's rates times the duration of the step
     """
 
     by_start: Rows

@@ -20,8 +20,8 @@ ORDINARY_SPEED = 1.0
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
-    """Friction of one joint as two numbers, neither negative. `constant` is a torque against the motion, N m (N), and
-    `damping` is N m s/rad (N s/m).
+    """Friction of one joint as two numbers, neither negative. `constant` is a torque against the motion, N m (N for a
+    sliding joint), and `damping` is N m s/rad (N s/m for a sliding joint).
 
     lost  in words, which parts of the calibrated friction the two numbers cannot express
     """

@@ -326,12 +326,13 @@ class Coordinates:
         return self._made([joint.restored(here) for joint, here in self._parts(q)], q)
 
     def tangent(self, q: Array, moved: Array) -> Array:
-        """Return the change along the tangent, (..., nv), for a change `moved` (..., nq) of the entries of q."""
+        """Return the joint displacements (..., nv), one per joint rate, for a small change `moved` (..., nq) of the
+        entries of q."""
         return self._made([joint.tangent(here, own) for joint, here, own in self._pairs(q, moved)], q)
 
     def gradient(self, q: Array, by_tangent: Array) -> Array:
-        """Return the gradient (..., nq) by the entries of q, from the gradient `by_tangent` (..., nv) along the
-        tangent."""
+        """Return the gradient (..., nq) by the entries of q, from the gradient `by_tangent` (..., nv) by joint
+        displacements, one per joint rate."""
         found = []
         for joint, here, own in self._pairs(q, by_tangent, rates=True):
             for k in range(joint.nq):
@@ -347,7 +348,8 @@ class Coordinates:
         )
 
     def pulled_back(self, q: Array, gradient: Array) -> Array:
-        """Return the gradient (..., nv) along the tangent, from the gradient (..., nq) by the entries of q."""
+        """Return the gradient (..., nv) by joint displacements, one per joint rate, from the gradient (..., nq) by the
+        entries of q."""
         found = []
         for joint, here, own in self._pairs(q, gradient):
             for k in range(joint.nv):

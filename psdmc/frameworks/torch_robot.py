@@ -264,7 +264,8 @@ class _Operator:
         values that the differentiation rule needs.
 
         PyTorch's custom_op has no forward mode, and torch.compile cannot trace an autograd.Function with forward mode.
-        An autograd.Function within the operator's own kernel has neither limit (decision 0156).
+        An autograd.Function within the operator's kernel (the function that PyTorch runs) has neither limit (decision
+        0156).
         """
 
         def forward(*given: Tensor) -> Any:

@@ -43,14 +43,14 @@ class Friction:
         return any("q" in term.reads for term in self.terms)
 
     def by_speed(self, qd: Array) -> Array:
-        """Return the friction torque (..., n) at speeds qd (..., n), N m (N), from the terms that do not depend on
-        positions."""
+        """Return the friction torque (..., n) at speeds qd (..., n), N m (N for a sliding joint), from the terms that
+        do not depend on positions."""
         here = [(term, own) for term, own in self._rows(list(self.values.T)) if "q" not in term.reads]
         return self._torque(here, np.asarray(qd), 0.0)
 
     def torque(self, qd: ArrayLike, q: ArrayLike = 0.0) -> Array:
-        """Return the friction torque (..., n), N m (N), at speeds and positions (..., n). The motor torque is the sum
-        of this torque and the torque of the rigid bodies."""
+        """Return the friction torque (..., n), N m (N for a sliding joint), at speeds and positions (..., n). The motor
+        torque is the sum of this torque and the torque of the rigid bodies."""
         return self._torque(self._rows(list(self.values.T)), np.asarray(qd, dtype=np.float64), np.asarray(q))
 
     def program(self) -> Program:

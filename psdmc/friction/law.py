@@ -27,7 +27,7 @@ class At:
 
     q, v  position and speed: rad, rad/s (m, m/s)
     sign  tanh(v / sign speed): the direction of motion, a smooth function of v
-    load  N m (N), the torque that the rigid bodies need at the joint
+    load  N m (N for a sliding joint), the torque that the rigid bodies need at the joint
     z     the internal state, if the law has one
     """
 
@@ -255,7 +255,7 @@ class Term:
         return self.law.torque(p, at) if self.number is None else self.law.torque(p, at, self.number)
 
     def torque(self, p: Sequence[Scalar], at: At | _Watched) -> Scalar:
-        """Return the torque of this friction term for one joint, N m (N)."""
+        """Return the torque of this friction term for one joint, N m (N for a sliding joint)."""
         size = self.size(p, at)
         return at.sign * size if self.law.against else size
 

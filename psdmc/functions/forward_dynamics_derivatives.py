@@ -30,7 +30,8 @@ def trace(g: Ingredients) -> Outputs:
 
     M and d tau_id / d qd do not depend on the acceleration. The torques of Coriolis forces and gravity are h = (d
     tau_id / d qd) qd / 2 + g, because h - g is quadratic in qd. The derivatives of tau_id by q and qd are multiplied by
-    M^-1 after the traced operations. The derivative by qd comes first, because its entries are known first.
+    M^-1 after these operations, by matrix products. The derivative by qd comes first, because its entries are known
+    first.
     """
     if any_limbs(g.frames):
         return _in_limbs(g)

@@ -70,8 +70,8 @@ def regions(frames: Sequence[Frame]) -> Regions:
     derivatives.
 
     The state is the start plus dt / 6 times the weighted sum of four slopes, with the weights 1, 2, 2, 1. The
-    derivatives are summed likewise. Each stage has slopes of q's entries and of qd. Between stages, derivatives are
-    along the tangent of q. The arrays are:
+    derivatives are summed with the weights of the slopes. Each stage has slopes of q's entries and of qd. Between
+    stages, derivatives are along the tangent of q. The arrays are:
 
     here, there    q and qd of a stage
     by_q, by_v     nv x 3 nv, derivatives of q (along its tangent) and of qd, by q, qd and tau

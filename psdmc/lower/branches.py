@@ -1,9 +1,9 @@
 """An estimate of the operations that a change of carriers saves, from the changed branches of a robot's tree alone.
 Carriers are the link parameters that are not set to zero in generated code.
 
-In a tree, the cost of a function is nearly a sum over branches. For large robots, the search first traces only the
-branches that a change affects and the bodies that carry them, before and after the change. It traces the whole robot
-only if these branches become cheaper. For talos, 9 to 11 of 33 joints are traced.
+In a tree, the cost of a function is nearly a sum over branches. For large robots, the search first traces (records on
+symbols) only the branches that a change affects and the bodies that carry them, before and after the change. It traces
+the whole robot only if these branches become cheaper. For talos, 9 to 11 of 33 joints are traced.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ class Branches:
         return found if len(found) <= WORTH * len(frames) else None
 
     def part(self, whole: Arrangement, kept: tuple[int, ...]) -> tuple[Arrangement, RobotConstants]:
-        """Return an arrangement for a robot that has only the joints `kept`, and the constants of this robot."""
+        """Return an arrangement (frames, nonzero parameters, recursion options) for a robot that has only the joints
+        `kept`, and the constants of this robot."""
         number = {joint: i for i, joint in enumerate(kept)}
         links = [divmod(carrier, PARAMETERS_PER_LINK) for carrier in whole.carriers]
         rows = [row for row, (joint, _) in enumerate(links) if joint in number]

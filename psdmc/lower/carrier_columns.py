@@ -78,8 +78,7 @@ def every_parameter(reframed: Reframed, representative: Array) -> tuple[tuple[in
     """Return the indices of all link parameters that theta_b contains, and the (count, l) matrix from theta_b to their
     values.
 
-    There are more of these parameters than carriers. No parameter represents another one, so small values keep their
-    digits.
+    If code uses all of these parameters, no parameter represents another one, and small values keep their digits.
     """
     lift = _lifted(reframed, representative).astype(np.float64)
     reached = np.flatnonzero(lift.any(axis=1))

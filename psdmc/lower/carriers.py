@@ -94,8 +94,9 @@ class CarrierSpace:
         return int(self.columns.shape[1])
 
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
-        """Return the carriers with the least sum of weights, as indices in ascending order. Of equal weights the
-        earlier parameter is chosen. If rounding makes this basis incomplete, return the basis of the tableau."""
+        """Return the carriers (parameters that represent all others) with the least sum of weights, as indices in
+        ascending order. Of equal weights the earlier parameter is chosen. If rounding makes this basis incomplete,
+        return the basis of the tableau."""
         key = tuple(weights)
         if key not in self._lightest:
             self._lightest[key] = self._chosen(key)
@@ -108,8 +109,9 @@ class CarrierSpace:
         return chosen if len(chosen) == len(self.tableau.basis) else self.tableau.basis
 
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
-        """Return pairs (out, in): the carrier `out` can be replaced by the parameter `in`, so that the carriers remain
-        a basis. Pairs that would make the carriers' values too large are left out."""
+        """Return pairs (out, in): the parameter `in` can take the place of the carrier `out`. The carriers (parameters
+        that represent all others) then remain a basis. Pairs that would make the carriers' values too large are left
+        out."""
         others = [j for j in range(self.count) if j not in carriers and self.lengths[j]]
         share = np.abs(self._coordinates(carriers, others)) * self.lengths[list(carriers), None]
         fair = np.argwhere((share > FAIR_SHARE * self.lengths[others]).T)

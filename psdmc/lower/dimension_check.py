@@ -52,8 +52,8 @@ def check_dimensions(
     """Raise InputError if the function adds, compares or chooses between unlike quantities. Raise InputError also if
     exp or a similar function has an argument with a unit, or if an output has another unit than its signature says.
 
-    Robots with a joint type that contains a length, such as the pitch of a screw, are not checked: in the trace this
-    length is a number.
+    Robots with a joint type that contains a length, such as the pitch of a screw, are not checked, because the check
+    sees this length as a number without a unit.
     """
     if any(frame.joint.has_length for frame in reframed.frames):
         return

@@ -129,8 +129,9 @@ class LimbSearch:
         return min(found, key=lambda each: each.weight) if found else None
 
     def among(self, geometries: Iterable[Reframed]) -> LimbArrangement | None:
-        """Return the cheapest arrangement with limbs in SIMD lanes and with one of these choices of joint frames.
-        Return None if there is none. The function must not depend on masses and inertias."""
+        """Return the cheapest arrangement (frames and options of the code) with limbs in SIMD lanes and with one of
+        these choices of joint frames. Return None if there is none. The function must not depend on masses and
+        inertias."""
         if not self.costs.has_vectors:
             return None
         starts = [self.search.uncarried(each) for each in geometries]
@@ -149,8 +150,8 @@ class LimbSearch:
         return self._cheapest(own, self._rearranged(shared.arrangement))
 
     def lowered(self, found: LimbArrangement, straight: Program) -> LimbProgram | None:
-        """Return this function with limbs in SIMD lanes, in the arrangement found. Return None if no number of lanes
-        makes it cheaper than straight-line code."""
+        """Return this function with limbs in SIMD lanes, with the frames, parameters and groups of limbs that a search
+        found. Return None if no number of lanes makes it cheaper than straight-line code."""
         limbs = self._ordered(self._traced(found.arrangement, found.groups))
         if limbs.products is not None and limbs.products.narrowest < AT_ONCE:
             return None

@@ -207,8 +207,8 @@ class _Trace:
         return [tuple(first[joint] + k for joint in place.joints) for k in counts]
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
-        """Yield the output values to store, with slots (name and index) of the core or of a group of limbs. Zeros are
-        not stored."""
+        """Yield the output values to store, with slots (name and index) of a group of limbs or of the core (everything
+        outside limbs). Zeros are not stored."""
         self.products = self._products(found)
         for quantity in self.signature.stored:
             entries = [

@@ -255,8 +255,8 @@ class Search:
         state per call, and the cheapest one for one state per SIMD lane.
 
         For a robot with more than MANY_JOINTS joints, only the second is yielded. All candidates are counted, and only
-        the best become PROGRAMs. The candidates most similar to the found arrangement come first. Counting ends when
-        the counted candidates have OPERATIONS operations together.
+        the best become PROGRAMs. The candidates most similar to the given arrangement (frames, parameters, options)
+        come first. Counting ends when the counted candidates have OPERATIONS operations together.
         """
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}

@@ -137,7 +137,8 @@ def in_words(
 ) -> str:
     """Return words for the suspicion that columns of a log are swapped or reversed.
 
-    Joint k's position is then signs[k] times column order[k] of the log, and its effort likewise.
+    Joint k's position is then signs[k] times column order[k] of the log, and its effort is effort_signs[k] times column
+    effort_order[k].
     """
     parts = []
     if order == effort_order:

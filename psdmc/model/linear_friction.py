@@ -1,5 +1,5 @@
-"""The friction of a calibrated model, as a sum of terms. The calibration must have used such friction and plain logs,
-not a measurement campaign."""
+"""The friction of a calibrated model, as a sum of terms. There is none for a measurement campaign with friction laws
+that have an internal state."""
 
 from __future__ import annotations
 

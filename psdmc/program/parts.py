@@ -37,7 +37,7 @@ def in_parts(
     """Divide the PROGRAM into parts of about `longest` operations and stores each.
 
     kept_in  for each value, the name of the vector that takes it if a later part reads it
-    groups   groups of output entries that one part must store together; all other entries may be stored in any part
+    groups   groups of output entries that one part must store together; every other entry is stored separately
     late     True: the last part stores all outputs; False: each part stores the outputs whose values it completes
 
     Keeps: output values, bit for bit. All inputs are read before the first output is stored, in an earlier part or in

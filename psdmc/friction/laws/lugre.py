@@ -59,8 +59,8 @@ def pieces(p: Sequence[Scalar], v0: Scalar, v1: Scalar) -> Scalar:
 
 
 def torque(p: Sequence[Scalar], at: At) -> Scalar:
-    """Return the friction torque, N m (N), from the fitted values p, the speed and the deflection of the bristles.
-    Source: Denso-2022, (14)."""
+    """Return the friction torque, N m (N for a sliding joint), from the fitted values p, the speed and the deflection
+    of the bristles. Source: Denso-2022, (14)."""
     viscous = p[3] * power(absolute(at.v), p[4])
     return p[5] * at.z + p[6] * rate(p, at.v, at.z) + select(at.v, 0.0, -viscous, viscous)
 
