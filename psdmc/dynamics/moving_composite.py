@@ -36,8 +36,8 @@ from psdmc.robot.joints import JointType
 
 
 class Momenta(NamedTuple):
-    """Two integrals over the mass of a composite: 2 int r r'^T dm and 2 int r' dm, with the velocities r' of the points
-    r.
+    """Two integrals over the mass of a composite (several bodies as one): 2 int r r'^T dm and 2 int r' dm, with the
+    velocities r' of the points r.
 
     `second` is the first integral, a 3 x 3 matrix whose rows belong to the components of r.
     """
@@ -60,7 +60,8 @@ class Composite(NamedTuple):
 
 
 def at_rest(body: Body) -> Composite:
-    """Return the composite (see Composite) of one body that does not move relative to the link."""
+    """Return the composite (several bodies as one) that consists of one body, which does not move relative to the
+    link."""
     return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
 
 
@@ -75,8 +76,8 @@ def both(a: Composite, b: Composite) -> Composite:
 
 
 def moved_to(composite: Composite, offset: Vector) -> Composite:
-    """Return a composite's moments about another point of the link. `offset` leads from the new point to the old
-    one."""
+    """Return a composite (several bodies as one) with its moments about another point of the link. `offset` leads from
+    the new point to the old one."""
     (second, first), (force, moment) = composite.momenta, composite.wrench
     rows = tuple(add(row, scale(first, length)) for row, length in zip(second, offset, strict=True))
     return Composite(
@@ -166,9 +167,10 @@ def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scala
 
 
 def swept(second: Matrix, s: Vector) -> Vector:
-    """Compute int r x (2 s x r') dm = (tr P - P^T) s: the moment of the Coriolis accelerations of a composite.
+    """Compute int r x (2 s x r') dm = (tr P - P^T) s: the moment of the Coriolis accelerations of a composite (several
+    bodies as one).
 
-    s is the angular velocity of the axes, and P is `second`, the integral 2 int r r'^T dm of Momenta.
+    s is the angular velocity of the axes, r' are the velocities of the points r, and P is the integral 2 int r r'^T dm.
     """
     trace = second[0][0] + second[1][1] + second[2][2]
     return add(scale(s, trace), scale(transform(transpose(second), s), -1.0))

@@ -44,7 +44,8 @@ def axis_along(axis: Axis, number: int) -> Axis:
 
 
 def composite_along(composite: Composite, number: int) -> Composite:
-    """Return a composite body with the entries of all vectors permuted so that the axis `number` becomes z."""
+    """Return a composite (several bodies as one) with the entries of all vectors permuted so that the axis `number`
+    becomes z."""
     body, (second, first), (force, moment) = composite
     xx, yy, zz, xy, xz, yz = body.second
     squares, products = to_z((xx, yy, zz), number), to_z((yz, xz, xy), number)
