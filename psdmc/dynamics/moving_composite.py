@@ -36,8 +36,8 @@ from psdmc.robot.joints import JointType
 
 
 class Momenta(NamedTuple):
-    """Two integrals over the mass of a composite (several bodies as one): 2 int r r'^T dm and 2 int r' dm, with the
-    velocities r' of the points r.
+    """Two integrals over the mass of a composite (several bodies as one): 2 int r r'^T dm and 2 int r' dm. The points
+    at r have the velocities r'.
 
     `second` is the first integral, a 3 x 3 matrix whose rows belong to the components of r.
     """
@@ -167,8 +167,8 @@ def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scala
 
 
 def swept(second: Matrix, s: Vector) -> Vector:
-    """Compute int r x (2 s x r') dm = (tr P - P^T) s: the moment of the Coriolis accelerations of a composite (several
-    bodies as one).
+    """Compute the moment of the Coriolis accelerations of a composite (several bodies as one). The moment is int r x (2
+    s x r') dm = (tr P - P^T) s.
 
     s is the angular velocity of the axes, r' are the velocities of the points r, and P is the integral 2 int r r'^T dm.
     """
