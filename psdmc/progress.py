@@ -13,7 +13,7 @@ Progress = Callable[[str], None]
 
 
 class Step(str):
-    """The text of a step, with the share of the stage's work that is done, from 0 to 1."""
+    """The text of a step of a computation, and the share of the work that is done then, from 0 to 1."""
 
     __slots__ = ("share",)
     share: float
@@ -42,5 +42,5 @@ def silent(step: str) -> None:
 
 
 def on_standard_error(step: str) -> None:
-    """Print the step to standard error, after the number of seconds since psdmc was loaded."""
+    """Print the text of a step to standard error, preceded by the number of seconds since psdmc was loaded."""
     print(f"{time.monotonic() - START:6.0f} s  {step}", file=sys.stderr, flush=True)

@@ -19,8 +19,8 @@ PIECE = 1 << 20
 def read_file(
     path: str | os.PathLike[str], most: int, hint: str, begins: bytes = b"", name: str | None = None
 ) -> bytes:
-    """Return the content of a file, pipe or device. Arguments and errors are those of read_rest. Raises OSError if the
-    file cannot be read."""
+    """Return the content of a file, pipe or device. Arguments and other errors are those of read_rest. Raises OSError
+    if the file cannot be read."""
     with Path(path).open("rb") as file:
         named = name or os.fspath(path)
         if os.fstat(file.fileno()).st_size > most:

@@ -35,13 +35,14 @@ def real_array(
     axes: Sequence[str] = (),
     names: AxisNames = _NO_NAMES,
 ) -> NDArray[Any]:
-    """Return the values as an array of this dtype. They are copied only if they are no such array yet.
+    """Return the values as an array with the NumPy type `dtype`. Values are copied only if they are not yet an array of
+    this type.
 
-    axes   words for the last axes; if a data frame has labels along one of them, its entries are put in the robot's order
-    names  for each word, the names along that axis
+    axes   words for the last axes, such as nq; entries with labels, as in a data frame, are put in the robot's order
+    names  for each word, the robot's names of the entries along the axis
 
     Raises InputError, which begins with `what`, for complex numbers, texts, dates, masked entries, ragged lists, and
-    labels that are not the names. Ascending integer labels, the default of pandas, count as positions.
+    labels that are not the robot's names. Ascending integer labels, the default of pandas, count as positions.
     """
     if type(values) is np.ndarray and values.dtype == dtype:
         return values
