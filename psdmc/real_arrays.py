@@ -1,8 +1,8 @@
-"""Turns a caller's numbers into arrays of reals. A value that is no real array gives an error with the argument's
-name.
+"""Turns a caller's numbers into arrays of real numbers. A value that is no array of real numbers gives an error that
+names the argument.
 
-The columns of data frames are matched with the robot's joints by name. psdmc recognises a data frame by its
-attributes, so it does not import pandas or another library for this.
+The columns of data frames are matched with the robot's joints by name. psdmc recognises a data frame by its attributes,
+so it does not import pandas or another library for this.
 """
 
 from __future__ import annotations

@@ -3,8 +3,9 @@ recorded, too.
 
 Source: Griewank, Walther 2008, chapters 3 (modes) and 4 (costs). Derivatives can be by inputs (`Tracer.symbols`) and by
 inputs times a constant, but not by other computed values. The tracer merges constants along a product, so a recorded
-product may no longer contain the value with which it was written. To differentiate by computed values, trace with
-inputs in their place, and substitute the values afterwards (replay.py).
+product may no longer contain the value with which it was written.
+
+To differentiate by computed values, trace with inputs in their place, and substitute the values afterwards (replay.py).
 """
 
 from __future__ import annotations

@@ -2,8 +2,10 @@
 equal branches, such as legs, on a core (the other joints).
 
 The code for limbs runs in stages, one limb after the other. An entry of the output in the row of one limb and the
-column of another depends on both, so no stage can compute it. The entry is a product of the limb's factor T with rows
-of the core (dynamics/arrow.py). After the stages, these rows are in memory.
+column of another depends on both, so no stage can compute it.
+
+The entry is a product of the limb's factor T with rows of the core (dynamics/arrow.py). After the stages, these rows
+are in memory.
 """
 
 from __future__ import annotations

@@ -93,11 +93,13 @@ def calibrate_command(
     """Calibrate a model or model file with a campaign or logs, and write the calibrated model and a report.
 
     output     path of the calibrated model file
-    report     path of an HTML page; its numbers go into a JSON file next to it. Only a report's JSON is replaced
-    actuators  folder for C code of friction and motors
-    loaded     further logs, recorded with the known load `load_on`: 'MASS,X,Y,Z' or a load's file
+    report     path of an HTML page; its numbers go into a JSON file next to it. A JSON file of another kind is not
+               replaced
+    actuators  folder into which C code of friction and motors is written
+    loaded     further logs, recorded while the robot carried the known load `load_on`: 'MASS,X,Y,Z' or the file of a
+               load
     keep       whether to write the model and the C code even if the verdict is `not usable`
-    validation  plain logs that only judge the fit
+    validation  plain logs that are not fitted but test the fit
     naming     topic and joint names of plain logs
     """
     if report is not None:
@@ -141,7 +143,8 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
 
 
 def require_actuators_folder(model: DynamicsModel, folder: str | Path) -> None:
-    """Raise InputError if a folder has files, but neither a package of psdmc nor this C code of the same robot."""
+    """Raise InputError if a folder has files that the C code would not replace. A package of psdmc may be there, and
+    earlier C code of friction and motors of this robot."""
     header = Path(folder) / "include" / f"{identifier(model.mechanism.name)}_actuators.h"
     if not content_of(folder) and not header.is_file():
         refuse_foreign_folder(folder, "choose a new or empty folder, or that of the robot's package")

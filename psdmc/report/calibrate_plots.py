@@ -1,4 +1,5 @@
-"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper Denso-2022."""
+"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper on the calibration of a Denso robot
+(published_denso.py)."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ FILE = (11, 6)
 
 
 def step_panels(step: StepQuality) -> tuple[str, ...]:
-    """Draw, for each joint, measured and predicted torque and their difference. Held-out parts of the log are shaded."""
+    """Draw the measured torque, the predicted torque and their difference for each joint, over time. Parts of the log
+    that were kept out of the fit are shaded."""
     return tuple(
         svg(partial(alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
         for sample in step.samples

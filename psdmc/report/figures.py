@@ -79,7 +79,7 @@ def write_figures(
 
 
 def require_own_folder(folder: str | Path) -> None:
-    """Raise InputError if a folder has files, but none that `psdmc figures` wrote."""
+    """Raise InputError if a folder has files, but none that the command `psdmc figures` wrote."""
     table = Path(folder) / TABLE
     try:
         with table.open("rb") as file:
@@ -131,8 +131,8 @@ def draw_parameters(figure: Figure, known: Calibrated) -> None:
 
 
 def friction_curves(known: Calibrated) -> dict[str, tuple[Array, Array]]:
-    """Return, for each joint, speeds and friction torques at constant speed, without friction that depends on position
-    or load."""
+    """Return for each joint an array of speeds and the friction torques at these constant speeds. Friction that depends
+    on position or load is left out."""
     law = known.prediction
     if law is None:
         return {}
@@ -157,8 +157,8 @@ def _reads(row: Row) -> frozenset[str]:
 
 
 def steady(rows: Sequence[Row], v: Array, sign_speed: float) -> Array:
-    """Return the friction at constant speeds that are not zero. An internal state, such as LuGre's, has its steady-state
-    value."""
+    """Return the friction torque or force at constant speeds that are not zero. A friction model with an internal
+    state, such as LuGre's, has the value that the state approaches at this speed."""
     sign = np.tanh(v / sign_speed) if sign_speed > 0.0 else np.sign(v)
     state, z = rows[0][0].law.state, np.zeros_like(v)
     if state is not None:

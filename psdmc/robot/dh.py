@@ -321,7 +321,7 @@ def parents_of(names: Sequence[str], given: Sequence[object]) -> tuple[tuple[int
     names   names of the rows' joints
     given   `parent` of each row in the file: the name of a joint, or "base"; None: the row before
 
-    The rows of a branch must be consecutive: the parent of a row is the row before it or an ancestor of that row.
+    The rows of a branch must be consecutive: the parent of a row is the row before, or an ancestor of the row before.
     """
     parents: list[int] = []
     faults: list[str] = []
