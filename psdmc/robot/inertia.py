@@ -1,4 +1,5 @@
-"""Standard inertial parameters of one link about its frame, and the conditions that they fulfil for a real body."""
+"""Standard inertial parameters of one link (mass, first moments, inertia) about the link's frame, and the conditions
+that they fulfil for a real body."""
 
 from __future__ import annotations
 
@@ -34,8 +35,8 @@ def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
 
 
 def about_com(parameters: Array) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass (3,) and inertia about it (6,). This is the inverse of standard_parameters for a
-    mass that is not zero."""
+    """Return mass, centre of mass (3,) and inertia about the centre of mass (6,) from standard parameters. The mass
+    must not be zero."""
     mass = float(parameters[0])
     com = parameters[1:4] / mass if mass else np.zeros(3)
     shift = standard_parameters(mass, com, np.zeros(6))[4:]

@@ -49,7 +49,7 @@ class LoadedRobot:
 
     @property
     def chain(self) -> Mechanism:
-        """The mechanism. This property has the name that psdmc 0.1 used."""
+        """The mechanism: joints, bodies and gravity of the robot. psdmc 0.1 used the name `chain` for it."""
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:

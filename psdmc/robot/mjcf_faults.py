@@ -16,7 +16,7 @@ REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
 
 @dataclass(frozen=True, slots=True)
 class Follows:
-    """Describes a mimic joint: its q is ratio times that of `leader`, plus offset."""
+    """Describes a mimic joint of an MJCF file: its position q is ratio times that of `leader`, plus offset."""
 
     leader: str
     ratio: float
@@ -122,7 +122,8 @@ def of_balls(mujoco: Any, model: Any) -> list[int]:
 
 
 def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
-    """Return the joints that follow another joint by an equality constraint, q1 - ref1 = c0 + c1 (q2 - ref2)."""
+    """Return the joints that follow another joint by an equality constraint q1 - ref1 = c0 + c1 (q2 - ref2). Here ref1
+    and ref2 are the reference positions of the joints."""
     found = {}
     for k in range(model.neq):
         if not (is_active(mujoco, model, k) and _is_linear(mujoco, model, k)):

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 
 def armatures(mujoco: Any, model: Any) -> Array:
-    """Return the drive inertia (njnt,) at each joint, kg m^2 (kg): that of the joint plus that of each actuator times
-    the square of its gear ratio."""
+    """Return the drive inertia at each of MuJoCo's joints (njnt,), in kg m^2 (kg). It is the joint's armature plus each
+    actuator's armature times the square of the gear ratio."""
     found = np.array(model.dof_armature[model.jnt_dofadr], dtype=float)
     for k in _with_armature(model):
         if model.actuator_trntype[k] in _joint_transmissions(mujoco):
@@ -38,7 +38,8 @@ def reflected(model: Any, actuator: int) -> float:
 
 
 def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Return for each object whether it has a force of the given kind, of any sign and power of position or velocity.
+    """Return for each object of one kind whether a force of the given kind acts on it. The force may have any sign, and
+    may be nonlinear in position or velocity.
 
     kind  objects to examine: jnt (joints), dof (degrees of freedom), tendon or actuator
     word  kind of force: stiffness, damping or frictionloss
@@ -47,7 +48,8 @@ def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
 
 
 def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Return for each object whether its force is nonlinear or has the wrong sign. URDF cannot express such forces.
+    """Return for each object of one kind whether the force of the given kind is nonlinear or has the wrong sign. URDF
+    cannot express such forces.
 
     kind  objects to examine, as in `acting`
     word  kind of force, as in `acting`
@@ -58,7 +60,8 @@ def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
 
 
 def is_active(mujoco: Any, model: Any, equality: int) -> bool:
-    """Return whether an equality constraint is active: neither it nor all constraints are switched off."""
+    """Return whether an equality constraint is active. It is inactive if the file switches off this constraint, or all
+    constraints."""
     bits = mujoco.mjtDisableBit
     off = int(model.opt.disableflags) & int(bits.mjDSBL_EQUALITY | bits.mjDSBL_CONSTRAINT)
     return bool(model.eq_active0[equality]) and not off

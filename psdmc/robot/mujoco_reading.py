@@ -161,7 +161,7 @@ def _entries(first: Array, counts: Sequence[int]) -> list[int]:
 
 
 def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-    """Return the states q (k, nq), qd and qdd (k, nv) of a robot with a floating base in MuJoCo's conventions.
+    """Return k states q (k, nq), qd and qdd (k, nv) of a robot with a floating base, in MuJoCo's conventions.
 
     The quaternion becomes (w, x, y, z). The linear rates become those along the world's axes. The acceleration of the
     base's origin is a + w x v along the base's axes, for rates v, w and their derivatives a.
@@ -176,7 +176,8 @@ def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
 
 
 def force_from_mujoco(q: Array, tau: Array) -> Array:
-    """Return MuJoCo's efforts (k, nv) with the force on the floating base along the base's own axes; q is MuJoCo's."""
+    """Return joint efforts (k, nv) for k states with the force on the floating base along the axes of the base.
+    MuJoCo's efforts have the force along the world's axes; `q` is in MuJoCo's convention."""
     back = np.swapaxes(_rotations(q[:, 3:7]), 1, 2)
     return np.concatenate([_turned(back, tau[:, :3]), tau[:, 3:]], axis=1)
 

@@ -25,9 +25,9 @@ DIFFERENCE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n), SI.
+    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n) with n joints, SI.
 
-    tip_name     the frame of `jacobian`
+    tip_name     name of the frame of which `jacobian` returns the Jacobian
     frame_names  the named frames; empty: the tip alone
     rows         for each named frame, 3 for a contact point, 6 for a surface, 0 for none; empty: all are points
     """
@@ -39,7 +39,8 @@ class Reference:
 
     @property
     def contacts(self) -> list[tuple[int, int]]:
-        """For each contact, Pinocchio's number of its frame, and its number of rows (3 or 6)."""
+        """Return for each contact the number of the contact's frame in Pinocchio's model, and the number of rows (3 or
+        6)."""
         ids = self.frame_ids
         return [
             (frame, rows) for frame, rows in zip(ids, self.rows or (POINT,) * len(ids), strict=True) if rows
@@ -101,7 +102,8 @@ class Reference:
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
     def integrated(self, q: Array, way: Array) -> Array:
-        """Return the positions (..., nq) that constant rates lead to from q; `way` is the rates times the duration."""
+        """Return the positions (..., nq) after a motion from q at constant rates. `way` is the rates multiplied by the
+        duration."""
 
         def moved(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.asarray(pinocchio.integrate(model, *state))
@@ -109,7 +111,8 @@ class Reference:
         return self.each(moved, q, way)
 
     def integrated_slopes(self, q: Array, way: Array) -> tuple[Array, Array]:
-        """Return the derivatives of `integrated` by q and by `way`, (..., nv, nv) each, along tangents."""
+        """Return the derivatives of `integrated` by q and by `way`, an array (..., nv, nv) each. Changes of positions
+        are small motions along the joint rates."""
 
         def slopes(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.array(
@@ -122,7 +125,7 @@ class Reference:
     def coordinate_rates(self, q: Array, qd: Array) -> Array:
         """Return the time derivatives (..., nq) of the coordinates at these rates.
 
-        They are a central difference of eighth order of `integrate`, with an error of 1e-12 of the rates.
+        They are computed by a central difference of eighth order, with an error of 1e-12 of the rates.
         """
         step = DIFFERENCE / max(1.0, float(np.abs(qd).max()))
         total = np.zeros_like(q)
@@ -153,7 +156,7 @@ class Reference:
         return self.each(of_tip, q)
 
     def poses(self, q: Array, link_names: Sequence[str]) -> Array:
-        """Return the poses (..., len(link_names) + 1, 4, 4) of the links' frames and of the tip in the base frame."""
+        """Return the poses (..., number of links + 1, 4, 4) of all links' frames and of the tip in the base frame."""
         kind = pinocchio.FrameType.BODY
         frames = [self.model.getFrameId(name, kind) for name in link_names]
         frames.append(self.model.getFrameId(self.tip_name))
@@ -182,8 +185,8 @@ class Reference:
         return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
 
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
-        """Return the values of a Pinocchio function of (model, data, state ...) at every state; leading axes
-        broadcast."""
+        """Return the values of a Pinocchio function of (model, data, state ...) at every state. The leading axes of the
+        states broadcast as in NumPy."""
         data = self.model.createData()
         rows = [np.asarray(state, dtype=float) for state in states]
         lead = np.broadcast_shapes(*(row.shape[:-1] for row in rows))
@@ -223,8 +226,8 @@ def pinocchio_version() -> str:
 # must come before its followers.
 @dataclass(frozen=True, slots=True, eq=False)
 class OnCoordinates:
-    """The dynamics of a Reference for a robot with mimic joints, in the robot's own coordinates q, qd, qdd, tau (...,
-    nv)."""
+    """The dynamics of a robot with mimic joints, computed with Pinocchio. The arrays q, qd, qdd, tau (..., nv) are for
+    the joints that follow no other joint."""
 
     free: Reference
     following: Following

@@ -37,8 +37,8 @@ def reference_model(
     snapped      True: joints are placed as in the mechanism; False: as in the file, rounding included
     parameters   (n, 11) standard parameters about the link frames that replace those of the file
 
-    Bodies with parameters assumed zero get the mechanism's values, because the file does not have them. Raises
-    ValueError if parameters are needed and unknown.
+    Bodies with parameters assumed zero (option assume_zero) get the mechanism's values, because the file does not have
+    them. Raises ValueError if parameters are needed and unknown.
     """
     chain = loaded.mechanism
     model = as_written(loaded)
@@ -59,8 +59,8 @@ def reference_model(
 
 
 def as_written(loaded: LoadedRobot) -> pinocchio.Model:
-    """Return Pinocchio's model of the file without psdmc's changes. Only names come from the mechanism. Links without
-    inertia in the file have none in the model."""
+    """Return the model that Pinocchio makes from the robot file alone, without psdmc's assumptions. psdmc only chooses
+    the joints and names them. Links without inertia in the file have none in the model."""
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:

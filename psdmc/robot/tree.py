@@ -20,11 +20,11 @@ BALL = "a URDF has no joint about every axis: write it as three revolute ones th
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """The selected joints: `to_base` from the root to the base link, and `path` from the base link to the tip, with
-    fixed joints.
+    """The joints of a URDF that a model contains, with the fixed joints between them. `to_base` is the path from the
+    root to the base link, `path` that from the base link to the tip.
 
-    ends   end links if `path` is the whole tree; empty for a chain. The joints of a tree are in the order of Pinocchio's
-           buildModelFromUrdf: branch by branch, and by name if they are on the same link
+    ends   end links if `path` is the whole tree; empty for a chain. The joints of a tree are in the order of
+           Pinocchio's buildModelFromUrdf: branch by branch, and by name if they are on the same link
     """
 
     base: str

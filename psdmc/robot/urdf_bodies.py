@@ -40,17 +40,17 @@ def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
 
 
 def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
-    """Return ten standard parameters for each movable joint: those of all links that move with it, about its child
-    link's frame.
+    """Return ten standard parameters for each movable joint, about the frame of the joint's child link. The parameters
+    are those of all links that move with the joint.
 
-    Joints that are not on the route are locked at their neutral position.
+    Joints that are not among the selected ones are locked at their neutral position.
     """
     return [without_noise(_merged(robot, body)) for body in bodies_of(robot, route.movable)]
 
 
 def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:
-    """Return for each of these joints the links that move with it and with no later joint, by their placements in its
-    child link's frame. The child link comes first."""
+    """Return for each movable joint the links that it moves together, up to the next movable joints. A link has the
+    placement in the frame of the joint's child link, which comes first."""
     below: dict[str, list[tuple[str, Placement]]] = {}
     moves = {joint.name for joint in movable}
     for joint in robot.joints:
@@ -80,7 +80,8 @@ def hold_against_pinocchio(
     """Raise InputError with the name of the first link whose inertia Pinocchio reads or merges differently.
 
     First each link is compared alone, in a model where every joint is revolute, so that no links are merged. Then the
-    merged inertias are compared. `held` are the positions of joints that are locked away from their neutral position.
+    merged inertias are compared. `held` are the positions of joints that are locked at another position than the
+    neutral one.
     """
     free = robot.free_root
     alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), free_root=free)

@@ -252,8 +252,8 @@ def urdf_frames(
     names: Iterable[str],
     source: str,
 ) -> tuple[NamedFrame, ...]:
-    """Return the named frames of these links, placed by the numbers of the file. The tip has the same placement as in
-    the chain.
+    """Return the named frames of these links, placed by the numbers of the file. The placement of the tip equals that
+    in the chain.
 
     Raises InputError if a link does not exist, does not move, or is not rigidly attached to a link of the chain.
     """

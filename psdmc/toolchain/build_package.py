@@ -143,10 +143,11 @@ FOLDERS = ("src", "test")
 
 @contextmanager
 def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
-    """Until the block ends, report to `progress` how many of `files` object files exist below the folder `build`.
+    """Report the progress of a build until the block ends: how many of `files` object files exist below the folder
+    `build`.
 
-    Compilers print nothing while they work, so the files are counted. If an earlier build left its files, the time
-    left is not known.
+    Compilers print nothing while they work, so the files are counted. If an earlier build left its files, the time left
+    is not known.
     """
     done, most = threading.Event(), 0
 

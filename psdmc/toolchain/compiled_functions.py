@@ -371,7 +371,7 @@ class CompiledFunctions(RobotFacts):
         self._kernel(kernel).batch(count, *(self._ffi.cast(self._pointer, address) for address in addresses))
 
     def tails(self, kernel: str) -> tuple[tuple[int, ...], ...]:
-        """Return the shape of each output of a generated function for one state."""
+        """Return for each output of a generated function the shape for one state, without batch axes."""
         return self._kernel(kernel).tails
 
     def address_of(self, kernel: str) -> int:
@@ -398,7 +398,8 @@ class CompiledFunctions(RobotFacts):
 
 @dataclass(frozen=True, slots=True)
 class OnArrays:
-    """A function of a robot, with optional theta_b, that can be pickled and sent to other processes."""
+    """A function of a robot, with optional base parameters theta_b, that can be called with arrays. The object can be
+    pickled and sent to other processes."""
 
     robot: CompiledFunctions
     function: str

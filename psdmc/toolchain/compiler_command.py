@@ -31,7 +31,7 @@ class Compiler:
 
     command   the words that start it
     version   its version text, for cache keys
-    portable  flags for every machine: FLAGS, and for GCC some of its own
+    portable  flags for every machine: FLAGS, and further ones for GCC
     flags     the portable flags, and those for the target or this machine's CPU
     target    macros that the compiler predefines with these flags; they name the CPU features
     """

@@ -14,8 +14,8 @@ from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
 class Planar(WideJoint):
     """The planar joint. q is x and y (m), and the cosine and sine of the angle about z.
 
-    Rates are the velocity of the moved frame's origin along its own x and y axes (m/s) and the angular velocity about
-    z (rad/s).
+    Rates are the velocity of the moved frame's origin (m/s) and the angular velocity about z (rad/s). The velocity is
+    along the x and y axes of the moved frame.
     """
 
     __slots__ = ()
