@@ -29,9 +29,9 @@ def read_file(
 
 
 def read_rest(file: BinaryIO, most: int, name: str, hint: str, begins: bytes = b"") -> bytes:
-    """Return the bytes that are left in an open file. It reads at most one byte more than `most`.
+    """Return the bytes that are left in an open file. The function reads at most one byte more than `most`.
 
-    begins   expected first bytes; if the file begins with other bytes, only its first bytes are returned
+    begins   expected first bytes; if the file begins with other bytes, only the first bytes of the file are returned
 
     Raises InputError, which calls the file `name`, if more than `most` bytes are left.
     """

@@ -92,7 +92,8 @@ def _in_order(
 
 
 def order_of(what: str, labels: Sequence[Any], names: Sequence[str]) -> list[int] | None:
-    """Return for each name its position among the labels. Return None if the labels are ascending integers.
+    """Return for each name the position of the equal label, which a data frame gives. Return None if the labels are
+    ascending integers.
 
     Raises InputError, which begins with `what`, if the labels are not the names in some order.
     """

@@ -1,9 +1,11 @@
 """Arithmetic that gives the same digits on every processor and with any number of threads.
 
 BLAS, LAPACK and einsum order their sums, and fuse products with sums, differently on different processors. Vectorised
-sines and exponentials differ, too. So psdmc computes all numbers in models and packages with the functions of this
-module. They use only NumPy's elementwise operations, which IEEE 754 defines to the last bit, in an order that depends
-on shapes and zeros alone. Results have the precision of the arguments.
+sines and exponentials differ, too.
+
+So psdmc computes all numbers in models and packages with the functions of this module. These functions use only NumPy's
+elementwise operations, which IEEE 754 defines to the last bit. The order of operations depends on shapes and zeros
+alone. Results have the precision of the arguments.
 """
 
 from __future__ import annotations
@@ -143,7 +145,8 @@ def triangle_solved(triangle: Array, right: Array) -> Array:
 def sine(angle: Any) -> Any:
     """Return sin of a float or an array in rad, in the precision of the argument.
 
-    The value is computed with the C library's long double and rounded to double, so it is the same on all processors.
+    The value is computed with the C library's long double and rounded to double, so the value is the same on all
+    processors.
     """
     return _rounded(np.sin, angle)
 

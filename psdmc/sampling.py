@@ -126,8 +126,8 @@ def _range(option: str, value: float, least: float, most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """The content of a folder after sampling: number of states, parts and bytes, how many parts were there before, and
-    the length of each column."""
+    """The content of an output folder after sampling: number of states, parts (output files) and bytes. It also has the
+    number of parts that were there before, and the length of each column."""
 
     states: int
     parts: int
@@ -143,13 +143,13 @@ def sample(
     progress: Progress = silent,
     scheduler: str | None = None,
 ) -> Sampled:
-    """Draw the states, evaluate the functions, and write the parts that are missing in the folder.
+    """Draw random states, evaluate the functions, and write the parts (output files) that are missing in the folder.
 
     scheduler  address of a Dask scheduler, whose workers compute the parts; None: this process computes them
 
-    Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit,
-    or if a function needs an input that psdmc cannot sample. Raises ToolchainError if the disk is full or too small
-    for the missing parts, or if the scheduler does not answer.
+    Raises InputError if the folder holds another sampling or files that psdmc did not write. The error is also raised
+    if a joint has no limit, or if a function needs an input that psdmc cannot sample. Raises ToolchainError if the disk
+    is full or too small for the missing parts, or if the scheduler does not answer.
     """
     if find_spec("pyarrow") is None:
         raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'")

@@ -245,7 +245,8 @@ class Signature:
 
 
 def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
-    """Return the signatures sorted by `order`. Raises InternalError if two have the same order."""
+    """Return the signatures of functions in the order of their numbers `order`. Raises InternalError if two functions
+    have the same number."""
     found = tuple(sorted(signatures, key=lambda signature: signature.order))
     for one, other in pairwise(found):
         if one.order == other.order:

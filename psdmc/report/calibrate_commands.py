@@ -47,7 +47,8 @@ def excite_command(
     """Plan a calibration campaign for a model. Write trajectories, campaign.toml, excitation.json, .csv and .svg into
     `folder`.
 
-    force   replace the plan of an existing campaign; without it, raise InputError before the search
+    force   replace the plan of an existing campaign; without `force`, a campaign in the folder gives an InputError
+            before the search
     """
     began = cpu_seconds()
     options = options or CampaignOptions()
@@ -71,7 +72,8 @@ def simulate_command(
     options: SimulateOptions | None = None,
     progress: Progress = silent,
 ) -> int:
-    """Write a campaign's logs from a virtual robot. Return how many logs were simulated; the others were up to date."""
+    """Write the logs of a calibration campaign as a virtual (simulated) robot would record them. Return how many logs
+    were simulated; the others were up to date."""
     return simulate_campaign(plant, campaign, options or SimulateOptions(), progress)
 
 

@@ -84,8 +84,8 @@ def _shade(axis: Axes, x: Array, held_out: Array) -> None:
 def excitation_panels(
     found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()
 ) -> tuple[str, ...]:
-    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Also draw its
-    condition number and those of random motions."""
+    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Draw the
+    condition number of the motion, too, next to those of random motions."""
     return tuple(
         svg(partial(alone, draw), PANEL, f"exciting motion: {says}")
         for says, draw in _excitation(found, joint_names, limits)

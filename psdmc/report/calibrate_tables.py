@@ -72,8 +72,8 @@ def _both(held_out: Quality, fit: Quality) -> list[str]:
 
 
 def parameter_table(record: Calibrated) -> str:
-    """Return the base parameters: file's value, value found, standard deviation, unit and equation (table 4 of
-    Denso-2022)."""
+    """Return the table of base parameters: the robot file's value, the value found, standard deviation, unit and
+    equation (table 4 of Denso-2022)."""
     head = ["Parameter", "In the file", "Found", "±", "Relative", "Unit", "Equation", "In the data", "Group"]
     rows = []
     for row in record.parameters:
@@ -86,7 +86,7 @@ def parameter_table(record: Calibrated) -> str:
 
 
 def joint_table(record: Calibrated) -> str:
-    """Return torque constants and friction of each joint (table 2 of Denso-2022)."""
+    """Return the table of torque constants and friction of each joint (table 2 of Denso-2022)."""
     own = (*record.motors, *record.friction)
     units = joined_units((row.name, row.unit) for row in own)
     by_key = {(row.joint, row.name): row for row in own}
@@ -175,7 +175,7 @@ def r_squared(value: float) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> str:
-    """Return an HTML table with every cell escaped. Columns of text break their lines."""
+    """Return an HTML table with every cell escaped. Columns of text are wrapped; columns of numbers are not."""
     names = "".join(_cell("th", cell, k in text_columns, ' scope="col"') for k, cell in enumerate(head))
     lines = ['<table class="plain">', f"<thead><tr>{names}</tr></thead>", "<tbody>"]
     for row in rows:

@@ -186,7 +186,7 @@ def draw_friction(
 
 
 def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -> None:
-    """Draw measured and predicted torque of each joint, and their difference."""
+    """Draw the measured torque, the predicted torque and their difference for each joint."""
     rows = figure.subplots(len(step.samples), 2, squeeze=False, sharex="row", width_ratios=[2, 1])
     for (both, left), sample in zip(rows, step.samples, strict=True):
         kept = thinned(len(sample.x))
@@ -210,7 +210,8 @@ def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -
 
 
 def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
-    """Return the LaTeX tables by file name. They need the packages booktabs, longtable and siunitx."""
+    """Return the tables of a calibration as LaTeX text, by file name. They need the packages booktabs, longtable and
+    siunitx."""
     equations = [parameter.terms for parameter in model.base_parameters]
     parameters = [
         [
@@ -254,7 +255,8 @@ def _seen(row: NumberRow) -> str:
 
 
 def tabular(columns: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "tabular") -> str:
-    """Return a LaTeX table from cells in LaTeX. A longtable continues on the next page and repeats its head."""
+    """Return a LaTeX table from cells in LaTeX. A longtable continues on the next page and repeats the head of the
+    table."""
     packages = "booktabs,siunitx" if kind == "tabular" else f"booktabs,{kind},siunitx"
     lines = [
         f"{MARK}; needs \\usepackage{{{packages}}}",
@@ -288,8 +290,8 @@ def preview(names: Sequence[str], pictures: Sequence[str]) -> str:
 
 
 def number(value: float, std: float = math.inf) -> str:
-    """Return a number for siunitx, rounded to two digits of its standard deviation; a dash for none. psdmc rounds it
-    itself, because siunitx drops the standard deviation of a number that is much smaller."""
+    """Return a number for siunitx, rounded to two digits of its standard deviation; a dash for none. psdmc rounds the
+    number itself, because siunitx drops the standard deviation of a number that is much smaller."""
     if not math.isfinite(value):
         return "--"
     if not 0.0 < std < math.inf:
@@ -323,7 +325,7 @@ SPECIAL = {
 
 
 def escaped(text: str) -> str:
-    """Return text as LaTeX code that shows it. Characters outside ASCII and Latin-1 are shown by their number."""
+    """Return LaTeX code that prints a text. Characters outside ASCII and Latin-1 are printed as their number."""
     return "".join(
         SPECIAL.get(c, c) if " " <= c <= "~" or "\xc0" <= c <= "\xff" else f"U+{ord(c):04X}" for c in text
     )

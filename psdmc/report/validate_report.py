@@ -68,7 +68,7 @@ class PageView:
 
 
 def require_free(report: Path) -> None:
-    """Raise InputError if the JSON file of a page would replace another kind of file."""
+    """Raise InputError if the JSON file of a page would replace a JSON file of another kind."""
     numbers = report.with_suffix(".json")
     remedy = f"give --report another name, or move {numbers}: the report's numbers go there"
     refuse_foreign_file(numbers, MARK, remedy)

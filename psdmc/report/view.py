@@ -244,7 +244,8 @@ def _poses(chain: Mechanism, q: Array) -> Array:
 
 
 def write_view(view: Viewed, path: str | Path) -> None:
-    """Write the page. Raise InputError if plotly is not installed, or if the path has a file that is not such a page."""
+    """Write the 3D page of a robot. Raise InputError if plotly is not installed, or if the path has a file that is no
+    page of `psdmc view`."""
     script = _plotly()
     require_own_page(path)
     write_whole(path, page(view, script))

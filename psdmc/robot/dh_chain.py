@@ -1,7 +1,9 @@
 """Makes a robot from a DH table.
 
-Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the distal frame
-is the link frame. The joint frame lies after Rz(theta + q), and the link frame has a constant placement in it.
+Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the distal frame is
+the link frame. The joint frame lies after Rz(theta + q), and the link frame has a constant placement in the joint
+frame.
+
 Modified convention (Craig): a row is Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and the joint frame is the link frame. For a
 prismatic joint q adds to d and not to theta.
 """
@@ -108,7 +110,8 @@ def _parameters(row: DhJoint) -> Array:
 
 
 def settled(link: DhLink) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass and inertia about it. Values that the `zero` list of the file names are zero."""
+    """Return mass, centre of mass, and inertia about the centre of mass of a link. Values that the `zero` list of the
+    file names are zero."""
     zero = canonical(link.zero)
     com_and_inertia = [
         0.0 if name in zero else value

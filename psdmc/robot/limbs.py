@@ -49,7 +49,8 @@ class _Tree:
             self.shapes[i] = known.setdefault(shape, len(known))
 
     def joints(self, branch: int) -> tuple[int, ...]:
-        """Return the joints of a branch, in an order that is the same for all branches of equal structure."""
+        """Return the joints of a branch. In branches of equal structure, corresponding joints have the same place in
+        this order."""
         found = [branch]
         for child in sorted(self.children[branch], key=lambda child: (self.shapes[child], child)):
             found += self.joints(child)

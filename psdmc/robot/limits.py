@@ -1,7 +1,7 @@
-"""Limits of the sizes and numbers in a robot file. An error message about such a limit states it.
+"""Limits of the sizes and numbers in a robot file. If a file exceeds a limit, the error message states the limit.
 
 The limits are far beyond any real robot. With larger numbers, squares and products of lengths and masses would exceed
-the range of 64-bit floats, and the error would appear far from its cause.
+the range of 64-bit floats. The error would then appear far from the wrong number.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def shown(value: object) -> str:
 
 
 def joined(faults: Sequence[str]) -> str:
-    """Return a list of faults as one line, shortened if there are many."""
+    """Return a list of faults as one line of a message, shortened if there are many."""
     more = [f"and {len(faults) - MOST_FAULTS} more"] if len(faults) > MOST_FAULTS else []
     return "; ".join([*faults[:MOST_FAULTS], *more])
 

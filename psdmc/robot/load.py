@@ -34,10 +34,10 @@ __all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_r
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRobot:
-    """A mechanism, the text from which psdmc read it, and the options.
+    """A robot read from a file: the mechanism, the text from which psdmc read it, and the options.
 
     source_name   the file's name in messages
-    snap_report   every rotation that was replaced by a near exact one, with the angle between them (rad)
+    snap_report   every rotation that was replaced by a near one with exact zeros, with the angle between both (rad)
     """
 
     mechanism: Mechanism
@@ -53,7 +53,8 @@ class LoadedRobot:
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
-        """Return the robot with the rotations as the file states them. It serves to compute the effect of snapping."""
+        """Return the robot with the rotations as the file states them. psdmc uses this robot to compute the effect of
+        snapping, which replaces rotations by near ones with exact zeros."""
         keywords = self.options.as_json() | {"snap": 0.0}
         return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
 

@@ -44,8 +44,8 @@ FREE_RATES = 6
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a joint in SI units (rad or m and their rates, N m or N). A limit that the file does not give is
-    infinite."""
+    """Limits of a joint: lower and upper position, speed, acceleration and effort, in SI units (rad or m and their
+    rates, N m or N). A limit that the file does not give is infinite."""
 
     lower: float = -math.inf
     upper: float = math.inf
@@ -161,7 +161,7 @@ class Mechanism:
 
     @property
     def has_unknown_body(self) -> NDArray[np.bool_]:
-        """(n,) whether at least one of a link's ten inertial parameters is unknown."""
+        """Return for each of n links whether at least one of the ten inertial parameters is unknown."""
         return np.asarray(np.isnan(self.parameters[:, :DRIVE]).any(axis=1))
 
     @property
@@ -218,7 +218,7 @@ class Mechanism:
 
     @property
     def rate_joints(self) -> tuple[int, ...]:
-        """For each of the nv rates, the index of its joint."""
+        """Return the index of the joint for each of the nv rates."""
         own = leaders(self.coordinates)
         return tuple(i for i in own for _ in range(self.joints[i].type.nv))
 
@@ -239,7 +239,7 @@ class Mechanism:
 
     @property
     def base_frame(self) -> str:
-        """The name, in words, of the frame in which gravity and placements are given."""
+        """Return the name, in words, of the frame in which gravity and placements are given."""
         return "world frame" if self.has_free_root else BASE_FRAME
 
     @property

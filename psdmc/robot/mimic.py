@@ -21,7 +21,7 @@ class Followed(NamedTuple):
     offset: float
 
     def position(self, q: float) -> float:
-        """Return the position of the mimic joint if the joint that it follows is at q."""
+        """Return the position of a mimic joint from the position q of the joint that it follows."""
         return self.ratio * q + self.offset
 
 

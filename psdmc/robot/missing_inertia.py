@@ -139,7 +139,7 @@ def massless_words(chain: Mechanism) -> str:
 
 
 def unknown_option(chain: Mechanism) -> str:
-    """Return the option of the command line that makes the inertia of massless links unknown, quoted for a shell."""
+    """Return the option of the command line, quoted for a shell, that makes the inertia of massless links unknown."""
     few = len(chain.massless) <= MOST_NAMED
     return f"--unknown {shlex.quote(','.join(chain.massless)) if few else MISSING}"
 

@@ -117,7 +117,7 @@ def _wide_drives(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
 
 
 def of_balls(mujoco: Any, model: Any) -> list[int]:
-    """Return the numbers of the ball joints in MuJoCo's model."""
+    """Return the numbers of the ball joints among the joints of MuJoCo's model."""
     return [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL]
 
 

@@ -1,7 +1,7 @@
-"""Collects values that a compiled MJCF stores in several arrays: drive inertias, force coefficients and active
+"""Collects values that a compiled MJCF file stores in several arrays: drive inertias, force coefficients and active
 constraints.
 
-An array that the installed version of MuJoCo does not have counts as zero.
+If the installed version of MuJoCo does not have an array, its values count as zero.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
 
 
 def reflected(model: Any, actuator: int) -> float:
-    """Return the inertia of an actuator at its joint, which is its armature times the square of the gear ratio."""
+    """Return the inertia of an actuator as seen at the joint: the actuator's armature times the square of the gear
+    ratio."""
     return float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
 
 
@@ -100,7 +101,8 @@ def _sizes(model: Any) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of bodies and joints by their numbers in MuJoCo. Objects without a name in the file get a new one."""
+    """Names of bodies and joints, by the numbers that MuJoCo gives them. Bodies and joints without a name in the file
+    get a new name."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]

@@ -75,7 +75,7 @@ def tree_text(
     free: int | None,
     notes: Sequence[str],
 ) -> str:
-    """Return the text of the URDF.
+    """Return the text of a URDF with the tree of a compiled MJCF.
 
     follows  the mimic joints
     free     the body that becomes the root link, on a free joint

@@ -1,5 +1,5 @@
-"""Computes a robot's torques with MuJoCo, if it is installed. MuJoCo is a second reference with a parser and an
-algorithm that differ from Pinocchio's."""
+"""Computes a robot's torques with MuJoCo, if it is installed. MuJoCo is a second reference besides Pinocchio: it reads
+files and computes torques by other code."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ States = tuple[Array, Array, Array]
 
 
 class NotCompared(Exception):
-    """MuJoCo cannot read this robot, so nothing is compared with it. The message says why."""
+    """An exception: MuJoCo is not installed or cannot read a robot, so nothing is compared with MuJoCo. The message
+    says why."""
 
 
 def mujoco_version() -> str:

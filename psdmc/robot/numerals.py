@@ -1,7 +1,8 @@
 """Reads numbers in robot files. A number must be a plain decimal in ASCII.
 
-Python's float also accepts underscores, digits of other alphabets and other kinds of spaces. The C++ streams of
-urdfdom accept none of them and read zero without a message. With one grammar all readers get the same number.
+Python's float also accepts underscores, digits of other alphabets and other kinds of spaces. The C++ streams of urdfdom
+accept none of them and read zero without a message. Because psdmc accepts only plain decimals, all readers get the same
+number.
 """
 
 from __future__ import annotations

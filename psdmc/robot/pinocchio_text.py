@@ -74,7 +74,8 @@ def _with_balls(model: pinocchio.Model, balls: Collection[str]) -> pinocchio.Mod
 
 
 def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Model:
-    """Return the model with some joints fixed at given positions and their bodies merged.
+    """Return Pinocchio's model with some joints fixed at given positions. The bodies that such a joint connects are
+    merged.
 
     held  positions by joint name, without JOINT_PREFIX
     """

@@ -174,8 +174,8 @@ class Reference:
 
     @property
     def path_length(self) -> float:
-        """Length in m of the longest path from the base to the tip or to another end of the tree, at the neutral
-        position. The path goes through all frames, including those of fixed joints."""
+        """Return the length in m of the longest path from the base to an end of the tree, such as the tip, at the
+        neutral position. The path goes through all frames, including those of fixed joints."""
         model, data = self.model, self.model.createData()
         pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
         parents = list(model.parents)
@@ -240,7 +240,8 @@ class OnCoordinates:
         return self.following.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))
 
     def on_joints(self, q: Array, *rates: Array) -> tuple[Array, ...]:
-        """Return the positions and rates (..., n) of every joint, mimic joints included."""
+        """Return the positions and rates (..., n) of all n joints from those of the joints that follow no other
+        joint."""
         return self.following.positions(q), *map(self.following.rates, rates)
 
     @property

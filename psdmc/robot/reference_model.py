@@ -6,8 +6,8 @@ a robot with snapped rotations, the placements of the joints also come from the 
 have them.
 
 The model has one coordinate per joint (a continuous joint is an angle) and the joints in the order of the mechanism.
-Its universe is the base, and it has a frame for the tip. All Pinocchio functions work with it on plain arrays q, qd,
-qdd (n,).
+The root frame of the model (Pinocchio's universe) is the base, and there is a frame for the tip. All Pinocchio
+functions take plain arrays q, qd, qdd (n,).
 """
 
 from __future__ import annotations
@@ -107,9 +107,10 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
 
 
 def body_of(parameters: Array) -> pinocchio.Inertia:
-    """Return Pinocchio's inertia with ten standard parameters, physically possible or not.
+    """Return Pinocchio's inertia object with the given ten standard parameters, which need not be physically possible.
 
-    Pinocchio divides by the mass. A body without mass gets the smallest possible mass, and its first moments are lost.
+    Pinocchio divides by the mass. A body without mass gets the smallest possible mass, and the first moments of the
+    body are lost.
     """
     if not parameters[:DRIVE].any():
         return pinocchio.Inertia.Zero()
@@ -120,7 +121,8 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
 
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
-    """Return whether the file alone does not determine some bodies, because parameters are assumed zero or unknown."""
+    """Return whether parameters of some bodies are assumed zero or unknown, so that the file alone does not determine
+    these bodies."""
     return bool(_assumed(loaded.mechanism))
 
 

@@ -1,9 +1,10 @@
 """Replaces the rounded entries of a file's rotations by exact zeros and ones.
 
 Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16 in floats. Both turn an exact zero of the dynamics into a tiny
-number that later steps cannot distinguish from a small one. Because its rows are orthogonal, a rotation matrix has six
-zeros (axes map to axes), four (one axis maps to an axis), one, or none. Only these three patterns are tried, the one
-with most zeros first.
+number, which later steps would take for a real value.
+
+Because the rows are orthogonal, a rotation matrix has six zeros (axes map to axes), four (one axis maps to an axis),
+one, or none. The patterns with six, four and one zero are tried, in this order.
 """
 
 from __future__ import annotations
@@ -124,11 +125,11 @@ def _unit(x: float, y: float) -> tuple[float, float]:
 
 
 def link_rotation(axis: Array) -> Array:
-    """Return the rotation (3, 3) from a link's frame into a joint frame whose z axis is the given unit axis in the
-    link.
+    """Return the rotation (3, 3) from a link's frame into the joint frame that psdmc chooses. The z axis of the joint
+    frame is the given unit axis in the link.
 
-    The x axis of the joint frame is the coordinate axis most perpendicular to z, made exactly perpendicular. So an
-    axis along a coordinate axis gives an exact signed permutation, and parallel axes give parallel frames.
+    The x axis of the joint frame is the coordinate axis most perpendicular to z, made exactly perpendicular. So an axis
+    along a coordinate axis gives an exact signed permutation, and parallel axes give parallel frames.
     """
     k = int(np.argmin(np.abs(axis)))
     x = np.eye(3)[k] - axis[k] * axis

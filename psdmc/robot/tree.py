@@ -42,11 +42,11 @@ class Route:
 def find_route(
     robot: UrdfRobot, base: str | None, tip: str | None, source: str, frames: Sequence[str] = ()
 ) -> Route:
-    """Return the chain from base (default: the root) to tip (default: see default_tip).
+    """Return the joints from the base link (default: the root) to the tip link (default: see default_tip).
 
-    If neither is given and the joints branch, return the whole tree. Its tip is the first of `frames`, or of its end
-    links. Raises InputError if a link is unknown, the tip is not below the base, no joint moves, or psdmc cannot model
-    a joint.
+    If neither link is given and the joints branch, return the whole tree. The tip of a tree is the first of `frames`,
+    or of the end links. Raises InputError if a link is unknown, the tip is not below the base, no joint moves, or psdmc
+    cannot model a joint.
     """
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in robot.inertials:
@@ -157,7 +157,8 @@ def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, .
 
 
 def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[str, ...]]:
-    """Return the end of the path with most movable joints, and a note if several ends were possible.
+    """Return the name of the link at the end of the path with most movable joints. Return a note, too, if several ends
+    were possible.
 
     If several paths have equally many joints, like the fingers of a gripper, the tip is the link where they branch.
     That link must have more movable joints before it than each path has after it. Otherwise the function raises an

@@ -24,15 +24,16 @@ to 1e3 rad leaves 1e-13, another reading of a number far more."""
 
 
 def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
-    """Return the placement of an <origin> element. Its rotations about the axes are snapped one by one (snap in rad)."""
+    """Return the placement that an <origin> element states. The rotations about the three axes are snapped one by one:
+    near right angles become exact (`snap` in rad)."""
     if origin.quaternion is None:
         return Placement(roll_pitch_yaw(origin.rpy, snap), np.array(origin.xyz))
     return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
 
 
 def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
-    """Return the placement of a joint's child link at q = 0, or at the locked position. Rotations are snapped (snap in
-    rad)."""
+    """Return the placement of a joint's child link at q = 0, or at the locked position of the joint. Rotations are
+    snapped: near right angles become exact (`snap` in rad)."""
     place = placement_of(joint.origin, snap)
     if joint.held is None:
         return place

@@ -39,7 +39,8 @@ def root_tag(text: str) -> str:
 def parse_xml(text: str, source: str, expected: str) -> Element:
     """Return the root element of an XML text, without its default name space.
 
-    Raises InputError if the text is no XML, if its root is not `expected`, or if it defines or fetches entities.
+    Raises InputError if the text is no XML, if the root element is not `expected`, or if it defines or fetches
+    entities.
     """
     try:
         root = _without_space(_parsed(text.lstrip()))
@@ -124,7 +125,7 @@ def numbers(
 def number(
     element: Element | None, attribute: str, default: float, accepted: Range, *, is_magnitude: bool = False
 ) -> float:
-    """Return one number from an attribute. Raises ValueError if it is out of range, or negative although
+    """Return one number from an attribute. Raises ValueError if the number is out of range, or negative although
     `is_magnitude` is true."""
     value = numbers(element, attribute, (default,), accepted)[0]
     if is_magnitude and value < 0.0 and element is not None:

@@ -83,5 +83,5 @@ class Costs:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether code that computes one state per SIMD lane differs from code for one state."""
+        """Return whether code that computes one state per SIMD lane differs from code for one state."""
         return self.angles_per_sincos > 1

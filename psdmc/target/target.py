@@ -1,5 +1,5 @@
-"""The class Target, which describes the processor for which psdmc generates code. All facts about processors are in
-this folder."""
+"""The class Target, which describes the processor for which psdmc generates code. Only the files in this folder contain
+facts about processors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Builds an emitted package with its own build files and runs its self-test."""
+"""Builds a generated C package with the package's build files, and runs the self-test of the package."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ MARKS = (UNFINISHED, "CMakeCache.txt", "CMakeFiles", "compiled_by")
 
 
 def build_package(directory: str | Path, edited: bool = False, progress: Progress = silent) -> str:
-    """Build the package in the folder `build` of `directory`, run its self-test, and return the output of the tools.
+    """Build the package in the folder `build` of `directory`, run the self-test of the package, and return the output
+    of the tools.
 
-    edited    True: build although files are missing or differ from what emit-c wrote
+    edited    True: build although files are missing or differ from what the command `emit-c` wrote
     progress  function that psdmc calls with the number of compiled files and their share
 
     The build uses CMake if it is installed, else make. Raises InputError if the folder holds no package, or an edited

@@ -168,7 +168,7 @@ LARGEST_SEAL = 1 << 20
 
 
 def seal(folder: Path) -> None:
-    """Write a list of all files of an entry with their digests, and let only this user write them."""
+    """Write a list of all files of a cache entry with their digests. Make the entry writable for this user only."""
     files: dict[str, str] = {}
     size = 0
     for path in sorted(folder.rglob("*")):
@@ -184,7 +184,7 @@ def seal(folder: Path) -> None:
 
 
 def is_sound(folder: Path) -> bool:
-    """Return whether an entry is complete, unaltered and writable by this user alone, and thus safe to load."""
+    """Return whether a cache entry is complete, unaltered and writable by this user alone, and thus safe to load."""
     try:
         if not _is_own(folder, stat.S_ISDIR):
             return False
@@ -198,14 +198,14 @@ def is_sound(folder: Path) -> bool:
 
 
 def touch(folder: Path) -> None:
-    """Record that an entry was used now. The function does nothing if the cache cannot be written."""
+    """Record that a cache entry was used now. The function does nothing if the cache cannot be written."""
     with contextlib.suppress(OSError):
         os.utime(folder / SEAL)
 
 
 def used_and_size(folder: Path) -> tuple[float, int]:
-    """Return when an entry was last used (s since 1970) and its size in bytes. For an incomplete entry, return when it
-    was made."""
+    """Return when a cache entry was last used (s since 1970), and the entry's size in bytes. For an incomplete entry,
+    return the time when it was made."""
     try:
         content, used = _seal_of(folder)
         return used, int(content["bytes"])
@@ -292,8 +292,8 @@ def cache_limit() -> int:
 
 
 def open_cache() -> Path:
-    """Return the cache folder, and make it if it is missing. Raises ToolchainError if it cannot be made, or if other
-    users could write into it."""
+    """Return the cache folder, and make the folder if it is missing. Raises ToolchainError if the folder cannot be
+    made, or if other users could write into it."""
     place = cache_directory()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)

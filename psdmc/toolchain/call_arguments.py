@@ -151,7 +151,7 @@ def _refuse_no_numbers(what: str, array: Array) -> None:
 
 
 def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike) -> Array:
-    """Return theta_b as an array (l,). Raises InputError if it has another shape."""
+    """Return theta_b as an array (l,). Raises InputError if theta_b has another shape."""
     array = np.ascontiguousarray(real_array(f"{function.name}: theta_b", theta_b, dtype, ("l",)))
     if array.shape != (l,):
         raise InputError(

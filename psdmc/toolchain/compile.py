@@ -159,7 +159,7 @@ def sources_digests() -> tuple[str, ...]:
 
 
 def digest(places: Iterable[Traversable]) -> str:
-    """Return the SHA-256 of the names and contents of these files, and of all files in these folders and their
+    """Return a SHA-256 digest of the names and contents of these files, and of all files in these folders and their
     subfolders."""
     found = hashlib.sha256()
     for name, content in _files("", places):

@@ -363,8 +363,8 @@ class CompiledFunctions(RobotFacts):
         return (kernels[function] if function in kernels else kernels[f"{function}_theta"]).tails
 
     def call_at(self, kernel: str, count: int, addresses: Sequence[int]) -> None:
-        """Compute `count` states from memory addresses of contiguous rows: those of the inputs, then theta_b, then the
-        outputs.
+        """Compute `count` states from memory addresses of the arrays: those of the inputs, then theta_b, then the
+        outputs. An array has the states in contiguous rows.
 
         Nothing is checked. If a matrix is not positive definite, the results of that state are NaN.
         """

@@ -44,7 +44,7 @@ class Compiler:
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """The properties of the compiler that a library depends on, for cache keys."""
+        """Return the properties of the compiler on which a compiled library depends. They are part of cache keys."""
         return (*self.command, self.version, self.target, *self.flags)
 
 

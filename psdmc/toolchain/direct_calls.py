@@ -1,8 +1,8 @@
 """The extension module that calls compiled functions from Python with little overhead. It is compiled once on each
 machine.
 
-It needs Python's C headers. If it cannot be compiled or loaded, calls go through cffi and take some microseconds
-longer. The results are the same, bit for bit.
+The module needs Python's C headers. If the module cannot be compiled or loaded, calls go through cffi and take some
+microseconds longer. The results are the same, bit for bit.
 """
 
 from __future__ import annotations

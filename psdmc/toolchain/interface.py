@@ -175,7 +175,7 @@ class Origin:
 
     again    importable function that returns the robot
     request  its argument, which can be pickled
-    key      text that is the same for equal robots
+    key      text that is equal for equal robots
     """
 
     again: Callable[[Any], Any]

@@ -55,8 +55,8 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 
 def documentation(function: Signature) -> str:
-    """Return a method's docstring: what it computes, its arguments and results, when results are NaN, and the lengths
-    of axes."""
+    """Return the docstring of the method for a generated function: what it computes, arguments and results, when
+    results are NaN, and the lengths of axes."""
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [

@@ -1,5 +1,5 @@
-"""Finds the robot with which a model is compared: the source that it was derived from, with parameters that both can
-have."""
+"""Finds the robot with which a model is compared: the robot file from which the model was derived. Chooses parameters
+that both the model and this robot can have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A pass of the code generator: it takes common factors out of sums, and leaves out terms that cancel."""
+"""A pass of the code generator: it takes common factors out of sums, and leaves out terms that are both added and
+subtracted."""
 
 from __future__ import annotations
 

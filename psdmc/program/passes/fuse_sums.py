@@ -1,5 +1,5 @@
-"""A pass of the code generator: it nests sums so that their results are ready early. The term that is ready last is
-added last, and products are added by fused multiply-add."""
+"""A pass of the code generator: it changes the order of additions in sums so that results are ready early. The term
+that is ready last is added last, and products are added by fused multiply-add."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""A pass of the code generator: it orders instructions so that few values are alive (computed and still needed) at a
-time."""
+"""A pass of the code generator: it orders the instructions of a PROGRAM (list of operations to generate). In the new
+order, few values are alive (computed and still needed) at a time."""
 
 from __future__ import annotations
 

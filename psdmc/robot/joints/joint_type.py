@@ -1,4 +1,4 @@
-"""The class JointType, which describes how a joint moves. All stages of psdmc use its properties.
+"""The class JointType, which describes how a joint moves. All stages of psdmc use the properties of this class.
 
 To add a joint type, add a file to this folder and a line to the table of types (__init__.py). Code outside this folder
 does not distinguish joint types.
@@ -131,7 +131,7 @@ class JointType:
         return Placement(rotation, np.array([0.0, 0.0, 0.0 if way is None else way]))
 
     def restored(self, q: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """Return the nearest valid coordinates: quaternions, and pairs of cosine and sine, get length one."""
+        """Return the valid coordinates nearest to q: quaternions, and pairs of cosine and sine, get length one."""
         part = self.unit
         return (*q[: part.start], *unit(q[part]), *q[part.stop :]) if part.stop else tuple(q)
 
@@ -141,8 +141,8 @@ class JointType:
         return np.stack(self.restored(list(q)))
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """Return the nq coordinates after one second at the nv constant rates `step`. Quaternions in the result have
-        length one."""
+        """Return the nq coordinates after a motion of one second at the nv constant rates `step`. Quaternions in the
+        result have length one."""
         return tuple(here + way for here, way in zip(q, step, strict=True))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -190,12 +190,12 @@ class JointType:
 
     @property
     def has_length(self) -> bool:
-        """Whether the type itself contains a length in m, such as the pitch of a screw."""
+        """Return whether the joint type itself contains a length in m, such as the pitch of a screw."""
         return any(any(linear) and any(angular) for linear, angular in self.twists)
 
     @property
     def comes_round(self) -> bool:
-        """Whether q and q plus a full turn are the same position."""
+        """Return whether q and q plus a full turn are the same position, as for a revolute joint."""
         return self.basis.has_sincos and not any(power for power, _, _ in self.basis.exponents)
 
     @property

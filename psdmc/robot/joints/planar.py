@@ -1,4 +1,4 @@
-"""The planar joint, which moves in its xy plane and turns about its z axis."""
+"""The planar joint, which moves in the xy plane and turns about the z axis of the joint frame."""
 
 from __future__ import annotations
 

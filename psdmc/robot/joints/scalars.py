@@ -1,7 +1,8 @@
-"""Sine, cosine, square root and sign for floats, arrays and symbols. The maps of joint coordinates consist of them.
+"""Sine, cosine, square root and sign for floats, arrays and symbols (which record code). The functions of joint
+coordinates, such as those of quaternions, consist of these operations.
 
-A PROGRAM (list of operations) has no branches, so these functions do not test whether an angle is small. To avoid 0/0
-they add a number to numerator and denominator that is too small to change any other result.
+A PROGRAM (list of operations) has no branches, so these functions do not test whether an angle is small. To avoid 0/0,
+the functions add a number to numerator and denominator that is too small to change any other result.
 """
 
 from __future__ import annotations
