@@ -59,7 +59,7 @@ def _up_to(file: BinaryIO, count: int) -> bytes:
 
 
 def in_words(size: int) -> str:
-    """Return a size in bytes as text for people, such as '64 MiB'."""
+    """Return a size in bytes as a text for messages, such as '64 MiB'."""
     for unit, bits in (("GiB", 30), ("MiB", 20), ("KiB", 10)):
         if size >= 1 << bits and size % (1 << bits) == 0:
             return f"{size >> bits} {unit}"

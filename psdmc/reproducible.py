@@ -152,37 +152,37 @@ def sine(angle: Any) -> Any:
 
 
 def cosine(angle: Any) -> Any:
-    """Return cos of a float or an array in rad, computed like `sine`."""
+    """Return the cosine of a float or an array in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.cos, angle)
 
 
 def arcsine(value: Any) -> Any:
-    """Return asin of a float or an array, in rad, computed like `sine`."""
+    """Return the arcsine of a float or an array, in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.arcsin, value)
 
 
 def angle_of(y: Any, x: Any) -> Any:
-    """Return atan2(y, x) of floats or arrays, in rad, computed like `sine`."""
+    """Return the angle atan2(y, x) of floats or arrays, in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.arctan2, y, x)
 
 
 def exponential(value: Any) -> Any:
-    """Return exp of a float or an array, computed like `sine`."""
+    """Return the exponential of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.exp, value)
 
 
 def hyperbolic_tangent(value: Any) -> Any:
-    """Return tanh of a float or an array, computed like `sine`."""
+    """Return the hyperbolic tangent of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.tanh, value)
 
 
 def logarithm(value: Any) -> Any:
-    """Return the natural logarithm of a float or an array, computed like `sine`."""
+    """Return the natural logarithm of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.log, value)
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Return base^exponent of floats or arrays, computed like `sine`."""
+    """Return base^exponent of floats or arrays, with equal digits on all processors (see `sine`)."""
     return _rounded(np.power, base, exponent)
 
 

@@ -65,8 +65,8 @@ class Instr(NamedTuple):
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:
-    """Return Instr(op, args) in a third of the time. Speed matters because passes make some hundred thousand
-    instructions."""
+    """Return an instruction with this operation and these arguments, three times as fast as Instr(op, args). Speed
+    matters because passes make some hundred thousand instructions."""
     return tuple.__new__(Instr, (op, args, None, None))
 
 

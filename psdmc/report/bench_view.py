@@ -89,7 +89,7 @@ def _headline(case: CaseResult) -> Headline:
 
 
 def function_tables(case: CaseResult) -> tuple[FunctionTable, ...]:
-    """Return a table for each function that was measured on a robot."""
+    """Return a table of times for each function that was measured on a robot."""
     functions = dict.fromkeys(m.function for m in case.measurements)
     return tuple(FunctionTable(FUNCTION_TITLES[f], tuple(_rows(case, f))) for f in functions)
 
@@ -177,7 +177,8 @@ class PublishedRow:
 
 
 def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
-    """Return inverse and forward dynamics in ns for the robots whose times the authors published."""
+    """Return rows with the times of inverse and forward dynamics in ns, for the robots whose times the method's authors
+    published."""
     rows = []
     for case in result.cases:
         theirs = PUBLISHED.get(case.name)
@@ -248,7 +249,8 @@ class ThreadRow:
 
 
 def thread_rows(result: BenchResult) -> tuple[ThreadRow, ...]:
-    """Return the times in ns per state by number of threads, and how many times faster the most threads are than one."""
+    """Return rows with the times in ns per state by number of threads. A row says how many times faster the most
+    threads are than one thread."""
     rows = []
     for case in result.cases:
         for function, layout in dict.fromkeys((t.function, t.layout) for t in case.threads):

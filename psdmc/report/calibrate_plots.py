@@ -104,7 +104,7 @@ def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Seq
 
 
 def limit_lines(limits: Sequence[Limits]) -> tuple[list[tuple[float, float]], ...]:
-    """Return (lowest, highest) position, speed and acceleration of each joint."""
+    """Return the limits of each joint for drawing: (lowest, highest) position, speed and acceleration."""
     positions = [(each.lower, each.upper) for each in limits]
     speeds = [(-each.speed, each.speed) for each in limits]
     return positions, speeds, [(-each.acceleration, each.acceleration) for each in limits]

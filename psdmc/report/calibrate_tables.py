@@ -1,4 +1,4 @@
-"""The tables of a calibration's report as HTML text, with every cell escaped."""
+"""Makes the tables of a calibration's report as HTML text, with every cell escaped."""
 
 from __future__ import annotations
 

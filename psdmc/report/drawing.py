@@ -1,6 +1,6 @@
-"""Draw pictures as inline SVG with Matplotlib. Matplotlib is loaded for the first picture only, as this takes half a
-second and writes to the home folder. Pictures load nothing from the network, keep text as text, and use the page's
-colours."""
+"""Draws pictures as SVG elements with Matplotlib. Matplotlib is loaded for the first picture only, because loading
+takes half a second and writes to the home folder. Pictures load nothing from the network, keep text as text, and use
+the page's colours."""
 
 from __future__ import annotations
 

@@ -108,7 +108,8 @@ def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQua
 
 
 def draw_parameters(figure: Figure, known: Calibrated) -> None:
-    """Draw the base parameters with intervals, one axis per unit. Open circles are the values of the robot file."""
+    """Draw the calibrated base parameters with confidence intervals, with one axis for each unit. Open circles are the
+    values of the robot file."""
     units = list(dict.fromkeys(row.unit for row in known.parameters))
     groups = [[row for row in known.parameters if row.unit == unit] for unit in units]
     axes = figure.subplots(len(units), 1, squeeze=False, height_ratios=[len(rows) + 2 for rows in groups])
@@ -304,7 +305,7 @@ UNIT = re.compile(r"[A-Za-z0-9.^/ ]+")
 
 
 def unit(text: str) -> str:
-    """Convert a unit from psdmc's notation to siunitx's."""
+    """Return a unit in the notation of the LaTeX package siunitx, from psdmc's notation."""
     if not text or text == "-":
         return ""
     if not UNIT.fullmatch(text):

@@ -1,4 +1,4 @@
-"""Draw a robot on an HTML page in 3D: links, axes, frames, bodies of the file and of a calibration, and the motion of
+"""Draws a robot on an HTML page in 3D: links, axes, frames, bodies of the file and of a calibration, and the motion of
 logs."""
 
 from __future__ import annotations
@@ -281,7 +281,8 @@ def page(view: Viewed, script: str) -> str:
 
 
 def embedded(value: Any) -> str:
-    """Return JSON for an HTML <script> element, in which no text can end the element."""
+    """Return a value as JSON text for an HTML <script> element. Characters are escaped so that no text in the value can
+    end the element."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

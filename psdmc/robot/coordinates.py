@@ -85,11 +85,11 @@ class Following:
         )
 
     def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the positions (..., n) of all joints, mimic joints included, from q (..., nq)."""
+        """Return the positions (..., n) of all n joints, mimic joints included, from the robot's q (..., nq)."""
         return np.asarray(times(q, self.shares.T) + self.offsets)
 
     def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the rates (..., n) of all joints, mimic joints included, from qd (..., nv)."""
+        """Return the rates (..., n) of all n joints, mimic joints included, from the robot's qd (..., nv)."""
         return np.asarray(times(qd, self.ratios.T))
 
     def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:

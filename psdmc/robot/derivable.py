@@ -21,7 +21,7 @@ def require_derivable(chain: Mechanism) -> None:
 
 
 def require_axes(chain: Mechanism, what: str) -> None:
-    """Raise InputError if a joint has several coordinates.
+    """Raise InputError if a joint of the robot has several coordinates, such as a ball joint.
 
     what  name of the operation that needs joints with one coordinate, such as "calibration"
     """

@@ -27,10 +27,10 @@ from psdmc.robot.zeros import COM_NAMES, canonical
 
 
 def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames: Sequence[str] = ()) -> Draft:
-    """Return the robot in a DH file.
+    """Return the robot that a DH file describes.
 
-    gravity  (3,) m/s^2, replaces the gravity in the file; None: that of the file
-    snap     rad; an angle that differs by at most this much from a right angle becomes exact
+    gravity  (3,) m/s^2, gravity that replaces that of the file; None: that of the file
+    snap     rad; angles that differ by at most this much from a right angle become exact
     """
     robot = read_dh(text, source)
     joints, snaps = _placed_joints(robot, snap)

@@ -1,4 +1,4 @@
-"""The result of reading a robot file, before psdmc applies assumptions such as assume_zero."""
+"""The data that reading a robot file gives, before psdmc applies assumptions such as assume_zero."""
 
 from __future__ import annotations
 

@@ -100,8 +100,8 @@ def _refuse_size(size: int, source: str) -> None:
 
 
 def robot_text(file: Path) -> str:
-    """Return the text of a file. Raises InputError if the file cannot be read, is no text, or is too large for a robot
-    file."""
+    """Return the text of a robot file. Raises InputError if the file cannot be read, is no text, or is too large for a
+    robot file."""
     try:
         data = read_file(file, limits.MAX_BYTES, "give a URDF or a DH .toml file")
         if data.startswith(PACKED):

@@ -76,7 +76,7 @@ class LoadOptions:
 
 
 def checked_options(**given: Any) -> LoadOptions:
-    """Return the options as LoadOptions after checking each. Raises InputError for the first wrong option."""
+    """Return the options as LoadOptions after a check of every value. Raises InputError for the first wrong option."""
     options = LoadOptions(
         **{name: CHECKS[name](value) if name in CHECKS else value for name, value in given.items()}
     )

@@ -239,7 +239,8 @@ class Mechanism:
 
     @property
     def base_frame(self) -> str:
-        """Return the name, in words, of the frame in which gravity and placements are given."""
+        """Return the name of the frame in which gravity and placements are given: base frame, or world frame if the
+        base floats."""
         return "world frame" if self.has_free_root else BASE_FRAME
 
     @property
@@ -257,7 +258,7 @@ class Mechanism:
         return self.base_name if parent == BASE else self.joints[parent].link_name
 
     def path_to(self, body: int) -> tuple[int, ...]:
-        """Return the bodies on the path from the base to this body, which comes last."""
+        """Return the bodies on the path from the base to a body. The last entry is this body itself."""
         path: list[int] = []
         while body != BASE:
             path.append(body)

@@ -1,5 +1,5 @@
-"""Finds elements of an MJCF file that change how the tree moves: mimic joints, and elements that psdmc rejects by
-name."""
+"""Finds elements of an MJCF file that change how the robot moves: mimic joints, which follow other joints, and elements
+that psdmc rejects by name."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
 
 
 def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """Raise InputError with the names of joints whose reference position is not one where sine and cosine are exact."""
+    """Raise InputError with the names of joints whose reference position is outside the accepted range. At larger
+    angles, sine and cosine lose digits."""
     ranges = {int(mujoco.mjtJoint.mjJNT_HINGE): ANGLE, int(mujoco.mjtJoint.mjJNT_SLIDE): LENGTH}
     found = []
     for j in range(model.njnt):

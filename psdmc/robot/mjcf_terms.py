@@ -28,7 +28,8 @@ def armatures(mujoco: Any, model: Any) -> Array:
 
 
 def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
-    """Return the actuators with armature that do not act on a joint but, for example, on a tendon."""
+    """Return the actuators that have an armature (rotor inertia) but do not act on a joint; for example, they act on a
+    tendon."""
     return [k for k in _with_armature(model) if model.actuator_trntype[k] not in _joint_transmissions(mujoco)]
 
 
@@ -69,7 +70,8 @@ def is_active(mujoco: Any, model: Any, equality: int) -> bool:
 
 
 def gravity(mujoco: Any, model: Any) -> tuple[float, float, float]:
-    """Return gravity in m/s^2 along the world's axes. It is zero if the file switches gravity off."""
+    """Return the acceleration of gravity in m/s^2 along the world's axes. It is zero if the file switches gravity
+    off."""
     if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return 0.0, 0.0, 0.0
     x, y, z = model.opt.gravity.tolist()

@@ -56,8 +56,8 @@ def mujoco_version() -> str:
 
 
 def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return the torques (k, nv), N m (N), that MuJoCo computes from the robot's file at q (k, nq), qd and qdd (k,
-    nv).
+    """Return the torques (k, nv), N m (N), that MuJoCo computes from the robot's file. They are for k states q (k, nq),
+    qd and qdd (k, nv).
 
     Raises NotCompared if MuJoCo is not installed, or does not read this file.
     """

@@ -53,7 +53,8 @@ class Reference:
 
     @property
     def joint_types(self) -> list[JointType]:
-        """The types of the joints in Pinocchio's order. All joints with one coordinate count as revolute."""
+        """Return the types of the joints in the order of Pinocchio's model. All joints with one coordinate count as
+        revolute."""
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
@@ -64,7 +65,7 @@ class Reference:
         return self.each(pinocchio.aba, q, qd, tau)
 
     def mass_matrix(self, q: Array) -> Array:
-        """Return the mass matrices (..., n, n), with both triangles."""
+        """Return the mass matrices (..., n, n) at positions q, with both triangles."""
         upper = np.triu(self.each(pinocchio.crba, q))
         return upper + np.swapaxes(np.triu(upper, 1), -1, -2)
 
@@ -79,7 +80,8 @@ class Reference:
         return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
     def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """Return the derivatives of the torques by q, qd and qdd, (..., n, n) each. Row i belongs to tau[i]."""
+        """Return the derivatives of the joint torques by q, qd and qdd, an array (..., n, n) each. Row i belongs to
+        tau[i]."""
 
         def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
@@ -91,8 +93,8 @@ class Reference:
     def forward_dynamics_derivatives(
         self, q: Array, qd: Array, tau: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the accelerations (..., n) and their derivatives by q, qd and tau, (..., n, n) each. Row i belongs to
-        qdd[i]."""
+        """Return the joint accelerations (..., n), and their derivatives by q, qd and tau, an array (..., n, n) each.
+        Row i belongs to qdd[i]."""
 
         def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
@@ -142,7 +144,8 @@ class Reference:
         return self.each(unit, q)
 
     def jacobian(self, q: Array) -> Array:
-        """Return the Jacobian (..., 6, n) of the tip frame: linear, then angular, along the axes of the base frame."""
+        """Return the Jacobian (..., 6, n) of the tip frame along the axes of the base frame: three linear rows, then
+        three angular rows."""
         frame = self.model.getFrameId(self.tip_name)
         aligned = pinocchio.LOCAL_WORLD_ALIGNED
 
@@ -174,8 +177,8 @@ class Reference:
 
     @property
     def path_length(self) -> float:
-        """Return the length in m of the longest path from the base to an end of the tree, such as the tip, at the
-        neutral position. The path goes through all frames, including those of fixed joints."""
+        """Return the length in m of the longest path from the base to an end of the tree, at the neutral position. The
+        path goes through all frames, including those of fixed joints."""
         model, data = self.model, self.model.createData()
         pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
         parents = list(model.parents)

@@ -1,8 +1,9 @@
 """Builds Pinocchio's model of a robot from the robot's own file. psdmc compares its results with this model.
 
 The model shares as little code as possible with psdmc's own reader. Pinocchio reads a URDF, merges its links and locks
-its joints; `dh_model` reads a DH table. Only the names of joints, links, base and tip come from psdmc's mechanism. For
-a robot with snapped rotations, the placements of the joints also come from the mechanism, because the file does not
+its joints; `dh_model` reads a DH table. Only the names of joints, links, base and tip come from psdmc's mechanism.
+
+For a robot with snapped rotations, the placements of the joints also come from the mechanism, because the file does not
 have them.
 
 The model has one coordinate per joint (a continuous joint is an angle) and the joints in the order of the mechanism.
@@ -171,9 +172,10 @@ MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelP
 
 
 def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
-    """Return Pinocchio's model of a DH table that read_dh has accepted. Its links are called link1, link2 and so on.
+    """Return Pinocchio's model of a DH table that read_dh has accepted. The links of the model are called link1, link2
+    and so on. A body with unknown numbers gets zeros.
 
-    gravity   m/s^2 in the base frame, replaces that of the table; bodies with unknown numbers are zero
+    gravity   m/s^2 in the base frame, replaces that of the table
     """
     table = tomllib.loads(text)
     is_modified = table.get("convention", "standard") == "modified"

@@ -144,7 +144,8 @@ def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
 
 
 def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
-    """Return the joints from link `start` down to link `end`, or None if `end` is not below `start`."""
+    """Return the joints on the path from link `start` outward to link `end`. Return None if `end` is not beyond
+    `start`."""
     above = {joint.child: joint for joint in robot.joints}
     path: list[UrdfJoint] = []
     link = end

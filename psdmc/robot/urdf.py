@@ -1,4 +1,4 @@
-"""Reads a URDF into plain data and checks every number, before a chain is selected."""
+"""Reads a URDF into plain data and checks every number. The joints of the robot are selected later (tree.py)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ normalized."""
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The placement of a frame in another one: xyz (m), and either rpy (rad) or a unit quaternion (x, y, z, w)."""
+    """The placement of a frame in another one, as in a URDF: xyz (m), and either rpy (rad) or a unit quaternion (x, y,
+    z, w)."""
 
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)
@@ -311,7 +312,7 @@ Ends = tuple[str, str, str]
 
 
 def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
-    """Return the reasons why the links do not form one tree, one sentence each."""
+    """Return the reasons why the links of a URDF do not form one tree, one sentence for each."""
     known = dict.fromkeys(links)
     faults = []
     parents: dict[str, list[str]] = {}

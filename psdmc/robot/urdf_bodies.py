@@ -61,7 +61,7 @@ def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, 
 
 
 def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
-    """Return the standard parameters (10,) of a link's inertia about a frame in which the link has the placement
+    """Return the standard parameters (10,) of a link about another frame, in which the link has the placement
     `place`."""
     if body is None:
         return np.zeros(10)
@@ -134,7 +134,7 @@ def _listed(values: Array) -> str:
 
 
 def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:
-    """Return the named frame 'tool', given by x y z (m), roll pitch yaw (rad) in the tip frame."""
+    """Return the named frame 'tool', placed in the tip frame by x y z (m) and roll pitch yaw (rad)."""
     # Turns are about fixed axes x, y, z in turn, as in URDF.
     x, y, z, roll, pitch, yaw = tool
     return NamedFrame(

@@ -1,4 +1,5 @@
-"""Makes a robot from a URDF: places the joints and merges the inertias by the numbers of the file."""
+"""Makes a robot from a URDF: places the joints and merges the inertias of links that move together, by the numbers of
+the file."""
 
 from __future__ import annotations
 

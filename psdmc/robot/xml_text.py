@@ -89,7 +89,7 @@ def _without_space(root: Element) -> Element:
 
 
 def only(parent: Element, tag: str) -> Element | None:
-    """Return the child element with this name, or None. Raises ValueError if there are several."""
+    """Return the child element with this name, or None if there is none. Raises ValueError if there are several."""
     found = parent.findall(tag)
     if len(found) > 1:
         raise ValueError(f"{len(found)} <{tag}> elements, expected one")
@@ -99,8 +99,8 @@ def only(parent: Element, tag: str) -> Element | None:
 def numbers(
     element: Element | None, attribute: str, default: tuple[float, ...], accepted: Range
 ) -> tuple[float, ...]:
-    """Return as many numbers from an attribute as `default` has. Raises ValueError with the text found if one is out
-    of range."""
+    """Return the numbers that an XML attribute lists, as many as `default` has. Raises ValueError, with the text found,
+    if a number is out of range."""
     text = None if element is None else element.get(attribute)
     if element is None or text is None:
         return default

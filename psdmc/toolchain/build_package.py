@@ -127,7 +127,7 @@ def _self_test(words: list[str], root: Path) -> str:
 
 
 def checks_of(report: str) -> str:
-    """Return the summary of the self-test, such as '39 checks of 15 functions'."""
+    """Return the summary of a package's self-test, such as '39 checks of 15 functions'."""
     found = re.findall(r": (\d+ checks of \d+ functions), 0 failed", report)
     return found[-1] if found else "nothing to check"
 

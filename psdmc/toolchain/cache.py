@@ -37,7 +37,8 @@ from psdmc.toolchain.cache_room import (
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
-    """Return the key of an entry: a hex digest of file names, texts and everything else that the binary depends on."""
+    """Return the key of a cache entry: a hex digest of file names, texts and everything else on which the library
+    depends."""
     platform = (sys.platform, sysconfig.get_platform(), str(sysconfig.get_config_var("SOABI")))
     digest = hashlib.sha256()
     for part in (*platform, *parts, *(item for path in sorted(files) for item in (path, files[path]))):

@@ -1,5 +1,5 @@
-"""Limits the size of the compile cache: removes leftovers of killed builds and the entries that were not used for
-longest."""
+"""Limits the size of the compile cache. Leftovers of killed builds are removed first, then the entries that were not
+used for longest."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def make_room(place: Path, keep: Path, limit: int) -> None:
 
 
 def sweep(place: Path) -> None:
-    """Remove the build folders of processes that have ended."""
+    """Remove the build folders, in the compile cache, of processes that have ended."""
     with contextlib.suppress(OSError):
         for name in sorted(os.listdir(place)):
             if _PASSING.fullmatch(name):
@@ -115,8 +115,8 @@ def _opened(folder: Path) -> int:
 
 
 def remove(entry: Path) -> None:
-    """Remove a cache entry. It is first renamed, so that no other process finds an incomplete entry. An entry that
-    another process has just removed is ignored."""
+    """Remove a cache entry. The entry is first renamed, so that no other process finds an incomplete entry. An entry
+    that another process has just removed is ignored."""
     gone = entry.parent / f".gone-{secrets.token_hex(8)}"
     try:
         entry.rename(gone)
@@ -331,7 +331,7 @@ def _is_ours(status: os.stat_result) -> bool:
 
 
 def unusable(place: Path, error: OSError) -> ToolchainError:
-    """Return the error for a cache folder that cannot be written."""
+    """Return the exception to raise for a cache folder that cannot be written."""
     return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _choose())
 
 

@@ -80,7 +80,7 @@ class RobotFacts:
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
-        """Return the number of base parameters, the length of theta_b."""
+        """Return the number of base parameters, which is the length of theta_b."""
         return self._interface.l
 
     @property
@@ -185,9 +185,11 @@ Array = NDArray[Any]
 
 
 class CompiledFunctions(RobotFacts):
-    """Calls the library of a compiled package by the signature of each function.
+    """Calls the C functions of a compiled package with NumPy arrays. The signature of a function says which inputs and
+    outputs it has.
 
-    more    function that compiles a generated function, by name, that the package does not have; None: such a call fails
+    more    function that compiles a generated function, by name, that the package does not have; None: such a call
+            fails
     origin  the request from which another process builds the same robot; None: the robot cannot be pickled
     """
 

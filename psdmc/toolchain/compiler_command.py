@@ -141,7 +141,8 @@ def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
-    """Return the standard output of a program. Raises ToolchainError with a line of its error output if it fails."""
+    """Run a program and return the standard output. Raises ToolchainError with a line of the error output if the
+    program fails."""
     done = attempt(words, what, cwd)
     if done.returncode != 0:
         raise failure(words, what, done)

@@ -122,7 +122,7 @@ def stub(functions: Iterable[Signature]) -> str:
 
 
 def result_name(function: Signature) -> str:
-    """Return the name of the named tuple that a function with several outputs returns."""
+    """Return the name of the named tuple that the method of a function with several outputs returns."""
     return "".join(word.capitalize() for word in function.name.split("_"))
 
 

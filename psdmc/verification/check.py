@@ -244,7 +244,7 @@ def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Arr
 
 
 def gravity_error(found: Array, expected: Array) -> float:
-    """Return the distance between two vectors (3,), relative to the length of the larger one."""
+    """Return the distance between two gravity vectors (3,), divided by the length of the larger one."""
     size = max(float(np.linalg.norm(found)), float(np.linalg.norm(expected)), np.finfo(float).tiny)
     return float(np.linalg.norm(found - expected)) / size
 

@@ -37,7 +37,7 @@ class Basis:
 
     @property
     def has_sincos(self) -> bool:
-        """Whether the sine or cosine of the coordinate occurs in the basis."""
+        """Return whether the sine or cosine of the coordinate occurs in the basis."""
         return any(sine or cosine for _, sine, cosine in self.exponents)
 
 

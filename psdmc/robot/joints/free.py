@@ -54,7 +54,7 @@ class Free(WideJoint):
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return q after one second at constant rates: velocity v and angular velocity w.
 
-        Let t be the angle of w. Along the axes of the moved frame at the start, the origin moves by v + (1 - cos t) /
+        Let t be the angle of w. The origin moves, along the axes of the moved frame at the start, by v + (1 - cos t) /
         t^2 w x v + (t - sin t) / t^3 w x (w x v).
         """
         linear, angles, here = step[:3], step[3:], unit(q[3:])

@@ -146,7 +146,8 @@ class JointType:
         return tuple(here + way for here, way in zip(q, step, strict=True))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """Return the nv constant rates that bring a joint from q to `other` in one second, by the shortest rotation."""
+        """Return the nv constant rates that bring a joint from q to `other` in one second. A rotation is at most half a
+        turn."""
         return tuple(there - here for here, there in zip(q, other, strict=True))
 
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:

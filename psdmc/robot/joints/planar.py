@@ -49,7 +49,7 @@ class Planar(WideJoint):
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return q after one second at constant rates.
 
-        The origin moves on a circular arc. Its displacement is the linear velocity times sin(h)/h, rotated by h, where
+        The origin moves on a circular arc. The displacement is the linear velocity times sin(h)/h, rotated by h, where
         h is half of the angle of rotation.
         """
         (x, y, *pair), (vx, vy, angle) = q, step

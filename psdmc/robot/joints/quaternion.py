@@ -1,4 +1,5 @@
-"""Operations on unit quaternions (x, y, z, w) of joints, for floats, arrays and symbols."""
+"""Operations on unit quaternions (x, y, z, w), which are coordinates of joints. They work on floats, arrays and symbols
+(which record code)."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ ARCSINE = tuple(math.comb(2 * k, k) / (4**k * (2 * k + 1)) for k in range(12))
 
 
 def rotation_of(quaternion: Sequence[Scalar]) -> Rows:
-    """Return the rows of the rotation matrix of a quaternion. The quaternion must have length one."""
+    """Return the rotation matrix, as three rows, of a quaternion (x, y, z, w). The quaternion must have length one."""
     x, y, z, w = quaternion
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz, xy, xz, yz = x2 * x, y2 * y, z2 * z, y2 * x, z2 * x, z2 * y
@@ -98,7 +99,8 @@ def turning(quaternion: Sequence[Scalar], moved: Sequence[Scalar]) -> Vector:
 
 
 def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
-    """Return the quaternion product a b: the rotation a, then the rotation b about the axes that a has rotated."""
+    """Return the product a b of two quaternions. It is the rotation a, followed by the rotation b about the axes that a
+    has rotated."""
     (x, y, z, w), (i, j, k, r) = a, b
     return (
         w * i + x * r + (y * k - z * j),

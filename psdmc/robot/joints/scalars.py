@@ -29,7 +29,7 @@ FAINTER = 1e-54
 
 
 def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
-    """Return (sin, cos) of an angle in rad, a float, an array or a symbol."""
+    """Return (sin, cos) of an angle in rad. The angle is a float, an array or a symbol (which records code)."""
     if hasattr(angle, "sincos"):
         s, c = angle.sincos()
         return s, c
@@ -37,12 +37,12 @@ def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def root(value: Scalar) -> Scalar:
-    """Return the square root of a float, an array or a symbol."""
+    """Return the square root of a float, an array or a symbol (which records code)."""
     return value.root() if hasattr(value, "root") else np.sqrt(value)
 
 
 def sign(value: Scalar) -> Scalar:
-    """Return 1 for a positive value or zero, and -1 for a negative value, without a branch."""
+    """Return 1 for a positive value or zero, and -1 for a negative value. The code has no branch."""
     moved = value + FAINT
     return moved / root(moved * moved + FAINTER)
 
