@@ -21,13 +21,13 @@ turns; those of parallel neighbours (`compound`) before the first of them turns.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, about_z, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, about_z, inward, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -40,7 +40,9 @@ from psdmc.dynamics.moving_composite import (
     driven_freely,
     handed_composite,
     moved_to,
+    relieved,
 )
+from psdmc.dynamics.newton_euler import NO_WRENCHES
 from psdmc.dynamics.own_axes import (
     accelerating,
     axis_along,
@@ -85,26 +87,20 @@ def inverse_dynamics_derivatives(
     qdd: Sequence[Scalar],
     base_acceleration: Vector,
     choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> Derivatives:
-    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`. Those by q of joints of
-    several coordinates are along the tangent: by a small motion along each of their rates, which stay what they are along
-    the moved frame's own axes.
+    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`, external wrenches fixed
+    to their links. Those by q of joints of several coordinates are along the tangent: by a small motion along each of their
+    rates, which stay what they are along the moved frame's own axes.
 
     Exact zeros where neither joint carries the other.
     """
-    n, first = len(frames), first_rates(frames)
-    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
-    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
-    axes: list[Axis] = []
-    steps: list[Step] = []
-    for i in range(n):
-        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
-        axes.append(axis)
-        steps.append(step)
+    axes, steps, composites = swept(frames, bodies, q, qd, qdd, base_acceleration, choices, external)
+    first, qd = first_rates(frames), rates(frames, qd)
     nv = first[-1]
     by_q, by_qd, by_qdd = ([[0.0] * nv for _ in range(nv)] for _ in range(3))
     gravity: list[Scalar] = [0.0] * nv
-    for i, composite in _composites(frames, bodies, q, qd, qdd, forward, choices, steps):
+    for i, composite in composites:
         for k, row in enumerate(torque_rows(frames[i], axes[i], composite), start=first[i]):
             gravity[k] = dot(row.c, axes[i].up)
             _fill_row((i, k), frames, axes, steps, row, qd, by_q, by_qd, by_qdd)
@@ -117,6 +113,28 @@ def inverse_dynamics_derivatives(
     return Derivatives(rows, slopes, mass, tuple(gravity))
 
 
+def swept(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base_acceleration: Vector,
+    choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+) -> tuple[list[Axis], list[Step], list[tuple[int, Composite]]]:
+    """Each joint's axis and its step to its parent, and `_composites`."""
+    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
+    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
+    axes: list[Axis] = []
+    steps: list[Step] = []
+    for i in range(len(frames)):
+        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
+        axes.append(axis)
+        steps.append(step)
+    return axes, steps, _composites(frames, bodies, q, qd, qdd, forward, choices, steps, external)
+
+
 def _composites(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
@@ -126,6 +144,7 @@ def _composites(
     forward: Forward,
     choices: Choices,
     steps: Sequence[Step],
+    external: Mapping[int, Wrench],
 ) -> list[tuple[int, Composite]]:
     """For each joint its number and the composite beyond it, in the joint's orientation about its origin; children
     before parents."""
@@ -143,7 +162,11 @@ def _composites(
             double = (angle + angle).turn() if choices.fold_double_angle else None
             body = spun(body, turn) if double is None else turned(body, turn, double)
             whole = at_rest(spun(body, step.turn) if step.joins else body)
+            if i in external:
+                whole = relieved(whole, *(inward(forward.compound_turns[i], v) for v in external[i]))
         else:
+            if i in external:
+                whole = relieved(whole, *external[i])
             for child in hung[i]:
                 whole = both(whole, child)
             if frame.joint.about_z:

@@ -8,7 +8,8 @@ from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
 from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import forward_kinematics
-from psdmc.dynamics.motion import JointState
+from psdmc.dynamics.motion import JointState, sweep_outward
+from psdmc.dynamics.newton_euler import wrench
 from psdmc.dynamics.regressor import Twist, carried
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform
 from psdmc.dynamics.slices import positions, rates
@@ -47,7 +48,30 @@ def total_momentum(
     """Momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, along and about the frame that the first joint
     frame turns from. Needs the real bodies: others with the same torques have another momentum."""
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
-    states, total = _states(frames, q), (ZERO, ZERO)
+    return _at_base(frames, _states(frames, q), moving)
+
+
+@on_coordinates()
+def total_momentum_rate(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+) -> tuple[Vector, Vector]:
+    """Derivative of `total_momentum` by time: the force (N) and the moment (N m) of everything that acts on the bodies from
+    outside."""
+    forward = sweep_outward(frames, q, qd, None, qdd, ZERO)
+    moving = [wrench(motion, body) for motion, body in zip(forward.motions, bodies, strict=True)]
+    return _at_base(frames, forward.states, moving)
+
+
+def _at_base(
+    frames: Sequence[Frame], states: Sequence[JointState], moving: list[tuple[Vector, Vector]]
+) -> tuple[Vector, Vector]:
+    """The sum of vectors and their moments about each joint frame's origin, along and about the frame that the first joint
+    frame turns from."""
+    total = (ZERO, ZERO)
     for i in reversed(range(len(frames))):
         frame, (linear, angular) = frames[i], moving[i]
         linear = to_previous(frame, inward(states[i].turn, linear))

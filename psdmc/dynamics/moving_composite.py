@@ -54,6 +54,13 @@ def at_rest(body: Body) -> Composite:
     return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
 
 
+def relieved(composite: Composite, force: Vector, moment: Vector) -> Composite:
+    """The composite with a wrench that the world exerts on it, fixed to the link: what motion requires of the joints, less
+    this."""
+    own_force, own_moment = composite.wrench
+    return composite._replace(wrench=(add(own_force, scale(force, -1.0)), add(own_moment, scale(moment, -1.0))))
+
+
 def both(a: Composite, b: Composite) -> Composite:
     """Two composites about one point and relative to one link as one."""
     second = tuple(add(x, y) for x, y in zip(a.momenta.second, b.momenta.second, strict=True))
