@@ -11,7 +11,6 @@ from psdmc.dynamics.energy import first_moment
 from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import AT_BASE, forward_kinematics
-from psdmc.dynamics.momentum import total_momentum_rate
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, scale, transform
 from psdmc.dynamics.slices import first_rates, rates
 from psdmc.dynamics.twist import momentum
@@ -29,27 +28,18 @@ class RateSlopes(NamedTuple):
     by_qdd: Rows
 
 
-def total_mass(bodies: Sequence[Body]) -> Scalar:
-    """kg"""
-    return sum(body.mass for body in bodies)
-
-
-def momentum_rate(
-    frames: Sequence[Frame],
-    bodies: Sequence[Body],
-    q: Sequence[Scalar],
-    qd: Sequence[Scalar],
-    qdd: Sequence[Scalar],
+def about_centre(
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], moved: Wrench
 ) -> Wrench:
-    """Rates of all bodies' linear momentum (N) and of their angular momentum about the centre of mass (N m), along the axes
-    that the first joint frame turns from. The bodies must be the real ones.
+    """A momentum about the origin that the first joint frame turns from, or its rate, about the bodies' centre of mass
+    instead. The bodies must be the real ones."""
+    linear, angular = moved
+    centre = scale(first_moment(frames, bodies, q), 1.0 / _mass(bodies))
+    return linear, add(angular, cross(linear, centre))
 
-    The rate is A qdd + dA/dt qd with the centroidal momentum matrix A, so that rates in the place of qdd, beside qd = 0, give
-    the momentum at these rates. The same holds for the derivatives.
-    """
-    force, moment = total_momentum_rate(frames, bodies, q, qd, qdd)
-    centre = scale(first_moment(frames, bodies, q), 1.0 / total_mass(bodies))
-    return force, add(moment, cross(force, centre))
+
+def _mass(bodies: Sequence[Body]) -> Scalar:
+    return sum(body.mass for body in bodies)
 
 
 def _summed(frames: Sequence[Frame], found: RateSlopes) -> RateSlopes:
@@ -64,10 +54,16 @@ def momentum_rate_slopes(
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
 ) -> RateSlopes:
-    """Derivatives of `momentum_rate`. A joint's motion requires a wrench on the bodies beyond it (derivatives.py); no other
+    """Derivatives of the rate of the bodies' linear momentum, and of that of their angular momentum about the centre of
+    mass, along the axes that the first joint frame turns from. The bodies must be the real ones.
+
+    The rate is A qdd + dA/dt qd with the centroidal momentum matrix A. At qd = 0, with rates in the place of qdd, it is
+    therefore the momentum at these rates, and the derivatives are the momentum's.
+
+    A joint's motion requires a wrench on the bodies beyond it (derivatives.py); no other
     body's momentum changes. By q the centre of mass c moves too, by which c x force changes."""
     axes, steps, composites = swept(frames, bodies, q, qd, qdd, ZERO)
-    share, placed = 1.0 / total_mass(bodies), forward_kinematics(frames, q)
+    share, placed = 1.0 / _mass(bodies), forward_kinematics(frames, q)
     force = centre = ZERO
     for i, composite in composites:
         if frames[i].parent == BASE:
@@ -82,7 +78,9 @@ def momentum_rate_slopes(
         axes_of, origin = AT_BASE if frame.parent == BASE else placed[frame.parent]
         before = axes_of, add(origin, scale(centre, -1.0))
         required = wrenches_of_motions(frame, axes[i], composite, own[i])
-        for k, (by_q, by_qd), twist in zip(range(first[i], first[-1]), required, frame.joint.twists, strict=False):
+        for k, (by_q, by_qd), twist in zip(
+            range(first[i], first[-1]), required, frame.joint.twists, strict=False
+        ):
             wrenches = (by_q, by_qd, momentum(composite.body, twist))
             by_q, by_qd, by_qdd = (_placed(step.to_parent(each), before) for each in wrenches)
             shifted = by_q[0], add(by_q[1], cross(force, scale(by_qdd[0], share)))

@@ -58,7 +58,9 @@ def relieved(composite: Composite, force: Vector, moment: Vector) -> Composite:
     """The composite with a wrench that the world exerts on it, fixed to the link: what motion requires of the joints, less
     this."""
     own_force, own_moment = composite.wrench
-    return composite._replace(wrench=(add(own_force, scale(force, -1.0)), add(own_moment, scale(moment, -1.0))))
+    return composite._replace(
+        wrench=(add(own_force, scale(force, -1.0)), add(own_moment, scale(moment, -1.0)))
+    )
 
 
 def both(a: Composite, b: Composite) -> Composite:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from psdmc.dynamics.arrow import Matrix, any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
@@ -30,15 +31,21 @@ def trace(g: Ingredients) -> Outputs:
     M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd. Both blocks
     are multiplied by M^-1 behind the trace; that by qd comes first, so that its entries need not wait.
     """
-    if any_limbs(g.frames):
-        return _in_limbs(g)
+    return _in_limbs(g) if any_limbs(g.frames) else traced(g, g.inputs["tau"])
+
+
+def traced(
+    g: Ingredients, torques: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> Outputs:
+    """Without limbs, for functions that lead further; `torques` are those of the joints and of external wrenches on the
+    links."""
     at_rest = _torque_derivatives(g, g.still)
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
     bias = [0.5 * inner_product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
-    load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
+    load = [tau - h for tau, h in zip(torques, bias, strict=True)]
     accelerations = solve(factors, load)
-    moving = _torque_derivatives(g, accelerations)
+    moving = _torque_derivatives(g, accelerations, external)
     by_tau = inverse(factors)
     return {
         "dtau_dqd": list(zip(*at_rest.by_qd, strict=True)),
@@ -99,10 +106,12 @@ def multiplied(g: Ingredients) -> Outputs:
     return {"qdd": found["qdd"], **blocks, "dqdd_dtau": by_tau, "pivot": found["pivot"]}
 
 
-def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
+def _torque_derivatives(
+    g: Ingredients, qdd: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> Derivatives:
     q, qd = g.inputs["q"], g.inputs["qd"]
     return inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
+        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices, external
     )
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from psdmc import reproducible
 from psdmc.dynamics.manifold import coordinate_rates, pulled_back
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program import dimensions
 from psdmc.program.replay import substituted
@@ -66,13 +67,20 @@ _FREE = "free_qdd"
 
 
 def torque_gradients(
-    g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
-) -> tuple[list[Scalar], list[Scalar]]:
-    """Gradients of the weighted torques by q (nv, along the tangent) and by qd, at fixed computed accelerations."""
+    g: Ingredients,
+    qdd: Sequence[Scalar],
+    weights: Sequence[Scalar],
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+    others: Sequence[Any] = (),
+) -> tuple[list[Scalar], list[Scalar], list[Scalar]]:
+    """Gradients of the weighted torques, at fixed computed accelerations, by q (nv, along the tangent), by qd and by other
+    inputs that external wrenches on the links are made of."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
-    by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
-    found = substituted([*by_q, *by_qd], free, qdd)
-    return pulled_back(g.frames, q, found[: len(q)]), found[len(q) :]
+    tau = torques(g, qd, free, g.base_acceleration, external=external)
+    by_q, by_qd, by_others = gradients(tau, weights, (q, qd, others))
+    found = substituted([*by_q, *by_qd, *by_others], free, qdd)
+    by_q, by_qd, by_others = found[: len(q)], found[len(q) : len(q) + len(qd)], found[len(q) + len(qd) :]
+    return pulled_back(g.frames, q, by_q), by_qd, by_others
 
 
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
@@ -83,11 +91,19 @@ def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[
     return substituted(found, free, qdd)
 
 
-def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
-    """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
+def torque_slopes(
+    g: Ingredients,
+    qdd: Sequence[Scalar],
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+    others: Sequence[Any] = (),
+    along: Sequence[Scalar] = (),
+) -> list[Scalar]:
+    """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations, and along a direction of other
+    inputs that external wrenches on the links are made of."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
-    along = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name]]
-    return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
+    tau = torques(g, qd, free, g.base_acceleration, external=external)
+    way = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name], *along]
+    return substituted(slopes(tau, [*q, *qd, *others], way), free, qdd)
 
 
 def _free(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
@@ -102,8 +118,10 @@ def solved(matrices: Array, right: Array) -> Array:
 
 
 def weighted(weights: Array, matrices: Array) -> Array:
-    """(k, n) weights^T matrix, state by state."""
-    return np.asarray(times(weights[:, None], matrices)[:, 0])
+    """(k, ...) weights^T matrix (k, n, ...), state by state."""
+    count, rows, *others = matrices.shape
+    found = times(weights[:, None], matrices.reshape(count, rows, -1))[:, 0]
+    return np.asarray(found.reshape(count, *others))
 
 
 def along(matrices: Array, direction: Array) -> Array:

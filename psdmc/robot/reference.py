@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -78,24 +79,14 @@ class Reference:
 
     def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """(..., n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
-
-        def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
-            by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
-            return np.stack([by_q, by_qd, np.triu(by_qdd) + np.triu(by_qdd, 1).T])
-
-        by_q, by_qd, by_qdd = np.moveaxis(self.each(derivatives, q, qd, qdd), -3, 0)
+        by_q, by_qd, by_qdd = np.moveaxis(self.each(torque_derivatives, q, qd, qdd), -3, 0)
         return by_q, by_qd, by_qdd
 
     def forward_dynamics_derivatives(
         self, q: Array, qd: Array, tau: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Accelerations (..., n), and (..., n, n) each: their derivatives by q, qd and tau; row i: of qdd[i]."""
-
-        def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
-            by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
-            return np.stack([by_q, by_qd, np.triu(by_tau) + np.triu(by_tau, 1).T])
-
-        by_q, by_qd, by_tau = np.moveaxis(self.each(derivatives, q, qd, tau), -3, 0)
+        by_q, by_qd, by_tau = np.moveaxis(self.each(acceleration_derivatives, q, qd, tau), -3, 0)
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
     def integrated(self, q: Array, way: Array) -> Array:
@@ -185,6 +176,22 @@ class Reference:
         flat = [np.broadcast_to(row, (*lead, row.shape[-1])).reshape(-1, row.shape[-1]) for row in rows]
         results = [np.array(function(self.model, data, *row)) for row in zip(*flat, strict=True)]
         return np.array(results).reshape(*lead, *results[0].shape)
+
+
+def torque_derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Any) -> Array:
+    """(3, n, n) by q, qd and qdd; state: these three, and external forces if there are any."""
+    return _whole(pinocchio.computeRNEADerivatives(model, data, *state))
+
+
+def acceleration_derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Any) -> Array:
+    """(3, n, n) by q, qd and tau; state: these three, and external forces if there are any."""
+    return _whole(pinocchio.computeABADerivatives(model, data, *state))
+
+
+def _whole(blocks: Sequence[Array]) -> Array:
+    """The blocks; of the last one, which is symmetric, Pinocchio fills the upper triangle."""
+    *others, symmetric = blocks
+    return np.stack([*others, np.triu(symmetric) + np.triu(symmetric, 1).T])
 
 
 def _way_to(frame: int, model: pinocchio.Model, data: pinocchio.Data) -> float:
