@@ -130,12 +130,7 @@ def frame_velocity_slopes(
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
         columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
         path = path_to(frames, each.joint)
-        own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
-        twists = {
-            k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))
-            for j in path
-            for k in own[j]
-        }
+        own, twists = _twists_along(path, frames, first, rows)
         turning = [_sum(scale(twists[k][1], qd[k]) for k in own[j]) for j in path]
         before = dict(zip(path, _running(turning), strict=True))
         linear, angular = ZERO, ZERO
@@ -174,9 +169,9 @@ def frame_acceleration_slopes(
 ) -> FrameSlopes:
     """Derivatives of `frame_accelerations`, along the base's axes.
 
-    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. The link before it has
-    the angular velocity w and the acceleration dw. Relative to that link, joints from j on give the frame the velocity
-    (u, s) and the acceleration (b, c).
+    As in `frame_velocity_slopes`, joint j moves what it carries along the twists (v, z) of its columns. The link before it
+    has the angular velocity w, and dw is the derivative of w. Relative to that link, joints from j on give the frame the
+    velocity (u, s) and the acceleration (b, c).
 
     By q, these are turned, and the frame's origin moves in the field of the link before:
         dw x v + w x (w x v) + 2 w x (z x u) + z x b,   w x (z x s) + z x c.
@@ -187,12 +182,7 @@ def frame_acceleration_slopes(
     first, by_q, by_qd = first_rates(frames), [], []
     for each, rows in zip(named, by_qdd, strict=True):
         path = path_to(frames, each.joint)
-        own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
-        twists = {
-            k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))
-            for j in path
-            for k in own[j]
-        }
+        own, twists = _twists_along(path, frames, first, rows)
         links, w, dw = {}, ZERO, ZERO
         for j in path:
             links[j] = w, dw
@@ -222,6 +212,18 @@ def frame_acceleration_slopes(
         by_q.append([[column[row] for column in positions_by] for row in range(6)])
         by_qd.append([[column[row] for column in rates_by] for row in range(6)])
     return FrameSlopes(by_q, by_qd, by_qdd)
+
+
+def _twists_along(
+    path: Sequence[int], frames: Sequence[Frame], first: Sequence[int], rows: Sequence[Sequence[Scalar]]
+) -> tuple[dict[int, range], dict[int, tuple[Vector, Vector]]]:
+    """The numbers of the rates of each joint of a path, and the columns of these rates, linear and angular."""
+    own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
+    return own, {
+        k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))
+        for j in path
+        for k in own[j]
+    }
 
 
 def _sum(parts: Iterable[Vector]) -> Vector:
