@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from bundled import ROBOTS, bundled_model, bundled_robot
+from bundled import ROBOTS, bundled_model, bundled_robot, robot_path
 from command_line import typed
 from pinocchio_in_casadi import acceleration, inverse_dynamics
 from random_trees import RandomTree
@@ -171,6 +171,34 @@ def test_reverse_mode_takes_the_gradient_function_where_it_is_emitted(tmp_path: 
     blocks = pinocchio_of("scara").forward_dynamics_derivatives(q[None], qd[None], x[None])[1:]
     for gradient, block in zip(found(q, qd, x), blocks, strict=True):
         close(gradient, block[0].T @ [1, -2, 3, 0.5])
+
+
+def test_wrenches_are_an_input_with_derivatives(tmp_path: Path) -> None:
+    """Of two frames; the Jacobian, and the reverse mode of the emitted gradient."""
+    model = psdmc.derive(robot_path("kr6"), frames=["link4", "link6"])
+    functions = ["forward_dynamics_with_wrenches", "forward_dynamics_with_wrenches_vjp", "frame_acceleration"]
+    called = external("kr6", tmp_path / "kr6", functions, model)
+    f, frame = called("forward_dynamics_with_wrenches"), called("frame_acceleration")
+    rng = np.random.default_rng(3)
+    given = [*state(5, 6), rng.uniform(-20.0, 20.0, (2, 6))]
+    given[3] = given[3].T  # CasADi has a column per frame
+    blocks = f.jacobian()(*given, 0)
+    at = [casadi.MX.sym(f"x{k}", *np.shape(np.atleast_2d(value.T).T)) for k, value in enumerate(given)]
+    weights = np.array([1, -2, 3, 0.5, -1, 2])
+    slopes = [casadi.gradient(casadi.dot(casadi.DM(weights), f(*at)), one) for one in at]
+    found = casadi.Function("slopes", at, slopes)(*given)
+    for k, (block, gradient) in enumerate(zip(blocks, found, strict=True)):
+        flat = given[k].reshape(-1, order="F")
+        for j in range(flat.size):
+            ahead, behind = ([*given], [*given])
+            for side, sign in ((ahead, 1e-5), (behind, -1e-5)):
+                side[k] = (flat + sign * np.eye(flat.size)[j]).reshape(given[k].shape, order="F")
+            slope = (np.array(f(*ahead)) - np.array(f(*behind)))[:, 0] / 2e-5
+            assert np.abs(np.array(block)[:, j] - slope).max() <= 1e-6 * np.abs(np.array(block)).max()
+        column = np.array(gradient).reshape(-1, order="F")
+        close(column, np.array(block).T @ weights)
+    with pytest.raises(RuntimeError, match="Derivatives cannot be calculated"):
+        frame.jacobian()
 
 
 def test_missing_inputs_are_zero_and_unwanted_outputs_are_not_written(scara: External) -> None:
