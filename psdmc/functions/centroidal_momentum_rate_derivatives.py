@@ -46,8 +46,8 @@ RECIPE = Recipe(
         INPUTS,
         OUTPUTS,
         theta=False,
-        summary="Compute the derivatives by q, qd and qdd of the rates of all links' linear momentum, and of their angular "
-        "momentum about their centre of mass.",
+        summary="Compute the derivatives by q, qd and qdd of the rates of linear momentum, and of angular momentum about "
+        "the centre of mass.",
     ),
     "derivatives of the centroidal momentum's rate",
     *on_both(values, INPUTS),

@@ -66,7 +66,7 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.outputs, *GRADIENTS),
         theta=True,
         summary="Compute the accelerations qdd under external wrenches, and the gradients of "
-        "the sum of cotangent[i] * qdd[i] with respect to q, qd, tau and wrenches.",
+        "the sum of cotangent[i] * qdd[i] by q, qd, tau and wrenches.",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "gradient of forward dynamics with wrenches",

@@ -52,7 +52,7 @@ RECIPE = Recipe(
         (*TORQUES.signature.outputs, *GRADIENTS),
         theta=True,
         summary="Compute the torques tau under external wrenches, and the gradients of "
-        "the sum of cotangent[i] * tau[i] with respect to q, qd, qdd and wrenches.",
+        "the sum of cotangent[i] * tau[i] by q, qd, qdd and wrenches.",
     ),
     "gradient of inverse dynamics with wrenches",
     trace,

@@ -50,7 +50,7 @@ WRENCHES = (
     "inverse_dynamics_with_wrenches_vjp",
     "inverse_dynamics_with_wrenches_jvp",
 )
-FEET = ["lf_foot", "rf_foot", "lh_foot", "rh_foot"]
+FRAMES = {"hyq": ["lf_foot", "rf_foot", "lh_foot", "rh_foot"], "panda": ["panda_link7", "panda_link4"]}
 ROBOTS = ("kr6", "panda", "hyq")
 COUNT, EXACT = 20, 1e-10
 FOLLOWERS = {"sliding": ("RPRRPRPR", 3, 4), "turning": ("RRPRRRRP", 1, 5)}
@@ -62,8 +62,8 @@ def robot(name: str) -> tuple[DynamicsModel, Reference]:
     if name == "kr6":
         loaded = load_robot(robot_path(name))
     else:
-        floats = name == "hyq"
-        loaded = load_robot(path_of(name), floating=floats, frames=FEET if floats else None)
+        tip = "panda_link7" if name == "panda" else None
+        loaded = load_robot(path_of(name), tip=tip, floating=name == "hyq", frames=FRAMES[name])
     return derive_model(loaded.mechanism, expand=False), reference(loaded)
 
 
