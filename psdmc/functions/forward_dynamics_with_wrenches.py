@@ -12,7 +12,6 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.wrenches import (
     WRENCHES,
-    each_under_wrenches,
     jacobians_on_arrays,
     times_wrenches,
     wrenches_on_links,
@@ -35,9 +34,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    return {"qdd": each_under_wrenches(robot, pin.aba, given, "q", "qd", "tau")}
+    states = (given[name] for name in ("q", "qd", "tau", WRENCHES.name))
+    return {"qdd": robot.forward_dynamics(*states)}
 
 
 RECIPE = Recipe(

@@ -50,8 +50,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    blocks = zip(BLOCKS, acceleration_derivatives(robot, given), strict=True)
-    return ACCELERATIONS.pinocchio(robot, given) | {output.name: block for output, block in blocks}
+    found = acceleration_derivatives(robot, given)
+    return {output.name: block for output, block in zip((QDD, *BLOCKS), found, strict=True)}
 
 
 RECIPE = Recipe(

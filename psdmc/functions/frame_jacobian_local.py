@@ -10,7 +10,6 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both
 from psdmc.recipes.recipe import Arrays, Outputs, Recipe
-from psdmc.recipes.wrenches import pinocchio_local_jacobians
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return {"J": pinocchio_local_jacobians(robot, given["q"])}
+    return {"J": robot.local_frame_jacobians(given["q"])}
 
 
 RECIPE = Recipe(

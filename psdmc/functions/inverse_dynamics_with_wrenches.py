@@ -11,7 +11,6 @@ from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.torques import torques
 from psdmc.recipes.wrenches import (
     WRENCHES,
-    each_under_wrenches,
     wrenches_on_arrays,
     wrenches_on_links,
 )
@@ -33,9 +32,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    return {"tau": each_under_wrenches(robot, pin.rnea, given, "q", "qd", "qdd")}
+    states = (given[name] for name in ("q", "qd", "qdd", WRENCHES.name))
+    return {"tau": robot.inverse_dynamics(*states)}
 
 
 RECIPE = Recipe(

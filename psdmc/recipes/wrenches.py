@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from psdmc.program.signature import Quantity
 from psdmc.recipes.directions import along
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
@@ -91,56 +92,18 @@ def along_all(blocks: Arrays, directions: Sequence[Quantity], given: Mapping[str
     return total
 
 
-def each_under_wrenches(
-    robot: Reference, function: Callable[..., Array], given: Mapping[str, Array], *names: str
-) -> Array:
-    """Values of a function of Pinocchio's (model, data, state ..., external forces) at every state."""
-
-    def loaded(model: Any, data: Any, *state: Array) -> Array:
-        *own, wrenches = state
-        return function(model, data, *own, _on_joints(robot, wrenches))
-
-    wrenches = np.reshape(given[WRENCHES.name], (len(given["q"]), -1))
-    return robot.each(loaded, *(given[name] for name in names), wrenches)
-
-
-def _on_joints(robot: Reference, wrenches: Array) -> list[Any]:
-    """Each wrench of one state carried from its frame into the joint's, as Pinocchio's fext are given."""
-    import pinocchio as pin
-
-    model = robot.model
-    forces = [pin.Force.Zero() for _ in range(model.njoints)]
-    for number, wrench in zip(robot.frame_ids, wrenches.reshape(-1, 6), strict=True):
-        frame = model.frames[number]
-        forces[frame.parentJoint] += frame.placement.act(pin.Force(wrench))
-    return forces
-
-
 def torque_derivatives(robot: Reference, given: Mapping[str, Array]) -> list[Array]:
     """Pinocchio's derivatives of torques under wrenches by q, qd, qdd and wrenches."""
-    from psdmc.robot import reference
-
-    found = each_under_wrenches(robot, reference.torque_derivatives, given, "q", "qd", "qdd")
-    jacobians = pinocchio_local_jacobians(robot, given["q"])
-    return [*np.moveaxis(found, -3, 0), -np.moveaxis(jacobians, -1, 1)]
+    states = (given[name] for name in ("q", "qd", "qdd", WRENCHES.name))
+    jacobians = robot.local_frame_jacobians(given["q"])
+    return [*robot.inverse_dynamics_derivatives(*states), -np.moveaxis(jacobians, -1, 1)]
 
 
 def acceleration_derivatives(robot: Reference, given: Mapping[str, Array]) -> list[Array]:
-    """Pinocchio's derivatives of accelerations under wrenches by q, qd, tau and wrenches."""
-    from psdmc.robot import reference
-
-    found = each_under_wrenches(robot, reference.acceleration_derivatives, given, "q", "qd", "tau")
-    by_q, by_qd, by_tau = np.moveaxis(found, -3, 0)
-    jacobians = pinocchio_local_jacobians(robot, given["q"])
-    return [by_q, by_qd, by_tau, np.einsum("kij,kfcj->kifc", by_tau, jacobians)]
-
-
-def pinocchio_local_jacobians(robot: Reference, q: Array) -> Array:
-    """(..., frames, 6, nv)"""
-    import pinocchio as pin
-
-    def jacobians(model: Any, data: Any, q: Array) -> Array:
-        found = [pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL) for frame in robot.frame_ids]
-        return np.reshape(found, (-1, 6, model.nv))
-
-    return robot.each(jacobians, q)
+    """Pinocchio's accelerations under wrenches and their derivatives by q, qd, tau and wrenches."""
+    states = (given[name] for name in ("q", "qd", "tau", WRENCHES.name))
+    *blocks, by_tau = robot.forward_dynamics_derivatives(*states)
+    jacobians = robot.local_frame_jacobians(given["q"])
+    transposed = np.moveaxis(jacobians, -1, 1).reshape(*by_tau.shape[:2], -1)
+    by_wrenches = times(by_tau, transposed).reshape(*by_tau.shape[:2], *jacobians.shape[1:3])
+    return [*blocks, by_tau, by_wrenches]

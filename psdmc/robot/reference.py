@@ -25,7 +25,7 @@ DIFFERENCE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """Pinocchio's dynamics of one model on arrays of states: q, qd, qdd, tau (..., n), SI.
+    """Pinocchio's dynamics of one model on arrays of states: q, qd, qdd, tau (..., n), wrenches (..., frames, 6), SI.
 
     tip_name     the frame of `jacobian`
     frame_names  the named frames; empty: the tip alone
@@ -56,11 +56,11 @@ class Reference:
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
-    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        return self.each(pinocchio.rnea, q, qd, qdd)
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, wrenches: Array | None = None) -> Array:
+        return self._loaded(pinocchio.rnea, wrenches, q, qd, qdd)
 
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
-        return self.each(pinocchio.aba, q, qd, tau)
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array, wrenches: Array | None = None) -> Array:
+        return self._loaded(pinocchio.aba, wrenches, q, qd, tau)
 
     def mass_matrix(self, q: Array) -> Array:
         """(..., n, n), both triangles."""
@@ -77,17 +77,19 @@ class Reference:
         """(..., n, n)"""
         return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
-    def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+    def inverse_dynamics_derivatives(
+        self, q: Array, qd: Array, qdd: Array, wrenches: Array | None = None
+    ) -> tuple[Array, Array, Array]:
         """(..., n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
-        by_q, by_qd, by_qdd = np.moveaxis(self.each(torque_derivatives, q, qd, qdd), -3, 0)
+        by_q, by_qd, by_qdd = np.moveaxis(self._loaded(torque_derivatives, wrenches, q, qd, qdd), -3, 0)
         return by_q, by_qd, by_qdd
 
     def forward_dynamics_derivatives(
-        self, q: Array, qd: Array, tau: Array
+        self, q: Array, qd: Array, tau: Array, wrenches: Array | None = None
     ) -> tuple[Array, Array, Array, Array]:
         """Accelerations (..., n), and (..., n, n) each: their derivatives by q, qd and tau; row i: of qdd[i]."""
-        by_q, by_qd, by_tau = np.moveaxis(self.each(acceleration_derivatives, q, qd, tau), -3, 0)
-        return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
+        by_q, by_qd, by_tau = np.moveaxis(self._loaded(acceleration_derivatives, wrenches, q, qd, tau), -3, 0)
+        return self.forward_dynamics(q, qd, tau, wrenches), by_q, by_qd, by_tau
 
     def integrated(self, q: Array, way: Array) -> Array:
         """(..., nq) positions where constant rates lead from q; `way` are these times seconds."""
@@ -139,6 +141,16 @@ class Reference:
 
         return self.each(of_tip, q)
 
+    def local_frame_jacobians(self, q: Array) -> Array:
+        """(..., frames, 6, n) of the named frames, along their own axes."""
+        ids, local = self.frame_ids, pinocchio.LOCAL
+
+        def of_frames(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
+            found = [pinocchio.computeFrameJacobian(model, data, q, frame, local) for frame in ids]
+            return np.reshape(found, (-1, 6, model.nv))
+
+        return self.each(of_frames, q)
+
     def poses(self, q: Array, link_names: Sequence[str]) -> Array:
         """(..., len(link_names) + 1, 4, 4) of the links' frames and the tip's in the base frame."""
         kind = pinocchio.FrameType.BODY
@@ -167,6 +179,22 @@ class Reference:
         at_ends = [f for f, frame in enumerate(model.frames) if frame.parentJoint in ends]
         tip = model.getFrameId(self.tip_name)
         return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
+
+    def _loaded(self, function: Callable[..., Array], wrenches: Array | None, *states: Array) -> Array:
+        """`each`, with external forces as the function's last argument if wrenches (..., frames, 6) at the named frames are
+        given. Pinocchio's forces are about the joints' origins, along the joints' axes."""
+        if wrenches is None:
+            return self.each(function, *states)
+        ids = self.frame_ids
+
+        def loaded(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
+            forces = [pinocchio.Force.Zero() for _ in range(model.njoints)]
+            for number, wrench in zip(ids, state[-1].reshape(-1, 6), strict=True):
+                frame = model.frames[number]
+                forces[frame.parentJoint] += frame.placement.act(pinocchio.Force(wrench))
+            return function(model, data, *state[:-1], forces)
+
+        return self.each(loaded, *states, np.reshape(wrenches, (*wrenches.shape[:-2], -1)))
 
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
         """Values of a function of Pinocchio's (model, data, state ...) at every state of broadcast arrays."""
