@@ -21,7 +21,7 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 class RateSlopes(NamedTuple):
-    """6 x nv each: derivatives of the momentum's rate by q, along its tangent, by qd and by qdd."""
+    """Derivatives of the momentum's rate, 6 x nv each: by q, along its tangent, by qd and by qdd."""
 
     by_q: Rows
     by_qd: Rows
@@ -31,8 +31,8 @@ class RateSlopes(NamedTuple):
 def about_centre(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], moved: Wrench
 ) -> Wrench:
-    """A momentum about the origin that the first joint frame turns from, or its rate, about the bodies' centre of mass
-    instead. The bodies must be the real ones."""
+    """Convert a momentum, or its rate, from the origin of the first joint frame to the bodies' centre of mass. The bodies
+    must be the real ones."""
     linear, angular = moved
     centre = scale(first_moment(frames, bodies, q), 1.0 / _mass(bodies))
     return linear, add(angular, cross(linear, centre))
@@ -54,14 +54,14 @@ def momentum_rate_slopes(
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
 ) -> RateSlopes:
-    """Derivatives of the rate of the bodies' linear momentum, and of that of their angular momentum about the centre of
+    """Compute the derivatives of the rates of the bodies' linear momentum and of their angular momentum about the centre of
     mass, along the axes that the first joint frame turns from. The bodies must be the real ones.
 
-    The rate is A qdd + dA/dt qd with the centroidal momentum matrix A. At qd = 0, with rates in the place of qdd, it is
-    therefore the momentum at these rates, and the derivatives are the momentum's.
+    The rate is A qdd + dA/dt qd with the centroidal momentum matrix A. At qd = 0, with rates in the place of qdd, the rate
+    is therefore the momentum at these rates, and the derivatives are those of the momentum.
 
-    A joint's motion requires a wrench on the bodies beyond it (derivatives.py); no other
-    body's momentum changes. By q the centre of mass c moves too, by which c x force changes."""
+    A joint's motion requires a wrench on the bodies beyond the joint (derivatives.py); the momentum of other bodies does
+    not change. By q the centre of mass c moves too, so that c x force changes."""
     axes, steps, composites = swept(frames, bodies, q, qd, qdd, ZERO)
     share, placed = 1.0 / _mass(bodies), forward_kinematics(frames, q)
     force = centre = ZERO
@@ -90,7 +90,7 @@ def momentum_rate_slopes(
 
 
 def _placed(wrench: Wrench, frame: tuple[Matrix, Vector]) -> Wrench:
-    """A wrench about a frame's origin and along its axes, along the axes and about the point in which the frame is given."""
+    """Convert a wrench from a frame to the axes and the origin in which the frame is given."""
     rotation, origin = frame
     force = transform(rotation, wrench[0])
     return force, add(transform(rotation, wrench[1]), cross(origin, force))

@@ -1,4 +1,4 @@
-"""Named frames: placements, Jacobians, drifts, and derivatives of velocities."""
+"""Named frames: their placements, Jacobians and drifts, and the derivatives of their velocities."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Root = tuple[Matrix, Vector]
 def placed_frames(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[tuple[Vector, Matrix]]:
-    """Origin (m) and rotation of each named frame in the base frame."""
+    """Compute the origin (m) and the rotation of each named frame in the base frame."""
     joints = _in_base(frames, q, root)
     return [
         (_point(joints[each.joint], each), multiply(joints[each.joint][0], _rotation(each))) for each in named
@@ -44,7 +44,8 @@ def placed_frames(
 def frame_jacobians(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: linear velocity of its origin, then angular, per unit joint rate, along the base's axes."""
+    """Compute the Jacobian, 6 x nv, of each named frame: linear velocity of its origin, then angular velocity, per unit
+    joint rate, along the base's axes."""
     joints = _in_base(frames, q, root)
     found = []
     for each in named:
@@ -58,8 +59,8 @@ def frame_jacobians(
 def local_jacobians(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar]
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: what `frame_jacobians` are along the named frame's own axes. Each joint's axes and the named
-    frame's origin are carried from joint to joint towards the base."""
+    """Compute the 6 x nv Jacobian of each named frame along the frame's own axes. The sweep carries these axes and the
+    frame's origin from joint to joint towards the base."""
     first, own, found = first_rates(frames), positions(frames, q), []
     for each in named:
         columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
@@ -84,7 +85,8 @@ def frame_drifts(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Six per named frame: acceleration of its origin, then angular, at constant joint rates, along the base's axes."""
+    """Compute six values per named frame: acceleration of its origin, then angular acceleration, at constant joint
+    rates, along the base's axes."""
     return frame_accelerations(frames, named, q, qd, [0.0] * len(qd), root)
 
 
@@ -97,7 +99,8 @@ def frame_accelerations(
     qdd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Six per named frame: acceleration of its origin (not less gravity), then angular, along the base's axes."""
+    """Compute six values per named frame: acceleration of its origin, without gravity, then angular acceleration, along
+    the base's axes."""
     joints = _in_base(frames, q, root)
     forward = sweep_outward(frames, q, qd, None, qdd, ZERO)
     found = []
@@ -118,13 +121,13 @@ def frame_velocity_slopes(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: derivatives of its velocity J qd (linear, then angular) by q, along its tangent, and along the
-    base's axes.
+    """Compute 6 x nv derivatives per named frame: its velocity J qd (linear, then angular) by q along its tangent. The
+    velocity is along the base's axes.
 
-    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. With w the angular
-    velocity of the link before it, and (u, s) the part of the frame's velocity that joints from j on contribute, the
-    frame's velocity changes by (w x v + z x u, z x s): that part, j's own rates in it, is turned, and the frame's origin
-    moves in the velocity field of the link before.
+    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. Let w be the
+    angular velocity of the link before joint j, and (u, s) the part of the frame's velocity that comes from joint j and
+    later joints. The frame's velocity changes by (w x v + z x u, z x s), for two reasons: that part of the velocity is
+    rotated, and the frame's origin moves in the velocity field of the link before the joint.
     """
     first, found = first_rates(frames), []
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
@@ -147,7 +150,7 @@ def frame_velocity_slopes(
 
 
 class FrameSlopes(NamedTuple):
-    """6 x nv per named frame: derivatives of its acceleration by q, along its tangent, by qd and by qdd."""
+    """Derivatives of the acceleration of each named frame, 6 x nv each: by q, along its tangent, by qd and by qdd."""
 
     by_q: list[list[list[Scalar]]]
     by_qd: list[list[list[Scalar]]]
@@ -167,7 +170,7 @@ def frame_acceleration_slopes(
     qdd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> FrameSlopes:
-    """Derivatives of `frame_accelerations`, along the base's axes.
+    """Compute the derivatives of `frame_accelerations`, along the base's axes.
 
     As in `frame_velocity_slopes`, joint j moves what it carries along the twists (v, z) of its columns. The link before it
     has the angular velocity w, and dw is the derivative of w. Relative to that link, joints from j on give the frame the
@@ -217,7 +220,7 @@ def frame_acceleration_slopes(
 def _twists_along(
     path: Sequence[int], frames: Sequence[Frame], first: Sequence[int], rows: Sequence[Sequence[Scalar]]
 ) -> tuple[dict[int, range], dict[int, tuple[Vector, Vector]]]:
-    """The numbers of the rates of each joint of a path, and the columns of these rates, linear and angular."""
+    """Return the numbers of the rates of each joint of a path, and the columns of these rates, linear and angular."""
     own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
     return own, {
         k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
-    """The momentum is its rate without rates of the joints, at the accelerations qd."""
+    """Differentiate the momentum's rate at rest, A qdd, at qdd = qd: there it equals the momentum."""
     found = momentum_rate_slopes(robot.frames, robot.solids(), q, [0.0] * len(qd), qd)
     return {"dh_dq": robot.rows_in_base(found.by_q), "dh_dqd": robot.rows_in_base(found.by_qdd)}
 

@@ -27,7 +27,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Derivatives of the force, over the mass."""
+    """Divide Pinocchio's derivatives of the force by the mass."""
     found = centroidal_momentum_rate_derivatives.RECIPE.pinocchio(robot, given)
     mass = sum(inertia.mass for inertia in list(robot.model.inertias)[1:])
     return {output.name: rows[:, :3] / mass for output, rows in zip(OUTPUTS, found.values(), strict=True)}

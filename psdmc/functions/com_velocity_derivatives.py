@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
-    """The velocity is the acceleration without rates, at the accelerations qd."""
+    """Differentiate the acceleration at rest, J qdd, at qdd = qd: there it equals the velocity."""
     found = momentum_rate_slopes(robot.frames, robot.solids(), q, [0.0] * len(qd), qd)
     by_q, by_qd = (robot.rows_in_base(rows[:3], 1.0 / robot.mass) for rows in (found.by_q, found.by_qdd))
     return {"dv_dq": by_q, "dv_dqd": by_qd}

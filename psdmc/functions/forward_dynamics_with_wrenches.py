@@ -28,7 +28,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """What the wrenches add to the accelerations that the torques were computed from, which are exact."""
+    """Add M^-1 J^T wrenches to the accelerations from which the torques were computed, which are exact."""
     load = times_wrenches(jacobians_on_arrays(robot, given), given[WRENCHES.name])
     return {"qdd": given["qdd"] + solved(robot.mass_matrix(given["q"]), load)}
 

@@ -28,7 +28,8 @@ BLOCKS = tuple(derivative_of(QDD, quantity) for quantity in ACCELERATIONS.signat
 
 
 def trace(g: Ingredients) -> Outputs:
-    """As `forward_dynamics_derivatives`, with d tau_id under the wrenches; by these it is M^-1 J^T."""
+    """Trace as `forward_dynamics_derivatives` does, with d tau_id under the wrenches. The derivative of the accelerations
+    by the wrenches is M^-1 J^T."""
     jacobians = jacobians_transposed(g)
     tau = [own + load for own, load in zip(g.inputs["tau"], loads(g, jacobians), strict=True)]
     found = forward_dynamics_derivatives.traced(g, tau, wrenches_on_links(g))

@@ -24,7 +24,7 @@ DIRECTIONS = (DQ, DQD, DTAU, DWRENCHES)
 
 
 def trace(g: Ingredients) -> Outputs:
-    """As `forward_dynamics_jvp`; the torques of inverse dynamics depend on the wrenches too."""
+    """Trace as `forward_dynamics_jvp` does. The torques of inverse dynamics depend on the wrenches, too."""
     external, wrenches = wrenches_on_links(g), [g.inputs[each.name] for each in (WRENCHES, DWRENCHES)]
     qdd, factors = accelerations(g, g.inputs["tau"], external)
     changes = torque_slopes(g, qdd, external, *wrenches)

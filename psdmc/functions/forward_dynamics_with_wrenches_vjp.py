@@ -31,7 +31,7 @@ GRADIENTS = (GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU, GRADIENT_WRENCHES)
 
 
 def trace(g: Ingredients) -> Outputs:
-    """As `forward_dynamics_vjp`; the torques of inverse dynamics depend on the wrenches too."""
+    """Trace as `forward_dynamics_vjp` does. The torques of inverse dynamics depend on the wrenches, too."""
     external = wrenches_on_links(g)
     qdd, factors = accelerations(g, g.inputs["tau"], external)
     weights = factors.solved(g.inputs[COTANGENT.name])

@@ -27,8 +27,8 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's derivatives of the spatial acceleration along the frame's own axes: those of the classical one, with w x v
-    added, turned into the base's axes, plus what the turning of the axes contributes."""
+    """Convert Pinocchio's derivatives of the spatial acceleration along the frame's own axes to those of the acceleration
+    of the frame's origin along the base's axes."""
     import pinocchio as pin
 
     def slopes(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:

@@ -1,4 +1,5 @@
-"""Derivatives along a direction: tangents of inputs, cotangents of outputs, and torques differentiated by both."""
+"""Derivatives along directions: tangents of inputs, cotangents (weights) of outputs, and derivatives of torques by
+both."""
 
 from __future__ import annotations
 
@@ -73,8 +74,8 @@ def torque_gradients(
     external: Mapping[int, Wrench] = NO_WRENCHES,
     others: Sequence[Any] = (),
 ) -> tuple[list[Scalar], list[Scalar], list[Scalar]]:
-    """Gradients of the weighted torques, at fixed computed accelerations, by q (nv, along the tangent), by qd and by other
-    inputs that external wrenches on the links are made of."""
+    """Return the gradients of the weighted torques by q (nv, along the tangent), by qd, and by other inputs, from which
+    external wrenches on the links are computed. The computed accelerations are held fixed."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     tau = torques(g, qd, free, g.base_acceleration, external=external)
     by_q, by_qd, by_others = gradients(tau, weights, (q, qd, others))
@@ -84,7 +85,8 @@ def torque_gradients(
 
 
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
-    """l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, Y their regressor."""
+    """Return l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, where Y is the
+    regressor."""
     theta_b, bodies, drives = g.by_theta()
     loose, free = replace(g, bodies=bodies, drives=drives), _free(g, qdd)
     (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base_acceleration), weights, (theta_b,))
@@ -98,8 +100,8 @@ def torque_slopes(
     others: Sequence[Any] = (),
     along: Sequence[Scalar] = (),
 ) -> list[Scalar]:
-    """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations, and along a direction of other
-    inputs that external wrenches on the links are made of."""
+    """Return the torques' derivatives along the inputs dq and dqd, and along a direction of other inputs, from which
+    external wrenches on the links are computed. The computed accelerations are held fixed."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     tau = torques(g, qd, free, g.base_acceleration, external=external)
     way = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name], *along]
@@ -138,7 +140,8 @@ def with_parameter_gradient(
     reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
     pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
 ) -> Recipe:
-    """The recipe of `state`'s function with the gradient by theta_b as one more output, called NAME_parameters."""
+    """Return the recipe of a function NAME_parameters, which is the function of `state` with the gradient by theta_b as
+    one more output."""
     known = state.signature
     return Recipe(
         Signature(

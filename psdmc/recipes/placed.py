@@ -19,7 +19,7 @@ Rows = Sequence[Sequence[Scalar]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedRobot:
-    """Constants of a robot whose first joint frame sits in the base frame at `root`.
+    """The constants of a robot whose first joint frame is placed in the base frame at `root`.
 
     solids  gives the links' own bodies about the joint frames
     """
@@ -31,15 +31,15 @@ class PlacedRobot:
 
     @property
     def mass(self) -> Scalar:
-        """Of all links, kg."""
+        """Return the mass of all links, kg."""
         return sum(body.mass for body in self.solids())
 
     def in_base(self, v: Vector) -> Vector:
-        """A vector along the axes that the first joint frame turns from, along the base's."""
+        """Convert a vector from the axes that the first joint frame turns from to the base's axes."""
         return transform(self.root[0], v)
 
     def rows_in_base(self, rows: Rows, factor: Scalar = 1.0) -> list[list[Scalar]]:
-        """Likewise the columns of a matrix, three rows after three, times a factor."""
+        """Convert the columns of a matrix likewise, three rows after three, and multiply them by a factor."""
         columns = [
             [x for k in range(0, len(column), 3) for x in scale(self.in_base(column[k : k + 3]), factor)]
             for column in zip(*rows, strict=True)
@@ -50,8 +50,8 @@ class PlacedRobot:
 def on_both(
     values: Callable[..., Outputs], inputs: Sequence[Quantity]
 ) -> tuple[Callable[[Ingredients], Outputs], Callable[[RobotOnArrays, Mapping[str, Array]], Arrays]]:
-    """The trace and the reference of a function with these inputs; `values` gives its outputs from a PlacedRobot and each
-    input as a list."""
+    """Return the trace and the reference of a function with these inputs. `values` computes its outputs from a PlacedRobot
+    and each input as a list."""
 
     def trace(g: Ingredients) -> Outputs:
         return values(

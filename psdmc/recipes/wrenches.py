@@ -44,12 +44,12 @@ GRADIENT_WRENCHES = Quantity(
 
 
 def wrenches_on_links(g: Ingredients) -> dict[int, Wrench]:
-    """The inputs' wrenches about the joint frames that carry the named frames."""
+    """Convert the input `wrenches` to the joint frames that carry the named frames."""
     return _on_links(g.named, g.inputs[WRENCHES.name])
 
 
 def wrenches_on_arrays(robot: RobotOnArrays, given: Mapping[str, Array]) -> dict[int, Wrench]:
-    """Likewise of given arrays."""
+    """Convert given arrays likewise."""
     values = given[WRENCHES.name]
     return _on_links(robot.chain.frames, list(values.reshape(len(values), -1).T))
 
@@ -59,32 +59,32 @@ def _on_links(named: Sequence[NamedFrame], values: Sequence[Scalar]) -> dict[int
 
 
 def jacobians_on_arrays(robot: RobotOnArrays, given: Mapping[str, Array]) -> Array:
-    """(k, nv, frames, 6) torques that unit wrenches are worth: the Jacobians along the named frames' axes, transposed."""
+    """Compute the torques (k, nv, frames, 6) of unit wrenches: the transposed Jacobians along the named frames' axes."""
     q = given["q"]
     found = entries(local_jacobians(robot.frames, robot.chain.frames, list(q.T)), len(q))
     return np.moveaxis(found, -1, 1)
 
 
 def jacobians_transposed(g: Ingredients) -> list[list[list[Scalar]]]:
-    """The same of a trace: nv of frames of six."""
+    """Compute the same in a trace: a list of nv lists, each with six values per named frame."""
     found = local_jacobians(g.frames, g.named, g.inputs["q"])
     return [[[row[k] for row in rows] for rows in found] for k in range(len(g.inputs["qd"]))]
 
 
 def loads(g: Ingredients, jacobians: Sequence[Sequence[Sequence[Scalar]]]) -> list[Scalar]:
-    """nv torques that the inputs' wrenches are worth, from `jacobians_transposed`."""
+    """Return the nv torques of the input `wrenches`, from `jacobians_transposed`."""
     values = g.inputs[WRENCHES.name]
     return [inner_product([x for row in rows for x in row], values) for rows in jacobians]
 
 
 def times_wrenches(matrices: Array, wrenches: Array) -> Array:
-    """(k, nv) matrices (k, nv, frames, 6) times wrenches."""
+    """Multiply matrices (k, nv, frames, 6) by wrenches; the products are (k, nv)."""
     count, nv = matrices.shape[:2]
     return along(matrices.reshape(count, nv, -1), wrenches.reshape(count, -1))
 
 
 def along_all(blocks: Arrays, directions: Sequence[Quantity], given: Mapping[str, Array]) -> Array:
-    """(k, nv) the sum of the derivatives by inputs times their directions, the wrenches' last."""
+    """Sum the derivatives by all inputs times their directions, (k, nv). The wrenches are the last input."""
     *others, last = zip(blocks.values(), (given[direction.name] for direction in directions), strict=True)
     total = times_wrenches(*last)
     for block, direction in others:
@@ -93,14 +93,14 @@ def along_all(blocks: Arrays, directions: Sequence[Quantity], given: Mapping[str
 
 
 def torque_derivatives(robot: Reference, given: Mapping[str, Array]) -> list[Array]:
-    """Pinocchio's derivatives of torques under wrenches by q, qd, qdd and wrenches."""
+    """Return Pinocchio's derivatives of torques under wrenches by q, qd, qdd and wrenches."""
     states = (given[name] for name in ("q", "qd", "qdd", WRENCHES.name))
     jacobians = robot.local_frame_jacobians(given["q"])
     return [*robot.inverse_dynamics_derivatives(*states), -np.moveaxis(jacobians, -1, 1)]
 
 
 def acceleration_derivatives(robot: Reference, given: Mapping[str, Array]) -> list[Array]:
-    """Pinocchio's accelerations under wrenches and their derivatives by q, qd, tau and wrenches."""
+    """Return Pinocchio's accelerations under wrenches and their derivatives by q, qd, tau and wrenches."""
     states = (given[name] for name in ("q", "qd", "tau", WRENCHES.name))
     *blocks, by_tau = robot.forward_dynamics_derivatives(*states)
     jacobians = robot.local_frame_jacobians(given["q"])
