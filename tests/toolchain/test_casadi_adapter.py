@@ -254,6 +254,25 @@ def floating(tmp_path_factory: pytest.TempPathFactory) -> External:
     return external("floating", tmp_path_factory.mktemp("casadi") / "floating", ON_FLOATING, free_model())
 
 
+def test_momenta_and_wrenches_differentiate_by_every_entry_of_q(tmp_path: Path) -> None:
+    """Against difference quotients of CasADi's functions, which divide the quaternion by its length."""
+    names = ["centroidal_momentum_rate", "inverse_dynamics_with_wrenches"]
+    called = external("floating", tmp_path / "floating", names, free_model())
+    rng = np.random.default_rng(6)
+    for name in names:
+        f = called(name)
+        given = [rng.uniform(-1.0, 1.0, f.size_in(k)) for k in range(f.n_in())]
+        for k, block in enumerate(f.jacobian()(*given, 0)):
+            for j in range(given[k].size):
+                ends = []
+                for step in (1e-5, -1e-5):
+                    there = [value.copy(order="F") for value in given]
+                    there[k].reshape(-1, order="F")[j] += step
+                    ends.append(np.array(f(*there))[:, 0])
+                slope = (ends[0] - ends[1]) / 2e-5
+                assert np.abs(np.array(block)[:, j] - slope).max() <= 1e-6 * np.abs(np.array(block)).max()
+
+
 @pytest.mark.parametrize("name", ON_FLOATING)
 def test_functions_on_a_floating_base_are_the_compiled_robots(floating: External, name: str) -> None:
     """Those are Pinocchio's (tests/functions)."""
