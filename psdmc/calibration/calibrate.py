@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign
+from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.fitted_logs import LogFit
 from psdmc.calibration.identify.essential import EssentialOptions
@@ -97,6 +97,7 @@ def calibrate(
     campaign = campaign_of(paths)
     plain = None if campaign is None else _exciting_logs(campaign, model.joint_names)
     if plain is not None:
+        held += validation_logs(paths[0])
         paths, campaign = list(plain), None
     if campaign is not None:
         _require_plain(campaign, options, held, naming, with_load)

@@ -15,8 +15,8 @@ from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_non
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 
-Step = Literal["motor", "gravity", "friction", "inertial"]
-STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial")
+Step = Literal["motor", "gravity", "friction", "inertial", "validation"]
+STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial", "validation")
 FILE = "campaign.toml"
 WHAT = "a campaign (campaign.toml), as `psdmc excite` writes it"
 HINT = "`psdmc excite` writes campaigns; docs/calibration.md describes them"
@@ -94,19 +94,24 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
 
 def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
     """Return the logs of a campaign that has only exciting motions without load, for one linear fit. Return None for
-    any other campaign.
+    any other campaign. Validation runs do not count.
 
     Raises InputError if a run names a joint that the model does not have.
     """
-    runs = listed_runs(path)
+    runs = [run for run in listed_runs(path) if run.step != "validation"]
     if any(run.step != "inertial" or run.load is not None for run in runs):
         return None
     _require_joints(runs, joint_names, path)
     return tuple(run.log for run in runs)
 
 
+def validation_logs(path: str | Path) -> tuple[Path, ...]:
+    """Return the logs of a campaign's validation runs, with which no step fits a value."""
+    return tuple(run.log for run in listed_runs(path) if run.step == "validation")
+
+
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
-    """Return all logs of a campaign, by the step of the calibration that uses them.
+    """Return all logs of a campaign but those of validation runs, by the step of the calibration that uses them.
 
     joint_names  joints of the robot to calibrate
 

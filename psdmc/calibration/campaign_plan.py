@@ -20,6 +20,7 @@ from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_a
 from psdmc.calibration.motions.criterion import all_columns, inertial_columns
 from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
 from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.limited_sines import from_rest_to_rest
 from psdmc.calibration.motions.looked_at import allowed_of, looked_at
 from psdmc.calibration.motions.search import cpu_seconds
@@ -58,10 +59,12 @@ class CampaignOptions:
     gravity_runs  number of slow sweeps through the workspace, each forwards and backwards
     repeats       periods of the exciting motion
     one_log       True: plan only the exciting motion, for one linear fit of all base parameters, friction and offsets
+    validation    True: also plan a second, different motion, on which the calibration only tests its result
     limits        limits of joints in addition to the file's
     shapes        folders of the collision shapes' meshes; None: collisions are not checked
     floor         height in m of a floor above the base's origin; None: no floor
     table         format of trajectories and logs: csv, npz or parquet
+    formats       names of file formats of robots' controllers in which each trajectory is written as well
     """
 
     sweep: SweepOptions = field(default_factory=SweepOptions)
@@ -71,12 +74,17 @@ class CampaignOptions:
     gravity_runs: int = 2
     repeats: int = 6
     one_log: bool = False
+    validation: bool = False
     limits: GivenLimits = field(default_factory=GivenLimits)
     shapes: tuple[Path, ...] | None = ()
     floor: float | None = None
     table: str = "csv"
+    formats: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(f"--format is {name!r}", f"known formats: {', '.join(FORMATS)}")
         if f".{self.table}" not in WRITTEN:
             known = ", ".join(ending.removeprefix(".") for ending in WRITTEN)
             raise InputError(f"table is {self.table!r}, expected one of {known}", "choose one of these")
@@ -149,6 +157,8 @@ def plan_campaign(
         )
     began = cpu_seconds() if began is None else began
     chain = bounded(model.mechanism, options.limits)
+    for name in options.formats:
+        FORMATS[name].require(chain.joint_names, sliding_joints(chain))
     progress("shapes")
     allowed = allowed_of(model, chain, regressor, options.excite.torque_margin, options.shapes, options.floor)
     planner = _Planner(chain, options, allowed)
@@ -168,6 +178,9 @@ def plan_campaign(
     )
     found = excite(chain, columns, options.excite, _spoken(progress), allowed, began)
     planner.exciting(found)
+    if options.validation:
+        other = replace(options.excite, seed=options.excite.seed + 1, random=FOR_VALIDATION, seconds=0.0)
+        planner.exciting(excite(chain, columns, other, allowed=allowed), "validation")
     said = (
         []
         if not found.ended_by_clock
@@ -183,6 +196,10 @@ def plan_campaign(
         looked_at(allowed, model, options.shapes, options.floor),
         (*planner.remarks, *said),
     )
+
+
+FOR_VALIDATION = 50
+"""Random motions, the best of which becomes the motion for validation: it need not excite much, but differ."""
 
 
 class _Planner:
@@ -229,13 +246,14 @@ class _Planner:
             series = self._first(f"sine series of joint {shown(name)}", tries)
             self.runs.append(PlannedRun("friction", f"friction_{name}", series, name))
 
-    def exciting(self, found: Excitation) -> None:
+    def exciting(self, found: Excitation, step: Step = "inertial") -> None:
         options = self.options
         motion = from_rest_to_rest(
             found.motion, self.chain, options.sweep.period, options.repeats, self.allowed.faults
         )
         motion = replace(motion, sliding=sliding_joints(self.chain))
-        self.runs.append(PlannedRun("inertial", "exciting" if options.one_log else "inertial", motion))
+        name = "exciting" if options.one_log and step == "inertial" else step
+        self.runs.append(PlannedRun(step, name, motion))
 
     def _first(self, what: str, tries: Iterator[Try], load: Load | None = None) -> Trajectory:
         """The first motion that is allowed, with the load and without; a remark where it is smaller than the first."""

@@ -37,7 +37,7 @@ def _steps(plan: Plan) -> Iterator[str]:
         own = [run for run in plan.runs if run.step == step]
         if own:
             minutes = sum(run.motion.duration for run in own) / 60.0
-            yield f"  {step:<9}{len(own):>3} run{'s' if len(own) > 1 else ' '} {minutes:6.1f} min"
+            yield f"  {step:<10}{len(own):>3} run{'s' if len(own) > 1 else ' '} {minutes:6.1f} min"
 
 
 def _loads(plan: Plan) -> tuple[Load, ...]:
@@ -56,7 +56,7 @@ def _which(plan: Plan, load: Load) -> str:
 
 def _found(plan: Plan) -> str:
     found = plan.found
-    is_whole = all(run.step == "inertial" for run in plan.runs)
+    is_whole = all(run.step in ("inertial", "validation") for run in plan.runs)
     what = (
         "all columns of the fit, friction and offsets included" if is_whole else "what gravity does not show"
     )
