@@ -22,13 +22,13 @@ turns; those of parallel neighbours (`compound`) before the first of them turns.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, about_z, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, about_z, inward, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -41,7 +41,9 @@ from psdmc.dynamics.moving_composite import (
     driven_freely,
     handed_composite,
     moved_to,
+    relieved,
 )
+from psdmc.dynamics.newton_euler import NO_WRENCHES
 from psdmc.dynamics.own_axes import (
     accelerating,
     axis_along,
@@ -88,26 +90,21 @@ def inverse_dynamics_derivatives(
     qdd: Sequence[Scalar],
     base_acceleration: Vector,
     choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> Derivatives:
-    """Compute the derivatives of the joint torques by q, qd and qdd. Arguments are those of `inverse_dynamics`.
+    """Compute the derivatives of the joint torques by q, qd and qdd. Arguments are those of `inverse_dynamics`; external
+    wrenches move with their links.
 
     For joints of several coordinates, derivatives by q are along the tangent: by a small motion along each of the
     joint's rates, while the rates stay constant along the moved frame's own axes. Entries of two joints are exact zeros
     if neither joint carries the other.
     """
-    n, first = len(frames), first_rates(frames)
-    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
-    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
-    axes: list[Axis] = []
-    steps: list[Step] = []
-    for i in range(n):
-        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
-        axes.append(axis)
-        steps.append(step)
+    axes, steps, composites = swept(frames, bodies, q, qd, qdd, base_acceleration, choices, external)
+    first, qd = first_rates(frames), rates(frames, qd)
     nv = first[-1]
     by_q, by_qd, by_qdd = ([[0.0] * nv for _ in range(nv)] for _ in range(3))
     gravity: list[Scalar] = [0.0] * nv
-    for i, composite in _composites(frames, bodies, q, qd, qdd, forward, choices, steps):
+    for i, composite in composites:
         for k, row in enumerate(torque_rows(frames[i], axes[i], composite), start=first[i]):
             gravity[k] = dot(row.c, axes[i].up)
             _fill_row((i, k), frames, axes, steps, row, qd, by_q, by_qd, by_qdd)
@@ -120,6 +117,28 @@ def inverse_dynamics_derivatives(
     return Derivatives(rows, slopes, mass, tuple(gravity))
 
 
+def swept(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base_acceleration: Vector,
+    choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+) -> tuple[list[Axis], list[Step], list[tuple[int, Composite]]]:
+    """Return each joint's axis, each joint's step to its parent, and the result of `_composites`."""
+    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
+    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
+    axes: list[Axis] = []
+    steps: list[Step] = []
+    for i in range(len(frames)):
+        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
+        axes.append(axis)
+        steps.append(step)
+    return axes, steps, _composites(frames, bodies, q, qd, qdd, forward, choices, steps, external)
+
+
 def _composites(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
@@ -129,6 +148,7 @@ def _composites(
     forward: Forward,
     choices: Choices,
     steps: Sequence[Step],
+    external: Mapping[int, Wrench],
 ) -> list[tuple[int, Composite]]:
     """For each joint its number and the composite beyond it, in the joint's orientation about its origin; children
     before parents."""
@@ -146,7 +166,11 @@ def _composites(
             double = (angle + angle).turn() if choices.fold_double_angle else None
             body = spun(body, turn) if double is None else turned(body, turn, double)
             whole = at_rest(spun(body, step.turn) if step.joins else body)
+            if i in external:
+                whole = relieved(whole, *(inward(forward.compound_turns[i], v) for v in external[i]))
         else:
+            if i in external:
+                whole = relieved(whole, *external[i])
             for child in hung[i]:
                 whole = both(whole, child)
             if frame.joint.about_z:

@@ -98,9 +98,13 @@ class Step:
         """Rotate a vector from the axes in which `offset` is given to the parent's orientation."""
         return v if self.joins else inward(self.turn, v)
 
-    def carried(self, wrench: Wrench) -> Wrench:
+    def to_parent(self, wrench: Wrench) -> Wrench:
+        """Return a wrench about the parent's origin, along the axes in which `offset` is given."""
         force = self.to_link(wrench[0])
-        moment = add(self.to_link(wrench[1]), cross(self.offset, force))
+        return force, add(self.to_link(wrench[1]), cross(self.offset, force))
+
+    def carried(self, wrench: Wrench) -> Wrench:
+        force, moment = self.to_parent(wrench)
         return self.to_orientation(force), self.to_orientation(moment)
 
     def carried_row(self, row: Row) -> Row:

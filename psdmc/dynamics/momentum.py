@@ -8,7 +8,8 @@ from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
 from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import forward_kinematics
-from psdmc.dynamics.motion import JointState
+from psdmc.dynamics.motion import JointState, sweep_outward
+from psdmc.dynamics.newton_euler import wrench
 from psdmc.dynamics.regressor import Twist, carried
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform
 from psdmc.dynamics.slices import positions, rates
@@ -47,7 +48,29 @@ def total_momentum(
     """Compute the momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, in the base frame of the joint
     frames. The bodies must be the real ones: others with the same torques have another momentum."""
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
-    states, total = _states(frames, q), (ZERO, ZERO)
+    return _at_base(frames, _states(frames, q), moving)
+
+
+@on_coordinates()
+def total_momentum_rate(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+) -> tuple[Vector, Vector]:
+    """Compute the derivative of `total_momentum` by time: the sums of all external forces (N) and of their moments (N m)."""
+    forward = sweep_outward(frames, q, qd, None, qdd, ZERO)
+    moving = [wrench(motion, body) for motion, body in zip(forward.motions, bodies, strict=True)]
+    return _at_base(frames, forward.states, moving)
+
+
+def _at_base(
+    frames: Sequence[Frame], states: Sequence[JointState], moving: list[tuple[Vector, Vector]]
+) -> tuple[Vector, Vector]:
+    """Sum forces, and moments about each joint frame's origin, along and about the frame that the first joint frame turns
+    from. Momenta are summed likewise."""
+    total = (ZERO, ZERO)
     for i in reversed(range(len(frames))):
         frame, (linear, angular) = frames[i], moving[i]
         linear = to_previous(frame, inward(states[i].turn, linear))
