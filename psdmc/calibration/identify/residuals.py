@@ -15,7 +15,10 @@ from psdmc.model.calibrated import Remark
 
 
 class Judged(Protocol):
-    """A solution with the correlation of its residuals, such as least_squares.Estimate."""
+    """The results of a fit that a check of the residuals needs, such as least_squares.Estimate.
+
+    They are the lag-one correlation of each joint's residuals, and the factor on all standard deviations.
+    """
 
     @property
     def correlation(self) -> Array: ...
@@ -79,8 +82,10 @@ NOISY = 1.7
 
 
 def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tuple[str, ...]:
-    """Return warnings if residuals are not noise: the model lacks an effect, and standard deviations were increased
-    for it."""
+    """Return warnings if the residuals of a fit are correlated from sample to sample and therefore more than noise.
+
+    The model then lacks an effect. The warnings also give the factor by which standard deviations were increased.
+    """
     found = [
         (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
     ]

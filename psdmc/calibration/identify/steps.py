@@ -85,16 +85,18 @@ def step_of(used: StepUsed) -> StepOptions:
 
 @dataclass(frozen=True, slots=True)
 class FrictionOptions:
-    """How the seven LuGre parameters are determined.
+    """Options for the fit of the seven LuGre friction parameters of a joint.
 
-    law             lugre: all seven; coulomb_viscous: F_c and a linear F_v only
-    fast            speed above which pre-sliding is ignored in the first step, as a share of the run's largest speed
-    sliding         speed above which plain friction is fitted, as a share of the run's largest speed
+    law             lugre: all seven parameters; coulomb_viscous: Coulomb friction F_c and linear viscous friction F_v
+                    only
+    fast            lowest speed in the first part of the fit, which ignores pre-sliding; a share of the run's largest
+                    speed
+    sliding         lowest speed in the fit of coulomb_viscous; a share of the run's largest speed
     simplex_steps   largest number of Nelder-Mead evaluations
-    estimate_delay  whether the time between position and current is estimated, too
+    estimate_delay  True: also estimate the time between position and current
     largest_delay   s
     unseen          relative standard deviation above which a parameter counts as not determined
-    workers         number of processes; joints are independent
+    workers         number of processes; joints are fitted independently
     """
 
     law: Literal["lugre", "coulomb_viscous"] = "lugre"
@@ -133,9 +135,13 @@ def judged(
     use: NDArray[np.bool_] | None = None,
     abscissa: str = "time [s]",
 ) -> StepQuality:
-    """Return the quality for every joint, and samples to plot.
+    """Return the accuracy (R^2, RMSE) of each joint's predicted torques, on fitted and on held-out samples, and data to
+    plot.
 
-    x (N,), measured and predicted (N, n), out (N,) held-out rows; use (N, n) entries that are used, None: all
+    x                    (N,) abscissa of the plots, such as time
+    measured, predicted  (N, n) torques of n joints
+    out                  (N,) True: the sample is held out for validation
+    use                  (N, n) True: the sample is used; None: all samples are used
     """
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []
