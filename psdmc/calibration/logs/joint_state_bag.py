@@ -59,13 +59,15 @@ class BagFormat(LogFormat):
         """Return a joint state with the fields of its message type."""
 
     def read(self, path: Path, topic: str = "", held: int | None = None) -> AnyLog:
-        """Return the joint states of one topic as a log. Effort is read as motor torque, and time from the header of
-        each message.
+        """Return the joint states of one topic as a log.
+
+        Effort is read as motor torque. Times come from the header of each message.
 
         topic  name of the topic; empty: /joint_states, or the only topic with joint states
-        held   most bytes of rows in memory; a larger log goes to a temporary file and becomes a StoredLog. None: no limit
+        held   largest size in bytes of the rows that stay in memory; None: no limit. The rows of a larger log go to a
+               temporary file (StoredLog)
 
-        Raises InputError if the bag is damaged, the topic is missing, or its messages disagree on joints.
+        Raises InputError if the bag is damaged, the topic is missing, or the messages contain different joints.
         """
         self.require_sizes(path, held)
         with decoding(str(path), self.what):

@@ -23,11 +23,12 @@ LOOKED_AT = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Allowed:
-    """Limits of motions.
+    """Limits on planned motions of a robot.
 
+    chain          the robot, with the limits of its joints
     torques        torque limits; None: torques are not checked
-    torque_margin  share of these limits that a motion may use
-    clearance      shapes that may not collide; None: collisions are not checked
+    torque_margin  share of the torque limits that a motion may use
+    clearance      shapes that may not collide, or a floor; None: collisions are not checked
     """
 
     chain: Mechanism
@@ -151,11 +152,13 @@ def _ranged(joint: Joint, low: float, high: float) -> Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueLimits:
-    """The largest torques of a robot, and the data to compute the torques of a motion.
+    """The largest joint torques of a robot, and the parameters with which the torques of a motion are computed.
 
+    chain     the robot
+    model     object that computes the regressor Y of the robot, with torques Y theta_b
     largest   (n,) N m (N), infinite for a joint without limit
-    theta_b   (l,)
-    friction  function from speeds (..., n) to torques (..., n); None: unknown
+    theta_b   (l,) base parameters
+    friction  function from speeds (..., n) to friction torques (..., n); None: unknown
     """
 
     chain: Mechanism
@@ -170,14 +173,17 @@ class TorqueLimits:
         return tau if load is None else tau + payload_torque(self.chain, q, load.mass, load.com)
 
     def of(self, regressor: Array, qd: Array) -> Array:
-        """Return the torques (..., n) from the regressor (..., n, l) and the speeds."""
+        """Return the joint torques (..., n), friction included, from the regressor (..., n, l) and the joint speeds
+        (..., n)."""
         tau = np.asarray(regressor @ self.theta_b)
         return tau if self.friction is None else tau + self.friction(qd)
 
     def excess(self, regressor: Array, qd: Array, share: float) -> tuple[float, Array, Array]:
-        """Return the penalty for torques beyond `share` of their limits: the mean over samples of the squared excess,
-        in shares of the limit. Also return its derivatives by the regressor (N, n, l) and, through friction, by the
-        speeds (N, n)."""
+        """Return a penalty for torques beyond `share` of the torque limits, and the derivatives of the penalty.
+
+        The penalty is the mean over N samples of the squared relative excess, summed over the joints. The derivatives
+        are those by the entries of the regressor (N, n, l) and, through friction, by the joint speeds (N, n).
+        """
         tau = self.of(regressor, qd)
         usable = share * self.largest
         beyond = np.maximum(np.abs(tau) / usable - 1.0, 0.0)
@@ -189,7 +195,8 @@ class TorqueLimits:
         return float(np.sum(beyond**2)) / len(tau), by_torque[..., None] * self.theta_b, by_speed
 
     def faults(self, tau: Array, share: float) -> list[str]:
-        """Return one sentence for each joint whose torque (N, n) exceeds `share` of its limit."""
+        """Return one sentence for each joint whose largest torque in `tau` (N, n) is above `share` of the joint's
+        limit."""
         reach = np.abs(tau).max(axis=0)
         return [
             f"{joint.name}: torque {value:.4g} beyond {share:.0%} of {limit:g}"

@@ -1,7 +1,8 @@
 """Describes sums of sines by unbounded coordinates, so that every motion keeps the joints' limits.
 
-The sines of each joint are divided by the share of its tightest limit that they need. A norm that is never smaller
-replaces the largest value of a curve. So motions are smooth in their coordinates, and the limits still hold.
+The sines of each joint are divided by the share of its tightest limit that they need, and so keep that limit. This
+share is the largest value of a curve, which is not a smooth function of the coordinates. A norm that is never smaller
+than the largest value therefore takes its place.
 """
 
 from __future__ import annotations
@@ -67,13 +68,14 @@ class LimitedSines:
         self.basis = np.stack([np.vstack(part) * self.weight for part in parts])
 
     def drawn(self, count: int, rng: np.random.Generator) -> Array:
-        """Return random coordinates (count, size) of motions that fill their limits."""
+        """Return random coordinates (count, size) of `count` motions that use nearly the full limits of every joint."""
         found = rng.standard_normal((count, self.size))
         found.reshape(count, self.n, -1)[..., -2] = FULL
         return found
 
     def filled(self, point: Array, share: float) -> Array:
-        """Return the coordinates with every joint's motion limited to this share of its limits."""
+        """Return the coordinates of a motion with the used share of every joint's limits reduced to `share`, if it was
+        larger."""
         found = point.copy().reshape(self.n, -1)
         found[:, -2] = np.minimum(found[:, -2], np.log(share / (1.0 - share)))
         return found.ravel()
@@ -101,8 +103,12 @@ class LimitedSines:
         )
 
     def slope(self, at: Placed, by_states: Array) -> Array:
-        """Return the derivatives (size,) by the coordinates of a number whose derivatives by the states (3, n, N) are
-        given."""
+        """Convert the derivatives of a scalar by the states of a motion to derivatives (size,) by the motion's
+        coordinates.
+
+        at         the motion, as `placed` returns it
+        by_states  (3, n, N) derivatives by q, qd and qdd of n joints at N samples
+        """
         by_centre = by_states[0].sum(axis=1)
         by_scale = np.einsum("pnt,pnt->n", by_states, at.raw) - by_centre * at.place * self.half * at.reach
         by_norm = -by_scale * at.fill / at.norm**2
