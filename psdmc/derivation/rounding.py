@@ -20,10 +20,12 @@ the noise of larger coefficients, it would cost digits of the torque."""
 
 
 def merged(values: Array, noise: Array) -> Array:
-    """Return the numbers, with those that are equal up to `noise` made equal in magnitude. No number changes by more
-    than its noise.
+    """Return the numbers with those that differ only by rounding made equal in magnitude. Signs stay.
 
-    values, noise   (count,), noise the absolute uncertainty of each value
+    No number changes by more than its noise.
+
+    values  (count,)
+    noise   (count,) absolute uncertainty of each value
     """
     if not len(values):
         return values
