@@ -1,10 +1,11 @@
 """Joint frames in a tree, and the rotation of each joint: the input of every algorithm in this folder.
 
-The placement of frame i in its parent's frame is   rotation @ Rz(turn + offset), translation + rotation @ z slide
-Here turn and slide follow from q by the type of the joint. For a joint of several coordinates, the placement is
-rotation @ rotation(q), translation + rotation @ way(q). Each frame has one rigid body, whose parameters are about the
-frame itself. Parents come before their children. Multiples of 90 degrees in the offset are stored separately: they
-exchange sine and cosine exactly and cost nothing.
+The placement of frame i in its parent's frame has the rotation and translation rotation @ Rz(turn + offset),
+translation + rotation @ z slide. The angle `turn` and the displacement `slide` follow from q by the type of the joint.
+For a joint of several coordinates, the placement is rotation @ rotation(q), translation + rotation @ way(q), with the
+functions of the joint type. Each frame has one rigid body, whose parameters are relative to the frame. Parents come
+before their children. Multiples of 90 degrees in the offset are stored separately, because they exchange sine and
+cosine exactly and need no operations.
 """
 
 from __future__ import annotations
@@ -37,16 +38,17 @@ class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
 
     parent       index of the parent's frame; BASE: the base frame
-    rotation     3 x 3, this frame's axes in the parent's, without the rotation about z
-    translation  m, origin of this frame at q = 0 in the parent's
-    offset       rad, rotation about z at q = 0, without the multiples of 90 degrees
+    rotation     3 x 3, axes of this frame in the parent's frame, without the rotation about z
+    translation  m, origin of this frame at q = 0 in the parent's frame
+    offset       rad, rotation about z at q = 0, without multiples of 90 degrees
     quarters     number of 90-degree rotations in addition to the offset, 0 to 3
-    follows      for a mimic joint, leader, ratio and offset: its q is ratio q_leader + offset (following.py)
-    limbs        for the first frame of a limb that represents several equal limbs: returns the sum over them of a scalar;
-                 None: the frame represents itself only
+    follows      for a mimic joint: its leader, ratio and offset, with q = ratio q_leader + offset; None: not a mimic
+                 joint
+    limbs        function that returns the sum of a scalar over equal limbs, such as legs. Only the first frame of a
+                 limb that stands for several has it; None for other frames
 
-    Computed from these: whether the joint's axis is parallel to that of the parent joint (`is_parallel`), and the
-    rotation and its transpose without their zeros (`inward_rows`, `outward_rows`).
+    Two fields are computed from these. `is_parallel` says whether the joint's axis is parallel to that of the parent
+    joint. `inward_rows` and `outward_rows` are the rotation and its transpose without their zeros.
     """
 
     joint: JointType
@@ -92,7 +94,7 @@ NO_TURN = Angle(None, 0)
 
 
 class Turn(NamedTuple):
-    """A rotation about z by its sine and cosine; None stands for no rotation."""
+    """The sine and cosine of a rotation about z. In place of a Turn, None stands for no rotation."""
 
     sine: Scalar
     cosine: Scalar
@@ -161,8 +163,10 @@ def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, 
 
 
 def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
-    """Return the frames of the joints in `kept`, renumbered. `kept` must include all joints that carry or lead one of
-    them."""
+    """Return the frames of the joints in `kept`, with parents and leaders renumbered by their places in `kept`.
+
+    `kept` must include all joints that carry or lead one of the joints in it.
+    """
     number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
     own = (frames[joint] for joint in kept)
     return tuple(
@@ -198,12 +202,12 @@ def base_acceleration(chain: Mechanism) -> Vector:
 
 
 def outward(turn: Turn | Rotation | None, v: Vector) -> Vector:
-    """Rotate a vector from the axes before a joint's rotation to the axes after it; None: no rotation."""
+    """Return a vector along the axes after a joint's rotation, given along the axes before it; None: no rotation."""
     return v if turn is None else turn.outward(v)
 
 
 def inward(turn: Turn | Rotation | None, v: Vector) -> Vector:
-    """Rotate a vector from the axes after a joint's rotation to the axes before it; None: no rotation."""
+    """Return a vector along the axes before a joint's rotation, given along the axes after it; None: no rotation."""
     return v if turn is None else turn.inward(v)
 
 
@@ -251,8 +255,8 @@ def joint_offset(frame: Frame, q: Scalar) -> Vector:
 
 
 def handed_on(frame: Frame, values: Iterable[Scalar]) -> Iterator[Scalar]:
-    """Return what a frame passes to its parent: the values themselves, or their sums over all limbs that the frame
-    represents."""
+    """Return the values that a frame passes to its parent. If the frame stands for several equal limbs, they are
+    summed."""
     return iter(values) if frame.limbs is None else map(frame.limbs, values)
 
 
@@ -263,7 +267,10 @@ def handed_vector(frame: Frame, v: Vector) -> Vector:
 
 
 def to_previous(frame: Frame, v: Vector) -> Vector:
-    """Rotate a vector from a frame, before its joint's rotation, to its parent's axes. This rotation is constant."""
+    """Return a vector along the axes of the parent's frame, given along those of `frame` before its joint's rotation.
+
+    This rotation is constant: it does not depend on q.
+    """
     return v if frame.is_parallel else rotated(frame.inward_rows, v)
 
 
