@@ -174,7 +174,10 @@ def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
 
 
 def base_parameters(B: Array, chain: Mechanism) -> Array | None:
-    """Compute theta_b = B x. The result is None if theta_b depends on a parameter that is unknown."""
+    """Compute the base parameters theta_b = B x (l,) from the standard parameters x (11 n,) of the n links of `chain`.
+
+    The result is None if theta_b depends on a parameter that is unknown.
+    """
     x = chain.parameters.reshape(-1)
     unknown = np.isnan(x)
     if B[:, unknown].any():

@@ -49,7 +49,8 @@ def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tupl
 
 
 def refuse_uncountable(types: Sequence[JointType]) -> None:
-    """Raise DerivationError if there are too many monomials to be numbered in 64 bits."""
+    """Raise DerivationError if the torques can have more monomials (products of joint variables) than 64 bits can
+    number."""
     monomials = Monomials(tuple(types))
     if len(monomials.rate_exponents()) * monomials.codes < 2**63:
         return
@@ -101,7 +102,12 @@ def velocity_bytes(
 
 
 def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
-    """Raise DerivationError if the expansion needs more memory than there is. The message names p and the memory."""
+    """Raise DerivationError if the computation of E and P needs more memory than is available.
+
+    needed, available  bytes
+    monomials          number of columns of E, for the message
+    n                  number of joints, for the message
+    """
     if needed <= available:
         return
     raise DerivationError(

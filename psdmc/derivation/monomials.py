@@ -74,7 +74,8 @@ class Monomials:
         return 1 + 2 * self.n + before + k - j - 1
 
     def rate_exponents(self) -> NDArray[np.uint8]:
-        """(rates, 2n) exponents of qd and qdd for every rate factor."""
+        """Return (rates, 2n) the exponents of qd (n) and qdd (n) in each product of rates: |g|, qdd_j, qd_j^2, qd_j
+        qd_k."""
         n = self.n
         table = np.zeros((1 + 2 * n + n * (n - 1) // 2, 2 * n), dtype=np.uint8)
         for j in range(n):
@@ -85,7 +86,11 @@ class Monomials:
         return table
 
     def exponents(self, keys: Integers) -> NDArray[np.uint8]:
-        """Return E, (5n, p) uint8, for p monomial keys; row blocks q, sin q, cos q, qd, qdd."""
+        """Return the matrix E (5n, p) uint8: exponents of the joint variables in p monomials, which are given by their
+        keys.
+
+        E has n rows each for q, sin q, cos q, qd and qdd.
+        """
         rows = RowBlocks.of(self.n)
         table = np.zeros((BLOCKS * self.n, len(keys)), dtype=np.uint8)
         position = table[rows.position].reshape(-1, self.n, len(keys))

@@ -114,7 +114,7 @@ class Scaled:
 
 
 def scaled(chain: Mechanism) -> Scaled:
-    """Return the robot in a unit of length near its size, for derivation."""
+    """Return the robot in the form that the derivation uses: lengths in a unit near the size of the robot."""
     unit = length_unit(chain)
     units = parameter_units(chain.types, unit)
     leads = leading_rows(chain.parameter_span)

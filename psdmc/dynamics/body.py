@@ -132,7 +132,9 @@ def joined(a: Body, b: Body) -> Body:
 
 
 def handed_body(frame: Frame, body: Body) -> Body:
-    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that the
-    frame represents."""
+    """Return the body that a frame passes to its parent, relative to the parent's frame.
+
+    If the frame stands for several equal limbs, such as legs, the result is the sum of their bodies.
+    """
     (mass,), moment = handed_on(frame, [body.mass]), handed_vector(frame, body.moment)
     return Body(mass, moment, tuple(handed_on(frame, body.second)))

@@ -237,7 +237,10 @@ def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
 
 
 def torque_row(frame: Frame, axis: Axis, composite: Composite) -> Row:
-    """Return A, B and C (see the module) of a joint with one rate, about its own origin."""
+    """Return the vectors A, B and C, from which the derivatives of the joint's torque follow (see the module).
+
+    The joint has one rate. The vectors are relative to the origin of the joint.
+    """
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:

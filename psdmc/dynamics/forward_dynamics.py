@@ -262,8 +262,12 @@ def both(a: Articulated, b: Articulated) -> Articulated:
 
 
 def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
-    """Return the inertia about another point; `offset` p leads from that point to the present one. With G = mixed -
-    linear [p], angular increases by [p] G + ([p] mixed)^T."""
+    """Return the articulated inertia relative to another point, from which `offset` p leads to the present reference
+    point.
+
+    With G = mixed - linear [p], mixed becomes G, and angular increases by [p] G + ([p] mixed)^T. [p] is the matrix of
+    the cross product with p.
+    """
     x, y, z = offset
     skew: Matrix = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     pushed = multiply(full(inertia.linear), skew)

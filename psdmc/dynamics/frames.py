@@ -70,7 +70,7 @@ class Frame:
 
 
 class Angle(NamedTuple):
-    """A rotation about z: `value` rad and `quarters` times 90 degrees; a value of None is zero."""
+    """A rotation about z by the angle `value` (rad) plus `quarters` times 90 degrees. None as `value` stands for zero."""
 
     value: Scalar | None
     quarters: int
@@ -136,7 +136,7 @@ def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
 
 
 def as_vector(values: Sequence[Scalar]) -> Vector:
-    """Return three numbers as a vector. The numbers are Python floats, which symbols take as constants, or symbols."""
+    """Return three entries, Python floats or symbols, as a vector. Operations with symbols treat floats as constants."""
     x, y, z = values
     return (x, y, z)
 

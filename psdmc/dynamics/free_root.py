@@ -20,7 +20,8 @@ KNOWN_BY_Q, KNOWN_BY_QD = 6, 3
 
 
 def has_free_root(frames: Sequence[Frame]) -> bool:
-    """Whether a floating joint, with rates along its own axes, carries the whole robot."""
+    """Return whether a floating joint carries the whole robot, with linear and angular rates along the axes of its
+    body."""
     return frames[0].joint.twists == (*SLIDES, *TURNS) and all(frame.parent != BASE for frame in frames[1:])
 
 

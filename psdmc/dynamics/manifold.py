@@ -27,7 +27,7 @@ def difference(frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Sca
 
 
 def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
-    """Return the changes per second of the nq coordinates at these nv rates."""
+    """Return the changes per second of the nq coordinates q, such as quaternions, at nv joint rates `rates`."""
     return [x for joint, here, own in _joints(frames, q, rates) for x in joint.coordinate_rates(here, own)]
 
 

@@ -28,7 +28,11 @@ def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -
 
 
 def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Compute a body's momentum m v + w x h, and its angular momentum h x v + I w about the frame's origin."""
+    """Return a body's momentum m v + w x h, and its angular momentum h x v + I w about the origin of a frame.
+
+    The frame has velocity v and angular velocity w. The body has mass m, first moments h and inertia I about its
+    origin.
+    """
     linear, (wx, wy, wz) = twist
     xx, yy, zz, xy, xz, yz = body.second
     own = (

@@ -25,7 +25,7 @@ class Motors:
 
     @staticmethod
     def torques(n: int) -> Motors:
-        """Return the motors for logs of torques: all constants are one."""
+        """Return conversion factors of one for n motors, for logs whose effort is motor torque instead of current."""
         return Motors(np.ones(n), np.zeros(n))
 
     def torque(self, effort: Array) -> Array:

@@ -1,9 +1,9 @@
 """Finds physically consistent parameters: every link's pseudo-inertia is positive definite, and every drive inertia is
 positive.
 
-Parameters belong to a distribution of mass if and only if the 4 x 4 matrix of its integrals of 1, r and r r^T is
-positive (Wensing, Kim, Slotine 2018). Then the mass matrix is positive definite everywhere, and forward dynamics
-exist.
+The pseudo-inertia is the 4 x 4 matrix of the integrals of 1, r and r r^T over a link's mass. It is positive if and only
+if the link's parameters belong to a distribution of mass (Wensing, Kim, Slotine 2018). Then the mass matrix is positive
+definite everywhere, and forward dynamics exist.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
-"""The regressor that a calibration needs. Compiled robots have one; this module computes it in NumPy without a
-compiler."""
+"""The regressor Y for a calibration, with torques Y theta_b for the base parameters theta_b.
+
+A compiled robot can compute the regressor. Without a compiler, this module computes it in NumPy.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +71,10 @@ def expansion(model: DynamicsModel) -> Array:
 
 
 def gravity_regressor(model: Regressor, q: Array) -> Array:
-    """Return Y_grav(q), (..., n, l): the regressor of gravity alone."""
+    """Return the regressor Y_grav (..., n, l) of gravity torques alone, at positions q (..., n) of n joints.
+
+    The gravity torques are Y_grav theta_b for the l base parameters theta_b.
+    """
     still = np.zeros_like(q)
     return model.regressor(q, still, still)
 

@@ -22,5 +22,6 @@ def quality(measured: Array, predicted: Array) -> Quality:
 
 
 def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
-    """Return the quality for every joint, from arrays (N, n)."""
+    """Return R^2 and root mean square error of each joint's predicted torque, from measured and predicted torques (N,
+    n)."""
     return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))

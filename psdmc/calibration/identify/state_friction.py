@@ -24,7 +24,7 @@ PARAMETERS = STATE_LAW.parameters
 
 @dataclass(frozen=True, slots=True)
 class StateLawView:
-    """The C functions of the friction law, for templates."""
+    """The options from which a template makes the C functions of the friction law with a state."""
 
     real: str = "double"
 

@@ -1,4 +1,4 @@
-"""Data classes that the four steps of the calibration share: runs, options, and the quality of predictions."""
+"""Data classes of a four-step calibration (motors, gravity, friction, inertia): runs, options, and accuracy."""
 
 from __future__ import annotations
 
@@ -37,8 +37,10 @@ class MotorRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityRun:
-    """A run of all joints at constant speeds, then along the same path backwards; `tool` is the known load at the tip,
-    if any."""
+    """A run of all joints at constant speeds, and then of the whole motion in reverse.
+
+    tool  known load at the tip; None: no load
+    """
 
     log: Log
     tool: Load | None = None
@@ -63,7 +65,7 @@ class InertialRun:
 
 @dataclass(frozen=True, slots=True)
 class StepOptions:
-    """Options of one step: filter, validation split, and solution of the linear problem."""
+    """Options of one step of a four-step calibration: filter, validation split, and solution of the linear problem."""
 
     filter: FilterOptions
     split: SplitOptions = field(default_factory=SplitOptions)
@@ -77,7 +79,10 @@ class StepOptions:
 
 
 def step_of(used: StepUsed) -> StepOptions:
-    """Return the options of a step that a calibrated model stores. Raises InputError if they are not possible."""
+    """Return filter and validation split that one step of a calibration used, as the calibrated model stores them.
+
+    Raises InputError if the stored values are out of range.
+    """
     return StepOptions(
         FilterOptions(used.cutoff, used.order, used.settle), SplitOptions(used.held_out, used.blocks)
     )
@@ -111,10 +116,11 @@ class FrictionOptions:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
-    """Options of all four steps, with the cut-off frequencies of Denso-2022.
+    """Options of all four steps (motors, gravity, friction, inertia), with the cut-off frequencies of Denso-2022.
 
-    passes   how often gravity, friction and inertia are repeated. From the second pass on, the gravity step subtracts the
-             inertial torque of the previous pass; the paper has one pass and neglects it
+    passes  number of times that gravity, friction and inertia are determined. From the second pass on, the gravity step
+            subtracts the inertial torque that the previous pass determined. The paper has one pass and neglects this
+            torque
     """
 
     motor: StepOptions = field(default_factory=lambda: StepOptions(FilterOptions(cutoff=4.0)))

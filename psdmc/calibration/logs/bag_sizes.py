@@ -41,8 +41,11 @@ PIECE = 2**20
 
 
 def require_packed_file(file: Path) -> None:
-    """Raise InputError if a compressed file unpacks to more than is plausible for its size, or to an MCAP file whose
-    chunks do. For the second check it is unpacked into a temporary file."""
+    """Raise InputError if a compressed file unpacks to more bytes than is plausible for its size.
+
+    The file is also unpacked into a temporary file. If the result is an MCAP file, its chunks are checked in the same
+    way.
+    """
     allowed = _allowed(file)
     with opened(file) as packed, tempfile.TemporaryDirectory() as folder:
         inside = Path(folder) / "inside"

@@ -41,9 +41,9 @@ class BagFormat(LogFormat):
 
     @abstractmethod
     def require_sizes(self, path: Path, held: int | None) -> None:
-        """Raise InputError if a file is missing or too large, or unpacks to more than is plausible for its size.
+        """Raise InputError if a file is missing or too large, or unpacks to more bytes than is plausible for its size.
 
-        held  most bytes of rows in memory; None: all
+        held  largest size in bytes of the rows that stay in memory; None: all rows stay in memory
         """
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Limits of a planned motion: those of the joints, torque limits, and collisions."""
+"""Limits of a planned motion: joint limits, torque limits, and collisions."""
 
 from __future__ import annotations
 
@@ -168,7 +168,10 @@ class TorqueLimits:
     friction: Callable[[Array], Array] | None = None
 
     def torque(self, q: Array, qd: Array, qdd: Array, load: Load | None = None) -> Array:
-        """Return the torques (N, n), N m (N). For a load only its weight counts, because it is carried in slow sweeps."""
+        """Return the torques (N, n), N m (N), that a motion needs at N samples of n joints.
+
+        Of a load, only the weight is included, because loads are carried in slow sweeps.
+        """
         tau = self.of(self.model.regressor(q, qd, qdd), qd)
         return tau if load is None else tau + payload_torque(self.chain, q, load.mass, load.com)
 

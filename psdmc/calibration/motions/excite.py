@@ -1,5 +1,8 @@
-"""Finds exciting trajectories: sums of sines for each joint (22), optimised for the fit's columns (23) within limits
-that every candidate keeps. Source of the equations: Denso-2022."""
+"""Finds exciting trajectories, that is, motions that determine the parameters of a fit well.
+
+They are sums of sines for each joint, (22), optimised for the columns of the fit, (23), within limits that every
+candidate keeps. Source of the equations: Denso-2022.
+"""
 
 from __future__ import annotations
 

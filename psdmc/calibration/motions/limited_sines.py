@@ -28,11 +28,14 @@ TINY = 1e-300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """Motions for given coordinates, with the data for their derivatives.
+    """A motion for given coordinates (see LimitedSines), with the data for its derivatives; n joints, N samples.
 
-    states  (3, n, N)  position, speed and acceleration
-    raw     (3, n, N)  before scaling;  norm (n,) share of the tightest limit, reach (n,) share of the position limit
-    fill    (n,)       share of the limits that is used;  place (n,) of the centre within the range, -1 to 1
+    states  (3, n, N) position, speed and acceleration
+    raw     (3, n, N) the sines before scaling
+    norm    (n,) share of each joint's tightest limit that the sines before scaling need
+    reach   (n,) share of the position limit that they need
+    fill    (n,) share of the limits that the motion uses
+    place   (n,) centre of the motion within the range of positions that remains, -1 to 1
     """
 
     states: Array
@@ -176,7 +179,10 @@ class SineSum:
 
 
 def sine_basis(harmonics: tuple[int, ...], duration: float, time: Array) -> list[tuple[Array, Array]]:
-    """Return the sines and cosines, as rows (h, N), for position, speed and acceleration."""
+    """Return the sines and cosines (h, N each) of h harmonics at N times, and their first and second derivatives.
+
+    The result has three pairs: for position, speed and acceleration.
+    """
     w = 2.0 * np.pi * np.array(harmonics)[:, None] / duration
     s, c = np.sin(w * time), np.cos(w * time)
     return [(s, c), (w * c, -w * s), (-(w**2) * s, -(w**2) * c)]
@@ -212,7 +218,11 @@ def from_rest_to_rest(
 def ramped(
     motion: SineSum, joint_names: tuple[str, ...], period: float, repeats: int, ramp: float
 ) -> Trajectory:
-    """Return the motion with ramps of `ramp` seconds, rounded to rows."""
+    """Return `repeats` periods of a motion with a ramp from rest before them, and a ramp to rest after them.
+
+    period  s between rows
+    ramp    s, duration of each ramp, rounded to a whole number of rows
+    """
     rows = max(round(ramp / period), 1)
     middle: Array = np.arange(round(repeats * motion.duration / period) + 1, dtype=np.float64) * period
     length = rows * period

@@ -47,10 +47,12 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shifted:
-    """Independent samples of a log with torques from other times; N samples, n joints, D delays.
+    """Independent samples of a log with torques from earlier and later times, to find a delay; N samples, n joints.
 
-    lags         (D,) s, evenly spaced about zero;  torque (N, n, D) this much later than the motion
-    q, qd, qdd   (N, n);  speed, sign (N, n) of the motors, as in Evidence
+    lags         (D,) s, D delays, evenly spaced about zero
+    q, qd, qdd   (N, n) states
+    speed, sign  (N, n) speed of the motors, and its smooth sign as in Evidence
+    torque       (N, n, D) torque at the time of the state plus each of the D delays
     """
 
     log: str

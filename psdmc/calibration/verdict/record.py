@@ -130,7 +130,11 @@ def verdict_of(record: Calibration) -> Verdict:
 def four_step_record(
     model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
 ) -> Calibration:
-    """Return the record of a campaign with these base parameters, without its quality."""
+    """Return the result of a four-step calibration with the given base parameters, before its accuracy is computed.
+
+    found    results of the four steps: motors, gravity, friction, inertia
+    theta_b  (l,) base parameters
+    """
     inertial, gravity = found.inertial, found.gravity
     groups = ["inertial"] * model.l
     for k in gravity.split.pivots:
@@ -389,10 +393,12 @@ def judged_record(
     distance: float | None = None,
     check: CheckOptions | None = None,
 ) -> Calibration:
-    """Return the record with its quality on these logs or runs, computed from its model's file after reading it back.
+    """Return the result of a calibration with its accuracy on logs or runs added.
 
-    plain     record of the unconstrained fit, if this one is physically consistent
-    distance  distance from the unconstrained fit in standard deviations
+    The torques are computed from the model's file after it was written and read back.
+
+    plain     result of the unconstrained fit, if `record` is physically consistent; None: `record` is unconstrained
+    distance  distance of `record` from the unconstrained fit, in standard deviations
     """
     model = reread(record.model)
     steps = delivered_quality(model, source, check)

@@ -40,9 +40,12 @@ BELIEVED = 0.7
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """A hypothesis about a log: joint k's position is signs[k] times column order[k]; the same holds for its effort.
+    """A hypothesis that columns of a log are exchanged or reversed.
 
-    score   explained share of the torque's variation, summed over joints
+    The true position of joint k is signs[k] times position column order[k]. The true effort of joint k is
+    effort_signs[k] times effort column effort_order[k].
+
+    score  share of the torque's variation that the hypothesis explains, summed over the joints
     """
 
     signs: tuple[int, ...]

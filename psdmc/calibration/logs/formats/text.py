@@ -373,8 +373,10 @@ class TextTable:
 
 
 def whole_lines(file: BinaryIO, name: str, left: bytes = b"") -> Iterator[bytes]:
-    """Yield the rest of a text in pieces of complete lines, after the text `left`. Raises InputError if a line is
-    longer than a piece."""
+    """Yield the rest of a text file in parts of complete lines. Raises InputError if a line is longer than a part.
+
+    left  text before the rest of the file, which the first part begins with
+    """
     while chunk := file.read(PIECE_BYTES):
         end = chunk.rfind(b"\n") + 1
         if not end and len(left) + len(chunk) > PIECE_BYTES:
