@@ -105,8 +105,9 @@ def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float,
 def smooth_condition(of: Scaled, power: float) -> tuple[float, Array]:
     """Return a smooth form of the logarithm of the condition number of scaled columns, and its derivatives.
 
-    The condition number has kinks. Power means over all eigenvalues therefore replace the largest and the smallest one.
-    The derivatives are those by the entries of the Gram matrix (m, m) before scaling.
+    The condition number is not differentiable where several eigenvalues are the largest or the smallest. Power means
+    over all eigenvalues therefore take the place of these two. The derivatives are those by the entries of the Gram
+    matrix (m, m) before scaling.
 
     power  exponent of the power means: with 1, all eigenvalues matter; with large values, only the largest and the
            smallest
