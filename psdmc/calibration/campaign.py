@@ -19,7 +19,8 @@ from psdmc.calibration.campaign_plan import PlannedRun as PlannedRun
 from psdmc.calibration.campaign_plan import plan_campaign as plan_campaign
 from psdmc.calibration.logs.foreign_bytes import is_folder
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.calibration.motions.trajectory import write_trajectory
+from psdmc.calibration.motions.formats import FORMATS
+from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
 from psdmc.errors import InputError
 
 UNFINISHED = ".psdmc-unfinished"
@@ -70,11 +71,18 @@ def _count(folder: Path) -> int:
 
 
 def write_campaign(
-    folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str, *, force: bool = False
+    folder: str | Path,
+    runs: Sequence[PlannedRun],
+    found: Excitation,
+    table: str,
+    formats: Sequence[str] = (),
+    *,
+    force: bool = False,
 ) -> Path:
     """Write the folder of a campaign. Return the path of its campaign.toml.
 
-    force   True: replace the plan and the trajectories of an existing campaign; logs are never changed
+    formats  names of formats of controllers; each trajectory is also written in these formats
+    force    True: replace the plan and the trajectories of an existing campaign; logs are never changed
 
     Raises InputError if a campaign exists and `force` is not given, or if the folder cannot be written.
     """
@@ -91,6 +99,7 @@ def write_campaign(
         if id(run.motion) not in written:  # loaded and unloaded runs share one motion
             written[id(run.motion)] = f"trajectories/{file}.{table}"
             write_trajectory(run.motion, root / written[id(run.motion)])
+            _write_formats(run.motion, root / "trajectories" / file, formats)
         lines += ["[[run]]", f"step = {_toml_text(run.step)}", f"name = {_toml_text(run.name)}"]
         if run.joint:
             lines.append(f"joint = {_toml_text(run.joint)}")
@@ -102,6 +111,16 @@ def write_campaign(
     path = root / FILE
     write_whole(path, "\n".join(lines))
     return path
+
+
+def _write_formats(motion: Trajectory, path: Path, chosen: Sequence[str]) -> None:
+    """Write a motion in the chosen formats, beside its table. Delete files in other formats: they hold older motions."""
+    for name, form in FORMATS.items():
+        file = path.with_name(path.name + form.ending)
+        if name in chosen:
+            write_whole(file, form.text(motion))
+        else:
+            file.unlink(missing_ok=True)
 
 
 def _file_names(runs: Sequence[PlannedRun]) -> list[str]:

@@ -20,6 +20,7 @@ from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_a
 from psdmc.calibration.motions.criterion import all_columns, inertial_columns
 from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
 from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.limited_sines import from_rest_to_rest
 from psdmc.calibration.motions.looked_at import allowed_of, looked_at
 from psdmc.calibration.motions.search import cpu_seconds
@@ -62,6 +63,7 @@ class CampaignOptions:
     shapes        folders of the collision shapes' meshes; None: collisions are not checked
     floor         height in m of a floor above the base's origin; None: no floor
     table         format of trajectories and logs: csv, npz or parquet
+    formats       names of file formats of robots' controllers in which each trajectory is written as well
     """
 
     sweep: SweepOptions = field(default_factory=SweepOptions)
@@ -75,8 +77,12 @@ class CampaignOptions:
     shapes: tuple[Path, ...] | None = ()
     floor: float | None = None
     table: str = "csv"
+    formats: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(f"--format is {name!r}", f"known formats: {', '.join(FORMATS)}")
         if f".{self.table}" not in WRITTEN:
             known = ", ".join(ending.removeprefix(".") for ending in WRITTEN)
             raise InputError(f"table is {self.table!r}, expected one of {known}", "choose one of these")
@@ -149,6 +155,8 @@ def plan_campaign(
         )
     began = cpu_seconds() if began is None else began
     chain = bounded(model.mechanism, options.limits)
+    for name in options.formats:
+        FORMATS[name].require(chain.joint_names, sliding_joints(chain))
     progress("shapes")
     allowed = allowed_of(model, chain, regressor, options.excite.torque_margin, options.shapes, options.floor)
     planner = _Planner(chain, options, allowed)

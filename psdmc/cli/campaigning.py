@@ -17,7 +17,7 @@ from psdmc.calibration.motions.excite_options import (
     ExciteOptions,
     chosen_objective,
 )
-from psdmc.cli.lists import assignments
+from psdmc.cli.lists import assignments, names
 from psdmc.cli.next_step import quoted, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
@@ -89,6 +89,14 @@ def excite(
     collisions: Annotated[
         bool, typer.Option("--collisions/--no-collisions", help="check self-collision, or not")
     ] = True,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="NAME,...",
+            help="also write each trajectory for a controller: ros2, urscript, rsi (KUKA), franka",
+        ),
+    ] = None,
     seconds: Annotated[
         float,
         typer.Option(min=1.0, help="most CPU time of the search, s"),
@@ -145,6 +153,7 @@ def excite(
         limits=limits,
         shapes=tuple(meshes or ()) if collisions else None,
         floor=floor,
+        formats=names(formats),
     )
     with steps() as progress:
         plan = excite_command(model, output, options, progress, force)

@@ -34,6 +34,7 @@ from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
+from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.call_arguments import bound_arguments
@@ -205,11 +206,13 @@ class Kernel:
         packed = any("nonzeros" in output.axes for output in self.function.outputs)
         return replace(sizes, nonzeros=len(self.robot.compiled.pattern(name)[0])) if packed else sizes
 
-    @cached_property
-    def number(self) -> int:
-        """The number by which XLA calls the function. If the function is not compiled yet, psdmc compiles it."""
+    def number(self, by_rows: bool) -> int:
+        """The number by which XLA calls the function. If the function is not compiled yet, psdmc compiles it.
+
+        by_rows  whether each state has a theta_b of its own
+        """
         compiled, function = self.robot.compiled, self.function
-        name = function.name + ("_theta" if self.theta else "")
+        name = function.name + (THETA_ROWS if by_rows else "_theta" if self.theta else "")
         number = xla.number_of(f"{self.robot._key} {name}")
         given = (*function.inputs, *((THETA,) if self.theta else ()))
         xla.add(
@@ -217,7 +220,7 @@ class Kernel:
             compiled.address_of(name),
             bool(function.factorises),
             compiled.dtype == np.float32,
-            len(function.inputs) if self.theta else None,
+            len(function.inputs) if self.theta and not by_rows else None,
             tuple(self._sizes.size(quantity) for quantity in (*given, *function.outputs)),
         )
         return number
@@ -264,7 +267,8 @@ def _called(*given: Array, kernel: Kernel) -> list[Array]:
         jax.ShapeDtypeStruct(kernel.with_tail(lead, output), given[0].dtype)
         for output in kernel.function.outputs
     ]
-    return list(jax.ffi.ffi_call(xla.TARGET, shapes)(*given, function=np.int64(kernel.number)))
+    number = kernel.number(by_rows=kernel.theta and given[-1].ndim > 1)
+    return list(jax.ffi.ffi_call(xla.TARGET, shapes)(*given, function=np.int64(number)))
 
 
 _call.def_abstract_eval(_shapes)

@@ -32,6 +32,7 @@ from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
+from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
@@ -237,15 +238,17 @@ class _Operator:
         rows."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
-        pairs = zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
-        rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in pairs]
-        robot, states = self.robot.compiled(inputs[0].dtype), math.prod(lead)
-        kernel = self.function.name + ("" if theta_b is None else "_theta")
-        thetas = () if not states else ((),) if theta_b is None else _apart(theta_b, lead).split(1)
-        for k, theta in enumerate(thetas):
-            ins, outs = ([x.data_ptr() + k * (x.nbytes // len(thetas)) for x in xs] for xs in (rows, made))
-            own = [part.data_ptr() for part in theta]
-            robot.call_at(kernel, states // len(thetas), [*ins, *own, *outs])
+        named = list(
+            zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
+        )
+        kernel, own = self.function.name, []
+        if theta_b is not None and theta_b.numel() == theta_b.shape[-1]:
+            kernel, own = f"{kernel}_theta", [theta_b.contiguous()]
+        elif theta_b is not None:
+            kernel, named = f"{kernel}{THETA_ROWS}", [*named, (THETA_B, theta_b)]
+        rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in named]
+        places = [tensor.data_ptr() for tensor in (*rows, *own, *made)]
+        self.robot.compiled(inputs[0].dtype).call_at(kernel, math.prod(lead), places)
         return made[0] if len(made) == 1 else tuple(made)
 
     def without_values(self, *given: Tensor) -> Any:
@@ -411,11 +414,3 @@ class _Operator:
     def _is_wide(self, quantity: Quantity) -> bool:
         """Whether it is a position whose entries are not its tangent's."""
         return quantity.axes == Q.axes and not self.robot.coordinates.are_plain
-
-
-def _apart(theta_b: Tensor, lead: tuple[int, ...]) -> Tensor:
-    """(k, l) the parameters of k equal parts of the states, in order: those that neighbouring states share stand once."""
-    own = (1,) * (len(lead) - theta_b.ndim + 1) + tuple(theta_b.shape[:-1])
-    ends = max((k + 1 for k, length in enumerate(own) if length > 1), default=0)
-    values = theta_b.reshape(*own[:ends], theta_b.shape[-1])
-    return values.expand(*lead[:ends], -1).reshape(-1, theta_b.shape[-1]).contiguous()

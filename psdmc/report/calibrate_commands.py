@@ -59,7 +59,7 @@ def excite_command(
     one_period = plan.found.motion.sampled(known.joint_names, options.sweep.period)
     picture = excitation_figure(plan.found, known.joint_names, [joint.limits for joint in plan.chain.joints])
     with being_written(folder):
-        campaign = write_campaign(folder, plan.runs, plan.found, options.table, force=force)
+        campaign = write_campaign(folder, plan.runs, plan.found, options.table, options.formats, force=force)
         write_trajectory(one_period, campaign.parent / "excitation.csv")
         write_whole(campaign.parent / "excitation.svg", picture)
     return plan
