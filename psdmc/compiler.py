@@ -226,10 +226,11 @@ def compare_emitted(
     given: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Differences:
-    """Compare the package in a folder with the package that `emit` would write with the options in the folder's
-    manifest.
+    """Compare the package in a folder with the package that `emit` would write now with the same options.
 
-    given  options of `emit`, by their names on the command line, that must agree with the options in the manifest
+    The options are those in the manifest of the folder.
+
+    given  options that the user gives, by their names on the command line; they must agree with the manifest
 
     This function writes no file. Raises InputError if the folder holds no package, or if `given` contradicts the
     manifest.

@@ -86,7 +86,8 @@ def certificate(model: DynamicsModel) -> Array:
 
 
 def measured(model: DynamicsModel) -> Measured:
-    """Compare the model's torques with Newton-Euler's at SAMPLES random states, and return the errors."""
+    """Compare the model's torques with those of the Newton-Euler algorithm at SAMPLES random states, and return the
+    errors."""
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
     chain, none = model.mechanism, np.zeros(model.nv)

@@ -43,7 +43,10 @@ def nodes(joint: JointType) -> Array:
 
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
-    """Evaluate the factors of degree two of a joint's basis at each q: (len(q), size)."""
+    """Return (len(q), size) the values at each position q of the `size` functions in a joint's degree-two polynomials.
+
+    An example is 1, q, q^2.
+    """
     rows = (q, sine(q), cosine(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
 

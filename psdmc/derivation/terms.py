@@ -43,7 +43,7 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
-    """Return the terms that a mask or a list of indices chooses."""
+    """Return some of the torque terms, chosen by a boolean mask or by a list of indices."""
     row, monomial, column, value = terms
     return Terms(row[chosen], monomial[chosen], column[chosen], value[chosen])
 

@@ -105,12 +105,12 @@ class Turn(NamedTuple):
         return Turn(s * other.cosine + c * other.sine, c * other.cosine - s * other.sine)
 
     def outward(self, v: Vector) -> Vector:
-        """Compute Rz^T v: a vector, rotated from the frame before this rotation to the frame after it."""
+        """Return a vector along the axes after this rotation about z, given along the axes before it: Rz^T v."""
         s, c = self.sine, self.cosine
         return (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
 
     def inward(self, v: Vector) -> Vector:
-        """Compute Rz v: a vector, rotated from the frame after this rotation to the frame before it."""
+        """Return a vector along the axes before this rotation about z, given along the axes after it: Rz v."""
         s, c = self.sine, self.cosine
         return (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
 
@@ -121,11 +121,11 @@ class Rotation(NamedTuple):
     rows: Matrix
 
     def outward(self, v: Vector) -> Vector:
-        """Rotate a vector from the frame before the joint's rotation into the frame after it."""
+        """Return a vector along the axes after this rotation, given along the axes before it."""
         return transform(transpose(self.rows), v)
 
     def inward(self, v: Vector) -> Vector:
-        """Rotate a vector from the frame after the joint's rotation into the frame before it."""
+        """Return a vector along the axes before this rotation, given along the axes after it."""
         return transform(self.rows, v)
 
 
@@ -176,7 +176,10 @@ def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
 
 
 def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
-    """Return leader, ratio and offset of joint i, if it is a mimic joint. None if it has its own coordinate."""
+    """Return leader, ratio and offset of joint i if it is a mimic joint, whose position follows that of its leader.
+
+    The result is None if the joint has its own coordinate.
+    """
     coordinate = chain.coordinates[i]
     if coordinate.leader is None or coordinate.leader == i:
         return None

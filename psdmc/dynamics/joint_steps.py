@@ -181,7 +181,12 @@ def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tupl
 
 
 def axis_of(w: Vector, dw: Vector, acceleration: Vector, up: Vector) -> Axis:
-    """Return an Axis from the motion of the link before the joint, given along the joint's axes."""
+    """Return an Axis, the motion of the link before a joint, from vectors along the joint's axes.
+
+    w, dw         rad/s, rad/s^2, angular velocity of the link, and its derivative
+    acceleration  m/s^2, of the joint's origin as a point of the link
+    up            m/s^2, acceleration of the base, minus gravity
+    """
     wx, wy, _ = w
     twice = (wy + wy, -(wx + wx), 0.0)
     return Axis(w, dw, spin_of(Rates(w, dw)), acceleration, (wy, -wx, 0.0), twice, up)

@@ -47,12 +47,13 @@ FEWEST_PAIRS = 20
 
 
 def widening(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """Return the factor (n,) by which correlated residuals increase standard deviations. It is at least 1.
+    """Return the factor (n,), at least 1, by which correlated residuals increase standard deviations, for n joints.
 
-    The factor is the root of the number of samples per independent sample, the larger of two estimates. An
-    autoregressive process with lag-one correlation r has (1 + r) / (1 - r). Any stationary process has 1 + 2 sum of
-    its correlations, summed in pairs up to the first pair that is not positive (Geyer 1992). The first estimate is
-    better for short logs, the second for noise with several time scales.
+    The factor is the square root of the number of correlated samples that count as one independent sample. Two
+    estimates of this number are computed, and the larger one is used. An autoregressive process with lag-one
+    correlation r has (1 + r) / (1 - r). Any stationary process has 1 + 2 times the sum of its correlations. They are
+    summed in pairs up to the first pair that is not positive (Geyer 1992). The first estimate is better for short logs,
+    the second for noise with several time scales.
     """
     first = np.clip(sample_correlation(residual, use), 0.0, SURELY)
     each = [_samples_per_effective(residual[:, k], use[:, k]) for k in range(residual.shape[1])]

@@ -172,7 +172,10 @@ def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
 
 
 def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDArray[np.intp]:
-    """Return the rows of the whole log that are usable and independent (one period of the cut-off apart)."""
+    """Return the indices of the usable rows of a whole log that are one period of the filter's cut-off apart.
+
+    Rows that are closer share their noise and are not independent.
+    """
     usable = _usable(grid, options, log)
     return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
 

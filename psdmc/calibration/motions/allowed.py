@@ -56,12 +56,13 @@ LARGEST_LIMIT = 1e6
 
 @dataclass(frozen=True, slots=True)
 class GivenLimits:
-    """Limits that the user gives by joint name, SI. A range or a speed may only be narrower than the file's.
+    """Limits that the user gives by joint name, SI. A range or a speed may only be narrower than that in the robot
+    file.
 
     ranges         lowest and highest position, rad (m)
     speeds         rad/s (m/s)
     accelerations  rad/s^2 (m/s^2)
-    acceleration   for joints that have no other limit of acceleration; None: such joints give an error
+    acceleration   rad/s^2 (m/s^2), for joints without another limit of acceleration; None: such joints give an error
     efforts        N m (N)
     """
 

@@ -139,8 +139,10 @@ class Changes:
 
     @property
     def chance(self) -> float:
-        """Probability that an unchanged robot gives a chi-square at least as large, or a single value with at least as
-        large a change."""
+        """Probability that the logs of an unchanged robot differ from the calibrated file by at least as much.
+
+        The measure of the difference is chi-square or the largest change of a single value, whichever is less probable.
+        """
         sizes = np.linalg.norm(self.by_value, axis=0)
         alone = (self.by_value.T @ self.white) / np.where(sizes > 0.0, sizes, np.inf)
         single = len(sizes) * stats.chi2.sf(np.max(alone**2, initial=0.0), 1)

@@ -113,7 +113,7 @@ def _versions() -> dict[str, str]:
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
-    """Return the calibration with its verdict, which its model also gets."""
+    """Return the result of a calibration with a verdict added, also in the data that its model stores."""
     return with_model(replace(record, verdict=verdict))
 
 
