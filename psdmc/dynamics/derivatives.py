@@ -1,23 +1,26 @@
-"""Derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and also M = d tau / d qdd.
+"""Computes derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and M = d tau / d qdd.
 
-When joint j turns by a small angle, every point of the bodies that it carries moves along t_j = z_j x r. Relative to
-these bodies, the motion of the link before the joint turns by the opposite angle. With z' = w x z and z'' = U z of that
-link and a the acceleration of the joint's origin, a joint i that j carries (or j itself) needs the additional torque
+When joint j turns by a small angle, each point of the bodies that it carries moves along t_j = z_j x r. Here z_j is the
+joint's axis, and r leads from its origin to the point. Relative to these bodies, the link before the joint turns by the
+opposite angle. The axis as a vector fixed in that link has the derivatives z' = w x z and z'' = U z. Here w is the
+link's angular velocity, and U r the part of its points' acceleration that depends on r. With the acceleration a_j of
+the joint's origin, a joint i that j carries (or j itself) has
 
     d tau_i / d q_j   = A_i . z_j'' + B_i . z_j' + C_i . (a_j x z_j)
     d tau_i / d qd_j  = 2 A_i . z_j' + B_i . z_j
     M_ij              = A_i . z_j
 
-where A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm over the bodies that joint i carries, r
-from the origin of joint j as a point of the link before it. If joint j slides, C_i takes the place of A_i, and there
-are no other terms. The torques of joints before i by the motion of joint i are the components along their axes of two
-wrenches, those that this motion requires on the bodies after joint i. Rows and wrenches are carried from each joint to
-the base.
+A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm are integrals over the bodies that joint i
+carries. Here r leads from the origin of joint j as a point of the link before it. If joint j slides, C_i takes the
+place of A_i, and there are no other terms. For joints before i, the derivatives by the motion of joint i follow from
+two wrenches. They are the additional wrenches that this motion requires on the bodies after joint i. Their components
+along a joint's axis are the torques. The vectors A, B, C and the wrenches are carried from each joint to the base.
 
 Carpentier, Mansard 2018 and Singh, Russell, Wensing 2022 have the same derivatives in spatial vectors. Here they are
-written on the pseudo-inertia, and on composites that move (moving_composite.py): when a composite turns about z as a
-whole, z x h takes the place of h in its wrench, and so on. All quantities of a joint are in the orientation before it
-turns; those of parallel neighbours (`compound`) before the first of them turns.
+written on the pseudo-inertia, and on composite bodies that move (moving_composite.py). When a composite body turns
+about z, z x h takes the place of its first moments h in the wrench, and so on. All quantities of a joint are in the
+orientation before the joint turns. Those of joints with parallel axes (`compound`) are in the orientation before the
+first of them turns.
 """
 
 from __future__ import annotations
@@ -242,7 +245,11 @@ def _fill_column(
 
 # Wrenches between a joint and the bodies beyond it: its own row A, B, C, and those that its motion requires.
 def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
-    """Return A, B and C (see the module) for each of a joint's rates, about the joint's own origin."""
+    """Return the vectors A, B and C, from which the derivatives of torques follow (see the module), for each rate of a
+    joint.
+
+    They are relative to the origin of the joint.
+    """
     if frame.joint.about_z:
         return [torque_row(frame, axis, composite)]
     found = []
@@ -254,7 +261,10 @@ def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
 
 
 def torque_row(frame: Frame, axis: Axis, composite: Composite) -> Row:
-    """Return A, B and C (see the module) of a joint with one rate, about its own origin."""
+    """Return the vectors A, B and C, from which the derivatives of the joint's torque follow (see the module).
+
+    The joint has one rate. The vectors are relative to the origin of the joint.
+    """
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:
@@ -290,7 +300,10 @@ def _sliding_row(axis: Axis, composite: Composite) -> Row:
 def wrenches_of_motions(
     frame: Frame, axis: Axis, composite: Composite, rates: Scalar
 ) -> list[tuple[Wrench, Wrench]]:
-    """For each of a joint's rates, return the wrenches that `wrenches_of_motion` returns for a single rate."""
+    """Return, for each rate of a joint, the two wrenches that `wrenches_of_motion` returns for a joint with one rate.
+
+    rates  rates of the joint
+    """
     if frame.joint.about_z:
         return [wrenches_of_motion(frame, axis, composite)]
     found = []
@@ -305,7 +318,10 @@ def wrenches_of_motions(
 
 
 def wrenches_of_motion(frame: Frame, axis: Axis, composite: Composite) -> tuple[Wrench, Wrench]:
-    """Return the wrenches on the composite body that a joint's motion requires, per unit of q and per unit of qd."""
+    """Return the wrenches on all bodies that a joint carries, per unit change of the joint's q and of its qd.
+
+    They are the derivatives of the wrench that the bodies' motion requires.
+    """
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:

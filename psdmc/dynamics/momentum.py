@@ -29,7 +29,11 @@ def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -
 
 
 def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Compute a body's momentum m v + w x h, and its angular momentum h x v + I w about the frame's origin."""
+    """Return a body's momentum m v + w x h, and its angular momentum h x v + I w about the origin of a frame.
+
+    The frame has velocity v and angular velocity w. The body has mass m, first moments h and inertia I about its
+    origin.
+    """
     linear, (wx, wy, wz) = twist
     xx, yy, zz, xy, xz, yz = body.second
     own = (
@@ -45,8 +49,11 @@ def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
 def total_momentum(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], qd: Sequence[Scalar]
 ) -> tuple[Vector, Vector]:
-    """Compute the momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, in the base frame of the joint
-    frames. The bodies must be the real ones: others with the same torques have another momentum."""
+    """Compute the momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, about the origin of the base frame.
+
+    The bodies must be the robot's real ones: bodies made from base parameters have the same torques, but another
+    momentum.
+    """
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
     return _at_base(frames, _states(frames, q), moving)
 
@@ -87,8 +94,11 @@ def _at_base(
 def momentum_matrix(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]
 ) -> list[list[Scalar]]:
-    """Compute the 6 x nv matrix whose columns are `total_momentum` at unit rate of each joint, by composite bodies. The
-    bodies must be the real ones."""
+    """Compute the 6 x nv matrix whose products with joint rates are the momentum and angular momentum of all bodies.
+
+    The method is that of composite bodies, which join each body with all bodies that it carries. The bodies must be the
+    robot's real ones, not bodies made from base parameters.
+    """
     found: list[list[tuple[Vector, Vector]]] = [[] for _ in frames]
     placed, states, composites = forward_kinematics(frames, q), _states(frames, q), list(bodies)
     for i in reversed(range(len(frames))):
