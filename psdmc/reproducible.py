@@ -132,7 +132,8 @@ def triangle_solved(triangle: Array, right: Array) -> Array:
     """Return the solution x (l, k) of `triangle` @ x = `right`, for an upper triangular matrix (l, l) and k right sides
     (l, k).
 
-    Entries below the diagonal are rounding errors and are not read. They would matter in a row of length 1e-13.
+    The entries of `triangle` below the diagonal are not read, because they hold rounding errors only. In a row whose
+    entries are as small as 1e-13, these errors would change the solution.
     """
     solution = right.copy()
     for r in reversed(range(len(triangle))):

@@ -96,13 +96,14 @@ def log_sources(
     naming: LogNaming,
     progress: Progress,
 ) -> LogSources:
-    """Open the logs of a description or of plain files for a fit.
+    """Open the logs for a fit. `paths` are log files, or one log description (a TOML file that names logs and describes
+    their columns).
 
-    validation  logs that are held out as a whole; the other logs are then used fully for the fit, unless `choice` has a
-                split
-    choice      options of the command line, which take precedence over the description's
+    validation  log files that are used for validation only. All rows of the other logs are then used for the fit, unless
+                the option `split` of `choice` holds out a share of their rows for validation
+    choice      options of the command line, which take precedence over those in the log description
 
-    Raises InputError if a file cannot be used, or if a description is given together with other logs.
+    Raises InputError if a file cannot be used, or if a log description is given together with other files.
     """
     described = [path for path in paths if is_description(path)]
     if described and len(paths) + len(validation) > 1:
@@ -129,8 +130,8 @@ def log_sources(
 
 
 def _options(linear: LinearOptions, own: FitChoice, choice: FitChoice, held_out: bool) -> LinearOptions:
-    """The fit's options: the command line's before the description's; no split beside logs for validation unless one is
-    asked for."""
+    """Return the options of the fit. Options of the command line take precedence over those of the log description. If
+    whole logs are for validation, no rows of the others are held out, unless an option asks for it."""
     linear = with_choice(linear, choice)
     if held_out and own.split is None and choice.split is None:
         return replace(linear, split=replace(linear.split, held_out=0.0))

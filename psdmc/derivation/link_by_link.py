@@ -55,17 +55,19 @@ def links_together(robot: Scaled) -> NDArray[np.int64]:
 
 
 def reduced_to_digits(rows: Long, links: NDArray[np.int64]) -> Reduction:
-    """Return the base parameters from rows whose columns stand for parameters, preferring large columns as leading
-    ones.
+    """Return the base parameters of a robot, by elimination in a matrix whose product with the link parameters is
+    torques.
 
-    A leading parameter (pivot) has the factor one in its base parameter. Columns are compared by the absolute size that
-    elimination leaves, not relative to their original size. A small column as an early pivot would give a large
-    parameter times small numbers, which loses digits. All columns of a link, small or not, come before those of the
-    next link. Otherwise, a parameter of a heavy link could be combined into that of a light link farther out. The
-    torque of the light link would then be a small difference of large numbers.
+    Elimination chooses independent columns, called pivots. Each pivot gives one base parameter: the pivot's link
+    parameter with the factor one, plus multiples of parameters that are not pivots. Pivots are chosen link by link.
+    Otherwise, a parameter of a heavy link could be combined into that of a light link farther out. The torque of the
+    light link would then be a small difference of large numbers.
 
-    rows   (m, k) torque rows
-    links  (k,) the link to which each column belongs
+    Within a link, the largest columns come first. The size of a column is the absolute length that elimination leaves.
+    A small column as an early pivot would give a large parameter times small numbers, which loses digits.
+
+    rows   (m, k) the matrix: m torques, k link parameters
+    links  (k,) the link to which each parameter belongs
     """
     work = np.array(rows, order="C")
     last = EXACT * max(1.0, float(lengths(work).max(initial=0.0)))

@@ -1,4 +1,4 @@
-"""Options for the arrangement of the recursions. They change the number of operations, but not the result."""
+"""Options of the recursions in generated code. They change the number of operations, but not the result."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """Options for the arrangement of the Newton-Euler recursion and of forward dynamics.
+    """Options of the Newton-Euler recursion and of forward dynamics in generated code.
 
     w and dw are a body's angular velocity and its derivative. A point of the body at r accelerates with a + U r.
 

@@ -34,12 +34,14 @@ WRONG = 1e-8
 
 
 class Accuracy:
-    """Computes the errors of generated code for one model: of an arrangement (frames, nonzero parameters, recursion
-    options), or of one PROGRAM (list of operations). Most arrangements are judged by inverse dynamics, whose operations
-    other functions share.
+    """Computes the errors that rounding causes in the code of one model, as relative errors of joint torques.
 
-    robot    constants of the model; theta_b is a constant or an input
-    theta_b  (l,) base parameters
+    The code is given as a PROGRAM (list of operations), or as an arrangement: a choice of link frames, nonzero link
+    parameters and options of the recursion. For most arrangements, the error is that of the code for inverse dynamics,
+    because other functions contain the same operations.
+
+    robot    the model, with the base parameters if the code contains them as numbers
+    theta_b  (l,) values of the base parameters, for which the errors are computed
     """
 
     def __init__(self, robot: RobotConstants, theta_b: Array) -> None:
@@ -48,8 +50,8 @@ class Accuracy:
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement, recipe: Recipe = inverse_dynamics.RECIPE) -> float:
-        """Return the error of a function in an arrangement (frames, nonzero parameters, recursion options), as
-        `error_of` does.
+        """Return the error of a function's code, as `error_of` does. The code follows from an arrangement: a choice of link
+        frames, nonzero link parameters and options of the recursion.
 
         For the mass matrix, the error of the matrix is returned, because its entries may be small compared with gravity
         torques. For all other functions, the error of inverse dynamics in this arrangement is returned.

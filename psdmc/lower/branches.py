@@ -37,8 +37,8 @@ class Branches:
     def changed(
         self, recipe: Recipe, before: Arrangement, behind: Arrangement, groups: Sequence[Limbs] = ()
     ) -> tuple[int, ...] | None:
-        """Return the joints of the branches in which two arrangements of the code differ, with all joints between these
-        branches and the base. The arrangements have equal geometry, but different nonzero link parameters (carriers).
+        """Return the joints of the branches in which two forms of the code differ, with all joints between these
+        branches and the base. Both forms have equal link frames, but different nonzero link parameters (carriers).
 
         Return None if these are most of the robot's joints, if the robot is small, or if the function cannot be
         computed for a part of the robot.

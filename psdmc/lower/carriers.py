@@ -61,14 +61,16 @@ class Careful(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarrierSpace:
-    """The sets of link parameters that can be the carriers of a model, and the carriers' values as functions of
-    theta_b. Carriers are the parameters that represent all others in generated code.
+    """Carriers are link parameters that represent all others in generated code; the other parameters are set to zero.
+    This class holds the possible sets of carriers of a model with n links. It also computes the carriers' values from
+    the l base parameters theta_b.
 
-    r is the rank of all columns, and l the number of the model's base parameters.
+    The torques are linear in the link parameters, which are in pseudo-inertia form, about the joint frames of generated
+    code. The regressor (the matrix of this linear function) has one column per link parameter, and the rank r.
 
-    columns  (r, 11 n)  regressor columns of the link parameters in pseudo-inertia form, about the new joint frames of
-                        generated code; they are coordinates in a basis of the columns' span
-    tableau  the columns as combinations of a basis among them, followed by the columns of the l base parameters
+    columns  (r, 11 n)  the regressor's columns, as coordinates in an orthonormal basis of the space that they span
+    tableau  the regressor's columns as linear combinations of r of these columns; after them the columns of the base
+             parameters, as combinations of the same r columns
     whole    (l,)  lengths of the base parameters' columns
     lengths  (11 n,)  lengths of `columns`
     careful  the columns in extended precision, if some are nearly dependent; else None

@@ -166,8 +166,11 @@ class _Lowered:
             )
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
-        """Return the kernel (operations) of one function. It is computed at the first call only, because another kernel
-        may contain it."""
+        """Return the kernel (operations) of one function. The kernel is stored at the first call, because the kernel of
+        another function may be made from it.
+
+        theta  True: the function takes the base parameters theta_b as an input
+        """
         key = recipe.name, theta
         if key not in self._kernels:
             self._kernels[key] = (

@@ -93,12 +93,12 @@ class Place:
 
     def constant(self, values: Sequence[float]) -> Scalar:
         """Return one constant for this place, from the numbers of its joints: the number itself, or a constant with one
-        number per limb."""
+        value per limb (such as a leg)."""
         return values[0] if self.group is None else lanes(self.group, values)
 
     def placed(self, frames: Sequence[Placement]) -> LinkFrame | Placement:
         """Return one placement for this place, from the placements of its joints. Numbers that differ between limbs
-        become constants with one number per limb."""
+        (such as legs) become constants with one value per limb."""
         if self.group is None:
             return frames[0]
         rotation, translation = np.empty((3, 3), object), np.empty(3, object)

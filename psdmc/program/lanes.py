@@ -82,6 +82,11 @@ class Lanes:
 
 
 def lanes(group: int, values: Sequence[float]) -> float | Lanes:
-    """Return a constant with the given number per limb. If all numbers are equal, return one plain number."""
+    """Return a constant that has one value per limb (such as a leg). Generated code computes equal limbs side by side,
+    one limb per SIMD lane (slot of a vector). If all values are equal, return one plain number.
+
+    group   number of the group of equal limbs
+    values  one value for each limb of the group
+    """
     numbers = tuple(float(x) for x in values)
     return numbers[0] + 0.0 if len(set(numbers)) == 1 else Lanes(group, numbers)

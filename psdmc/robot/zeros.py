@@ -31,8 +31,9 @@ ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """Return the assumed zeros of one link with the zeros that follow from them, in a fixed order. Without mass, all
-    parameters of the body are zero. Zero first moments imply a centre of mass at the origin, and conversely."""
+    """Return the names of all parameters of one link that are zero, in a fixed order. They are the parameters `names`,
+    which the user assumes zero, and the parameters that are zero as a consequence. Without mass, all parameters of the
+    body are zero. A first moment is zero if and only if the same coordinate of the centre of mass is zero."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY_PARAMETERS]) | set(COM_NAMES)
@@ -56,8 +57,14 @@ def link_span(names: Collection[str]) -> Array:
 
 
 def link_values(parameters: Array, names: Collection[str]) -> Array:
-    """Return the standard parameters (11,) of a link with the assumed zeros applied. Zeros about the centre of mass are
-    applied first."""
+    """Return the standard parameters (11,) of a link, after the parameters that the user assumes zero are set to zero.
+
+    Coordinates of the centre of mass, and inertias about the centre of mass, are set to zero first. Then the masses,
+    first moments and inertias about the origin of the link frame follow.
+
+    names  the parameters that are zero, such as "rx" (centre of mass), "Ixz@com" (about the centre of mass) or "Ixz"
+           (about the origin)
+    """
     zero = canonical(names)
     values = np.array(parameters, dtype=float)
     if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY_PARAMETERS]).any():

@@ -40,8 +40,9 @@ class VectorWidth:
 
     @property
     def angles(self) -> VectorWidth:
-        """Return the vector size with which code for one state computes the sines of several angles. This size is for a
-        machine on which no vectors are wider than the present ones."""
+        """Return the vector size with which code for one state computes the sines of several angles at once. The size
+        is for machines whose widest vectors have the size of this object. It is smaller than the widest size if wide
+        vectors would slow the other code."""
         narrower = self.unit.narrower
         if narrower is None:
             return self

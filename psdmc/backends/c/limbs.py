@@ -150,7 +150,11 @@ def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[Vec
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A C array whose row is a vector with one number per limb. The data are the C name, and the C text of each row."""
+    """A C array of vectors. Each vector holds one number per limb (such as a leg).
+
+    name  C name of the array
+    rows  C text of each vector
+    """
 
     name: str
     rows: tuple[str, ...]

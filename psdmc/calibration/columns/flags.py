@@ -1,4 +1,5 @@
-"""Reads keys that several effects of a log description have: true or false, the name of one joint, or several joints."""
+"""Reads keys that occur in several tables of a log description, such as those of springs. A value is true or false, the
+name of one joint, or the names of several joints."""
 
 from __future__ import annotations
 

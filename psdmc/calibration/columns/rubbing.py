@@ -1,5 +1,5 @@
-"""Friction of single joints as effects of a fit. The friction torque is a sum of terms of friction laws, such as
-Coulomb and viscous friction."""
+"""Friction of single joints as a contribution to the motor torques that a fit predicts. The friction torque is a sum of
+terms of friction laws, such as Coulomb and viscous friction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbing:
-    """The friction of some joints as an effect of a fit.
+    """The friction of some joints: one contribution to the motor torques that a fit predicts, with unknown values.
 
     terms     terms of friction laws, each with the index of its joint
     unknowns  the unknown values of all terms, term after term
@@ -43,8 +43,10 @@ class Rubbing:
 
 
 def rubbing(terms: Sequence[tuple[int, Term]], chain: Mechanism) -> Rubbing:
-    """Return the friction of some joints as an effect of a fit. `terms` are terms of friction laws, each with the index
-    of its joint."""
+    """Return the friction of some joints as one contribution to the motor torques that a fit predicts.
+
+    terms  terms of friction laws, such as Coulomb friction, each with the index of its joint
+    """
     unknowns = [
         Unknown(chain.joint_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
         for joint, term in terms

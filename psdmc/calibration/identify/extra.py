@@ -18,11 +18,13 @@ from psdmc.robot.mechanism import Mechanism
 def motion_of(
     q: Array, qd: Array, sign_speed: float, load: Array | None = None, coupling: Coupling | None = None
 ) -> Motion:
-    """Return the motion from which the torques of springs and friction are computed. If several motors drive a joint,
-    friction acts on the motors.
+    """Return the motion of the joints, together with the motion of the parts that have friction. The torques of springs
+    and friction are computed from both. If several motors drive a joint, the parts that have friction are the motors.
+    Otherwise they are the joints.
 
-    q, qd  (N samples, n joints) positions and speeds
-    load   (N, n) torques of the rigid bodies; None if no friction depends on them
+    q, qd     (N samples, n joints) positions and speeds of the joints
+    load      (N, n) joint torques of the rigid bodies, for friction that grows with the torque; None if no friction does
+    coupling  how joint positions depend on motor positions; None: each motor drives one joint
     """
     if coupling is None:
         return Motion(q, qd, q, qd, sign_speed, load)

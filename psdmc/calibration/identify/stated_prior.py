@@ -45,11 +45,13 @@ def body_confidence(link: Array, share: float) -> Confidence:
 
 
 def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence], scale: Array) -> Array:
-    """Return the prior covariance (l, l) of the base parameters theta_b from confidences in links.
+    """Return the prior covariance (l, l) of the l base parameters theta_b. It follows from the accuracy that the user
+    states for the masses, centres of mass and inertias of the links in the robot file.
 
-    stated  confidence by the index of the link; links without an entry are nearly unknown
-    scale   (at least l,) plausible sizes of base parameters: standard deviations of those that are zero or contain
-            unknowns
+    stated  accuracy by the index of the link; links without an entry get very large standard deviations
+    scale   plausible size of each base parameter, in the unit of the parameter; entries after the first l are ignored.
+            If all link parameters in a base parameter are zero, or one of them is unknown, the base parameter gets the
+            standard deviation VAGUE times `scale`
     """
     covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
     for k, link in enumerate(model.mechanism.known_parameters):

@@ -106,11 +106,11 @@ class LimitedSines:
         )
 
     def slope(self, at: Placed, by_states: Array) -> Array:
-        """Convert the derivatives of a scalar by the states of a motion to derivatives (size,) by the motion's
-        coordinates.
+        """Return the gradient (size,) of a scalar by the `size` numbers that describe a motion, such as the weights of
+        its sines. The chain rule gives it from the derivatives by positions, speeds and accelerations.
 
         at         the motion, as `placed` returns it
-        by_states  (3, n, N) derivatives by q, qd and qdd of n joints at N samples
+        by_states  (3, n, N) derivatives of the scalar by q, qd and qdd of n joints at N samples of the motion
         """
         by_centre = by_states[0].sum(axis=1)
         by_scale = np.einsum("pnt,pnt->n", by_states, at.raw) - by_centre * at.place * self.half * at.reach

@@ -146,7 +146,8 @@ def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:
 def simulate(
     robot: VirtualRobot, trajectory: Trajectory, *, payload: Payload | None = None, seed: int = 0
 ) -> Log:
-    """Return the log of the robot's sensors while it runs a trajectory from rest, with the rows of the trajectory."""
+    """Return the log of the robot's sensors while it runs a trajectory from rest. The log has one row for each row (time
+    step) of the trajectory."""
     shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
     rigid = _rigid_torque(_loaded(robot, payload), *shifted)
     tau = rigid + _friction(robot, trajectory, shifted[0], shifted[1], rigid)
