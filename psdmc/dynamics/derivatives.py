@@ -27,7 +27,7 @@ from typing import NamedTuple
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, about_z, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, about_z, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -104,7 +104,7 @@ def inverse_dynamics_derivatives(
     nv = first[-1]
     by_q, by_qd, by_qdd = ([[0.0] * nv for _ in range(nv)] for _ in range(3))
     gravity: list[Scalar] = [0.0] * nv
-    for i, composite in _composites(frames, bodies, q, qd, qdd, forward, choices, steps):
+    for i, composite in composites(frames, bodies, q, qd, qdd, forward, choices, steps):
         for k, row in enumerate(torque_rows(frames[i], axes[i], composite), start=first[i]):
             gravity[k] = dot(row.c, axes[i].up)
             _fill_row((i, k), frames, axes, steps, row, qd, by_q, by_qd, by_qdd)
@@ -117,7 +117,7 @@ def inverse_dynamics_derivatives(
     return Derivatives(rows, slopes, mass, tuple(gravity))
 
 
-def _composites(
+def composites(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
     q: Sequence[Scalar],
@@ -137,12 +137,7 @@ def _composites(
         frame, step = frames[i], steps[i]
         whole = at_rest(bodies[i])
         if is_leaf[i] and frame.joint.about_z:
-            body = bodies[i]
-            turn = about_z(forward.states[i].turn)
-            angle = joint_angle(frame, q[i])
-            double = (angle + angle).turn() if choices.fold_double_angle else None
-            body = spun(body, turn) if double is None else turned(body, turn, double)
-            whole = at_rest(spun(body, step.turn) if step.joins else body)
+            whole = at_rest(leaf_body(frame, bodies[i], q[i], step, forward.states[i].turn, choices))
         else:
             for child in hung[i]:
                 whole = both(whole, child)
@@ -161,6 +156,16 @@ def _composites(
     return found
 
 
+def leaf_body(
+    frame: Frame, body: Body, q: Scalar, step: Step, turn: Turn | Rotation | None, choices: Choices
+) -> Body:
+    """A body that carries no other one, in its joint's orientation."""
+    angle = joint_angle(frame, q)
+    double = (angle + angle).turn() if choices.fold_double_angle else None
+    body = spun(body, about_z(turn)) if double is None else turned(body, about_z(turn), double)
+    return spun(body, step.turn) if step.joins else body
+
+
 def _fill_row(
     at: tuple[int, int],
     frames: Sequence[Frame],
@@ -177,7 +182,7 @@ def _fill_row(
     first = first_rates(frames)
     while True:
         joint, axis = frames[j].joint, axes[j]
-        found = by_own_axes(joint, axis, row, qd[j]) if not joint.about_z else _by_axis(joint, axis, row)
+        found = by_own_axes(joint, axis, row, qd[j]) if not joint.about_z else by_axis(joint, axis, row)
         for place, (x, y, z) in enumerate(zip(*found, strict=True), start=first[j]):
             by_q[k][place], by_qd[k][place] = x, y
             by_qdd[k][place] = by_qdd[place][k] = z
@@ -186,7 +191,7 @@ def _fill_row(
         row, j = steps[j].carried_row(row), frames[j].parent
 
 
-def _by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tuple[Scalar], tuple[Scalar]]:
+def by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tuple[Scalar], tuple[Scalar]]:
     """Derivatives of a torque with this row by a joint's position, rate and acceleration."""
     turning = dot(row.a, axis.bend) + dot(row.b, axis.rate) + dot(row.c, axis.lever)
     by_q = effort(joint, (0.0, 0.0, dot(row.c, axis.bend)), (0.0, 0.0, turning))

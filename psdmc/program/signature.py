@@ -15,9 +15,10 @@ from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
 from psdmc.program.thin_products import Thin
 
-WORDS = ("n", "nq", "nv", "nx", "l", "frames", "contacts", "contact_rows", "nonzeros")
-"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames, contacts
-and the rows of all contacts; and, of a function that packs a matrix, entries that it puts out."""
+WORDS = ("n", "nq", "nv", "nx", "nxa", "nxu", "l", "frames", "contacts", "contact_rows", "nonzeros")
+"""Sizes that depend on the robot: joints, length of q, of qd, of both together, and of these with qdd and with tau, base
+parameters, named frames, contacts and the rows of all contacts; and, of a function that packs a matrix, entries that it puts
+out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,16 @@ class Sizes:
     def nx(self) -> int:
         """Length of a small motion of the state (q, qd), along the tangent of q."""
         return 2 * self.nv
+
+    @property
+    def nxa(self) -> int:
+        """Length of a small motion of (q, qd, qdd), along the tangent of q."""
+        return 3 * self.nv
+
+    @property
+    def nxu(self) -> int:
+        """Length of a small motion of (q, qd, tau), along the tangent of q."""
+        return 3 * self.nv
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:
@@ -79,7 +90,8 @@ class Quantity:
     means    what Python's documentation says of it, with the unit
     unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
     powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
-             joint coordinates (rad or m), nx those of nv and then the same per second, l those of base parameters. The
+             joint coordinates (rad or m), nx those of nv and then the same per second, nxa and nxu those of nx and then of
+             qdd or tau, l those of base parameters. The
              first three of 6, and of each contact's rows, are m, the others 1
     default  of an input that Python's callers may leave out: the value of all its entries
     whole    whether tests draw whole numbers alone

@@ -53,7 +53,7 @@ def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packi
 def unpacked(packing: Packing, dense: Recipe, robot: RobotOnArrays, values: Array) -> Arrays:
     """The outputs of `dense` from the values of the function that packs it, (k, nonzeros)."""
     (matrix,) = dense.signature.outputs
-    lengths = {"nv": robot.nv, "l": robot.lift.shape[1]}
+    lengths = {"nv": robot.nv, "nxa": 3 * robot.nv, "l": robot.lift.shape[1]}
     found = np.zeros((len(values), *(lengths[axis] for axis in matrix.axes)))
     rows, columns = _indices(packing, robot)
     found[:, rows, columns] = values

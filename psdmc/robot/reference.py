@@ -98,6 +98,28 @@ class Reference:
         by_q, by_qd, by_tau = np.moveaxis(self.each(derivatives, q, qd, tau), -3, 0)
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
+    def second_derivatives(self, gradient: Callable[..., Sequence[Array]], *states: Array) -> Array:
+        """(..., 3 nv, 3 nv) second derivatives by q, qd and a third quantity of what has this gradient by each of them: its
+        central differences of eighth order, along `integrate` for q. Of joints of several coordinates, the mean of both
+        orders."""
+        nv = self.model.nv
+        columns = []
+        for which, size in enumerate((DIFFERENCE, 1.0, 1.0)):
+            for step in size * np.eye(nv):
+                total = np.zeros((*states[1].shape[:-1], 3 * nv))
+                for k, weight in enumerate(CENTRAL, start=1):
+                    for sign in (k, -k):
+                        moved = list(states)
+                        way = np.broadcast_to(sign * step, states[1].shape)
+                        moved[which] = moved[which] + way if which else self.integrated(moved[0], way)
+                        total += np.copysign(weight / size, weight * sign) * np.concatenate(
+                            gradient(*moved), -1
+                        )
+                columns.append(total)
+        found = np.stack(columns, axis=-1)
+        mean: Array = 0.5 * (found + np.swapaxes(found, -1, -2))
+        return mean
+
     def integrated(self, q: Array, way: Array) -> Array:
         """(..., nq) positions where constant rates lead from q; `way` are these times seconds."""
 
