@@ -1,18 +1,22 @@
 """Second derivatives of weighted torques, lambda . tau, by q, qd and qdd: a recursion over composites.
 
-Let u be the velocities of all points at the joint rates lambda. By d'Alembert's principle lambda . tau is the integral of
-u . x'' over the mass. A small motion of joint j changes u, the velocities and the accelerations of the points beyond it,
-and all of them by the motion of the link before the joint (derivatives.py). So a first derivative is
+Let u be the velocities of all points at the joint rates lambda. By d'Alembert's principle, lambda . tau is the integral of
+u . x'' over the mass. A small motion of joint j changes u, the velocities and the accelerations of all points beyond it, by
+what follows from the motion of the link before the joint (derivatives.py). First derivatives are therefore
 
     d / d q_j    =  D_j . F + A . z_j'' + B . z_j' + C . (a_j x z_j)
     d / d qd_j   =  2 A . z_j' + B . z_j
     d / d qdd_j  =  A . z_j
 
-with A = int r x u dm, B = 2 int r' x u dm and C = int u dm over the bodies beyond joint j, the wrench F that they require,
-and the twist D_j by which u changes: omega x z and, at the joint's origin, o' x z, where the link before the joint moves with
-(omega, o') at the rates lambda. This is a row of the first derivatives with u in the place of t_i. Of all this, the motion of
-a joint k beyond j changes F, A, B and C alone. The second derivatives therefore are the same sums of the derivatives of F, A,
-B and C by the position, rate and acceleration of joint k, carried from joint k to the base.
+with A = int r x u dm, B = 2 int r' x u dm and C = int u dm over the bodies beyond joint j, and the wrench F that they
+require. D_j is the twist by which u changes, omega x z and v x z, if the link before the joint moves with the angular
+velocity omega, and the joint's origin with v, at the rates lambda. The sums without D_j . F are those of the first
+derivatives of one torque, with u in the place of t_i.
+
+Of all this, the motion of a joint k beyond joint j changes F, A, B and C alone. So the second derivatives are the same sums
+of the derivatives of F, A, B and C by the position, rate and acceleration of joint k, carried from joint k to the base.
+
+Nganga, Wensing 2021 differentiate lambda . tau once by such a recursion, and again automatically.
 """
 
 from __future__ import annotations
@@ -202,8 +206,8 @@ def _with_b(composite: Composite, more: Vector) -> Composite:
 
 # What the motion of one joint changes for the joints before it.
 class Change(NamedTuple):
-    """Derivatives by the position, rate and acceleration of a joint, about an origin: of the wrench that the bodies beyond it
-    require, and of the row A, B, C of u. By the acceleration, the row does not change, and A and C not by the rate."""
+    """Derivatives about an origin: of the wrench that the bodies beyond a joint require, by the joint's position, rate and
+    acceleration; and of the row A, B, C of u by the position and rate."""
 
     moved: Wrench
     pushed: Wrench

@@ -109,7 +109,7 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
     if not names:
         raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
-    called = {known[name].calls for name in names}
+    called = {other for name in names for other in known[name].calls}
     return tuple(name for name in known if name in names or name in called)
 
 

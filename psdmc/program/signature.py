@@ -167,7 +167,7 @@ class Signature:
     thin      outputs (nv, nv) that a trace with limbs gives as factors, besides THIN, and no product (thin_products.py)
     normalizes  whether quaternions that it reads may have any length but zero
     summary   a sentence on what it computes, for Python and the table of docs/functions.md
-    calls     name of a function of states that its C calls stage by stage, instead of a body of its own
+    calls     names of functions of states that its C calls
     spoilt    what its outputs are called where they become NaN
     """
 
@@ -180,7 +180,7 @@ class Signature:
     factorises: tuple[SymmetricMatrix, ...] = ()
     products: tuple[Product, ...] = ()
     thin: tuple[Thin, ...] = ()
-    calls: str | None = None
+    calls: tuple[str, ...] = ()
     normalizes: bool = False
     summary: str = ""
     spoilt: str = "results"
