@@ -176,8 +176,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """From Pinocchio's derivatives and differences of its gradient of inverse dynamics; differences of the gradient of forward
-    dynamics would be less exact where the mass matrix is nearly singular."""
+    """From Pinocchio's derivatives, and differences of its gradient of inverse dynamics. Differences of the gradient of
+    forward dynamics would be less exact if the mass matrix is nearly singular."""
     qdd, *slopes = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
     weights = weighted(given[COTANGENT_OF_QDD.name], slopes[2])
     there = {**given, "qdd": qdd, COTANGENT.name: weights}
