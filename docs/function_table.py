@@ -30,7 +30,11 @@ UNRELEASED = frozenset(
         "contact_drift",
         "contact_jacobian",
         "delassus",
+        "forward_dynamics_second_derivatives",
+        "forward_dynamics_second_derivatives_packed",
         "impulse",
+        "inverse_dynamics_second_derivatives",
+        "inverse_dynamics_second_derivatives_packed",
         "operational_space_inertia",
         "tangent_map",
     ]

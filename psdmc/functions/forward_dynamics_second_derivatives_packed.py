@@ -11,6 +11,6 @@ RECIPE = packed(
     forward_dynamics_second_derivatives.RECIPE,
     216,
     "entries of the lower triangle of cotangent . qdd's second derivatives that can differ from zero, row by row",
-    "Compute the entries of forward_dynamics_second_derivatives's lower triangle that can differ from zero, row by row.",
+    "Compute the lower triangle of forward_dynamics_second_derivatives: the entries that can differ from zero, row by row.",
     Packing(forward_dynamics_second_derivatives.RECIPE.name, acceleration_hessian_places, is_triangle=True),
 )

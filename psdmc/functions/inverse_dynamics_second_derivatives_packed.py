@@ -11,6 +11,6 @@ RECIPE = packed(
     inverse_dynamics_second_derivatives.RECIPE,
     199,
     "entries of the lower triangle of cotangent . tau's second derivatives that can differ from zero, row by row",
-    "Compute the entries of inverse_dynamics_second_derivatives's lower triangle that can differ from zero, row by row.",
+    "Compute the lower triangle of inverse_dynamics_second_derivatives: the entries that can differ from zero, row by row.",
     Packing(inverse_dynamics_second_derivatives.RECIPE.name, torque_hessian_places, is_triangle=True),
 )
