@@ -175,8 +175,9 @@ class _Lowered:
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
-        if recipe.regions is not None:
-            regions, program = recipe.regions(self.geometry.unmoved.frames), NOTHING
+        regions = recipe.regions(self.geometry.unmoved.frames) if recipe.regions else None
+        if regions is not None:
+            program = NOTHING
             if self.model.nv <= TRACED:
                 arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
                 program = trace_dynamics(recipe, arranged, self._search(theta).robot)

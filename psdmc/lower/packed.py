@@ -28,8 +28,8 @@ def packed(kernel: Kernel, function: Signature, columns: int, places: Places) ->
         Slot(matrix.name, row * columns + column): Slot(values.name, k)
         for k, (row, column) in enumerate(places)
     }
-    single = _only(kernel.single, kept)
-    batch = single if kernel.batch is kernel.single else _only(kernel.batch, kept)
+    single = _only(kernel.single, matrix.name, kept)
+    batch = single if kernel.batch is kernel.single else _only(kernel.batch, matrix.name, kept)
     limbs = None if kernel.limbs is None else _limbs(kernel.limbs, matrix.name, kept)
     regions = None if kernel.regions is None else _regions(kernel.regions, matrix.name, columns, kept)
     return replace(
@@ -37,8 +37,13 @@ def packed(kernel: Kernel, function: Signature, columns: int, places: Places) ->
     )
 
 
-def _only(program: Program, kept: Kept) -> Program:
-    outputs = tuple((kept[slot], index) for slot, index in program.outputs if slot in kept)
+def _only(program: Program, matrix: str, kept: Kept) -> Program:
+    """The PROGRAM without the matrix's other entries; pivots stay."""
+    outputs = tuple(
+        (kept.get(slot, slot), index)
+        for slot, index in program.outputs
+        if slot in kept or slot.vector != matrix
+    )
     return drop_unused(Program(program.body, outputs))
 
 

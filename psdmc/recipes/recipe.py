@@ -151,8 +151,8 @@ class Recipe:
     benched      whether `make bench` measures it
     packs        the matrix some of whose entries it puts out: its own function is lowered, and the other entries are left
                  out. Its `trace`, and the values of `pinocchio`, are that function's
-    regions      its body as regions, which the C is made of; its `trace` is those regions written out. None: the C is the
-                 straight line
+    regions      its body as regions, which the C is made of; its `trace` is those regions written out. None, also of one
+                 robot: the C is the straight line
     """
 
     signature: Signature
@@ -175,7 +175,7 @@ class Recipe:
     default_where_wide: bool = False
     benched: bool = False
     packs: Packing | None = None
-    regions: Callable[[Sequence[Frame]], Regions] | None = None
+    regions: Callable[[Sequence[Frame]], Regions | None] | None = None
 
     def __post_init__(self) -> None:
         if self.needs is None and self.signature.factorises:

@@ -9,7 +9,7 @@ from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchi
 from fifty_digits import fifty_digit_jacobian
 from hessians_of_trees import HessianTree, error, followers, trees
 from hypothesis import given, settings
-from wide_robots import is_pinocchios
+from wide_robots import is_pinocchios, wide_robot
 
 from psdmc.functions import RECIPES
 from psdmc.program.interpret import interpret
@@ -66,6 +66,21 @@ def test_it_is_symmetric_to_the_last_bit() -> None:
     own = bench(ARM)
     found = getattr(own.robot, NAME)(*(own.given[name] for name in ("q", "qd", "tau", "cotangent")))
     np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
+
+
+def test_calls_and_loops_take_parameters_at_run_time() -> None:
+    """Of a robot with more rates than are written out: in rows, for one state, and where nothing is a number."""
+    own = wide_robot("small")
+    for name in (NAME, f"{NAME}_packed"):
+        recipe, robot = RECIPES[name], own.compiled(name)
+        states = [own.given[quantity.name] for quantity in recipe.signature.inputs]
+        expected, theta_b = recipe.reference(own.arrays, own.given), np.asarray(own.model.theta_b)
+        (values,) = expected.values()
+        found = robot.call(recipe.signature, states, theta_b)
+        assert error(found, values) < 1e-9
+        one = robot.call(recipe.signature, [array[3] for array in states], theta_b)
+        np.testing.assert_array_equal(one, found[3])
+        assert np.isnan(robot.call(recipe.signature, states, -theta_b)).all()
 
 
 def test_where_the_mass_matrix_is_not_positive_nothing_is_a_number() -> None:
