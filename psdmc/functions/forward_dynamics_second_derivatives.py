@@ -11,18 +11,30 @@ lambda; H_xa is zero unless x is q.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.frames import Frame, with_carriers
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import leading
+from psdmc.dynamics.slices import joints_of_rates, leading
 from psdmc.functions import forward_dynamics_derivatives as accelerations
 from psdmc.functions import inverse_dynamics_second_derivatives as torques
-from psdmc.program.regions import Call, Column, For, Reader, Regions, Slice, drop_unread, run, straight
+from psdmc.program.regions import (
+    Call,
+    Column,
+    For,
+    Reader,
+    Region,
+    Regions,
+    Slice,
+    drop_unread,
+    run,
+    straight,
+)
 from psdmc.program.signature import QD, TAU, Q, Signature
 from psdmc.recipes.directions import COTANGENT, COTANGENT_OF_QDD, hessian_of, weighted
 from psdmc.recipes.on_arrays import RobotOnArrays
@@ -83,9 +95,6 @@ def _regions(frames: Sequence[Frame]) -> Regions:
     def weighted_row(read: Reader) -> dict[str, Column]:
         return {"weight": Column([_product(read("row", nv), read("cotangent", nv))])}
 
-    def bent(read: Reader) -> dict[str, Column]:
-        return {"entry": Column([_product(read("row", nv), read("slope", nv, nv))])}
-
     def by_q_q(read: Reader) -> dict[str, Column]:
         turned = read("bent_ij", 1)[0] + read("bent_ji", 1)[0]
         return {"entry": Column([-(read("own", 1)[0] + turned)])}
@@ -107,7 +116,7 @@ def _regions(frames: Sequence[Frame]) -> Regions:
 
     entry, own = Slice("entry", "hessian_i"), Slice("own", "torques_i")
     bent_ij, mirror = Slice("bent_ij", "bent_i"), Slice("mirror", "mirror_i", 0, width)
-    body = (
+    body: tuple[Region, ...] = (
         Call(
             ACCELERATIONS.name,
             (("q", 0), ("qd", 0), ("tau", 0)),
@@ -119,20 +128,7 @@ def _regions(frames: Sequence[Frame]) -> Regions:
         ),
         Call(TORQUES.name, (("q", 0), ("qd", 0), ("qdd", 0), ("weights", 0)), (("torques", 0),)),
         For(still * width, (Slice("entry", "bent"),), (straight(lambda read: {"entry": Column([0.0])}),)),
-        For(
-            nv - still,
-            (
-                Slice("row", "torques", still * width + 2 * nv, width),
-                Slice("bent_i", "bent", still * width, width),
-            ),
-            (
-                For(
-                    3,
-                    (Slice("slopes_k", "slopes", 0, size), Slice("bent_k", "bent_i", 0, nv)),
-                    (For(nv, (Slice("slope", "slopes_k"), Slice("entry", "bent_k")), (straight(bent),)),),
-                ),
-            ),
-        ),
+        *_bent_rows(frames, still, nv),
         For(
             nv,
             (rows("hessian"), rows("torques"), rows("bent"), Slice("column", "bent")),
@@ -173,6 +169,46 @@ def _regions(frames: Sequence[Frame]) -> Regions:
     )
     sizes = {"qdd": nv, "slopes": 3 * size, "weights": nv, "torques": 9 * size, "bent": 3 * size}
     return drop_unread(Regions(sizes, body))
+
+
+def _bent_rows(frames: Sequence[Frame], still: int, nv: int) -> Iterator[For]:
+    """The rows of H_qa times the slopes, from row `still` on. A loop takes neighbouring rows with zeros in the same columns,
+    such as those of a leg."""
+    width, coupled = 3 * nv, _coupled(frames)
+    for columns, numbers in groupby(range(still, nv), key=coupled.__getitem__):
+
+        def entry(read: Reader, columns: Sequence[int] = columns) -> dict[str, Column]:
+            row, slope = read("row", nv), read("slope", nv, nv)
+            return {"entry": Column([_product([row[k] for k in columns], [slope[k] for k in columns])])}
+
+        own = tuple(numbers)
+        yield For(
+            len(own),
+            (
+                Slice("row", "torques", own[0] * width + 2 * nv, width),
+                Slice("bent_i", "bent", own[0] * width, width),
+            ),
+            (
+                For(
+                    3,
+                    (Slice("slopes_k", "slopes", 0, nv * nv), Slice("bent_k", "bent_i", 0, nv)),
+                    (For(nv, (Slice("slope", "slopes_k"), Slice("entry", "bent_k")), (straight(entry),)),),
+                ),
+            ),
+        )
+
+
+def _coupled(frames: Sequence[Frame]) -> list[tuple[int, ...]]:
+    """For each rate those that move a joint of it, carry one or are carried by one."""
+    moved = [
+        {i for i, frame in enumerate(frames) if owner in (i, frame.follows and frame.follows[0])}
+        for owner in joints_of_rates(frames)
+    ]
+    carriers = [set(with_carriers(frames, own)) for own in moved]
+    return [
+        tuple(k for k in range(len(moved)) if moved[k] & carriers[j] or moved[j] & carriers[k])
+        for j in range(len(moved))
+    ]
 
 
 def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
