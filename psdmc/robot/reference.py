@@ -101,15 +101,15 @@ class Reference:
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
     def second_derivatives(self, gradient: Callable[..., Sequence[Array]], *states: Array) -> Array:
-        """(..., 3 nv, 3 nv) second derivatives by q, qd and a third quantity of what has this gradient by each of them: its
-        central differences of eighth order, along `integrate` for q. Of joints of several coordinates, the mean of both
-        orders."""
+        """Return (..., 3 nv, 3 nv) second derivatives from this gradient by q, qd and a third vector: its central
+        differences, for q of eighth order and along `integrate`. The gradient may be at most quadratic in qd and the third
+        vector, for which differences are exact. For joints with several coordinates, the matrix is the mean of both orders."""
         nv = self.model.nv
         columns = []
         for which, size in enumerate((DIFFERENCE, 1.0, 1.0)):
             for step in size * np.eye(nv):
                 total = np.zeros((*states[1].shape[:-1], 3 * nv))
-                for k, weight in enumerate(CENTRAL, start=1):
+                for k, weight in enumerate((0.5,) if which else CENTRAL, start=1):
                     for sign in (k, -k):
                         moved = list(states)
                         way = np.broadcast_to(sign * step, states[1].shape)
