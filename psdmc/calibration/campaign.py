@@ -29,8 +29,8 @@ UNFINISHED = ".psdmc-unfinished"
 
 @contextmanager
 def being_written(folder: str | Path) -> Iterator[None]:
-    """Mark a folder as incomplete while a campaign is written to it. If the process is killed, psdmc may write the
-    folder again."""
+    """Mark a folder as incomplete during a `with` statement that writes a campaign to it. If the process is killed, the
+    mark remains, and psdmc may later write a new campaign to the folder."""
     root = Path(folder)
     make_folder(root)
     write_whole(root / UNFINISHED, "")
@@ -79,7 +79,7 @@ def write_campaign(
     *,
     force: bool = False,
 ) -> Path:
-    """Write the folder of a campaign. Return the path of its campaign.toml.
+    """Write the plan and the trajectories of a campaign to a folder. Return the path of its campaign.toml.
 
     formats  names of formats of controllers; each trajectory is also written in these formats
     force    True: replace the plan and the trajectories of an existing campaign; logs are never changed
@@ -146,7 +146,8 @@ def _toml_text(text: str) -> str:
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
-    """Return the parameters of the exciting motion, (22) in Denso-2022, and its condition number as plain JSON values."""
+    """Return the exciting motion of a campaign as plain JSON values. They are the parameters of its Fourier series,
+    (22) in Denso-2022, and the condition number of its regressor."""
     motion = found.motion
     return {
         "duration_s": motion.duration,

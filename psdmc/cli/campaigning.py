@@ -32,6 +32,9 @@ def excite(
     one_log: Annotated[
         bool, typer.Option("--one-log", help="plan one motion and one log instead of four steps")
     ] = False,
+    validation: Annotated[
+        bool, typer.Option("--validation", help="also plan a second motion, to test the calibration with")
+    ] = False,
     load: Annotated[
         str | None,
         typer.Option(
@@ -150,6 +153,7 @@ def excite(
         load=None if carried is None else Load(*carried),
         repeats=repeats,
         one_log=one_log,
+        validation=validation,
         limits=limits,
         shapes=tuple(meshes or ()) if collisions else None,
         floor=floor,
