@@ -45,6 +45,7 @@ class PackageView:
 
     robot     identifier that every symbol starts with
     adapters  names of psdmc.backends.c.adapters
+    private   functions for one state that adapters alone call: no header declares them
     """
 
     robot: str
@@ -53,12 +54,19 @@ class PackageView:
     functions: tuple[FunctionView, ...]
     references: ReferenceView | None
     adapters: tuple[str, ...] = ()
+    private: tuple[FunctionView, ...] = ()
+
+    @property
+    def alone(self) -> PackageView:
+        """The same without functions for many states."""
+        target = replace(self.target, forms=self.target.forms[:1])
+        return replace(self, options=replace(self.options, target=target))
 
     @property
     def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
         """Adapters whose C file becomes a shared library of its own, lib<robot>_<name>, and the sources compiled into it
         besides: files for CasADi include them, under other names."""
-        sources = {"casadi": (), "casadi_theta": (), "fmu": self.sources}
+        sources = {"casadi": (), "casadi_theta": (), "casadi_hessian": (), "fmu": self.sources}
         return {name: sources[name] for name in self.adapters if name in sources}
 
     @property
@@ -195,14 +203,19 @@ class PackageView:
         return tuple(kernel for function in self.functions for kernel in function.kernels)
 
     @property
+    def _all_kernels(self) -> tuple[KernelView, ...]:
+        """Those of adapters, too."""
+        return (*self.kernels, *(kernel for function in self.private for kernel in function.kernels))
+
+    @property
     def is_mixed(self) -> bool:
         """Whether some kernel writes one output's rows from registers and another's from a block."""
-        return any(kernel.is_mixed for kernel in self.kernels)
+        return any(kernel.is_mixed for kernel in self._all_kernels)
 
     @property
     def fails_in_several(self) -> bool:
         """Whether some kernel that fails sets more than one vector of all joints to NaN."""
-        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self.kernels)
+        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self._all_kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
@@ -212,7 +225,7 @@ class PackageView:
     @property
     def has_parts(self) -> bool:
         """Whether some body is several functions."""
-        return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels)
+        return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self._all_kernels)
 
     @property
     def has_thin_products(self) -> bool:
@@ -222,12 +235,12 @@ class PackageView:
     @property
     def has_clears(self) -> bool:
         """Whether some body clears runs of zeros."""
-        return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)
+        return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self._all_kernels)
 
     @property
     def calls(self) -> tuple[CallView, ...]:
         """Operations of some kernel that are macros."""
-        bodies = [body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body)]
+        bodies = [body for kernel in self._all_kernels for body in (kernel.single_body, kernel.lanes_body)]
         found = {op for body in bodies for op in body.calls}
         found |= {op for kernel in self.kernels if kernel.regions for op in kernel.regions.calls}
         return call_views(frozenset(found))

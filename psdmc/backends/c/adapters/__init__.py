@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from psdmc.backends.c.adapters import casadi, fmu, wheel
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
+from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.make_kernel_view import make_kernel_view
+from psdmc.program.kernel import Kernel
 from psdmc.robot.mechanism import Mechanism
 
 ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
-    "casadi": casadi.files,
-    "casadi_theta": casadi.files_by_theta,
+    casadi.FIRST: casadi.files_of(casadi.FIRST),
+    casadi.BY_THETA: casadi.files_of(casadi.BY_THETA),
+    casadi.HESSIANS: casadi.files_of(casadi.HESSIANS),
     "wheel": wheel.files,
     "fmu": fmu.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
-NEEDS = {"casadi": casadi.needed, "casadi_theta": casadi.needed_by_theta, "fmu": fmu.needed}
+NEEDS = {
+    casadi.FIRST: casadi.needed,
+    casadi.BY_THETA: casadi.needed_by_theta,
+    casadi.HESSIANS: casadi.needed,
+    "fmu": fmu.needed,
+}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
-REMARKS = {"casadi": casadi.remark, "casadi_theta": casadi.remark}
+REMARKS = dict.fromkeys((casadi.FIRST, casadi.BY_THETA, casadi.HESSIANS), casadi.remark)
 """By name, the function that says what users should know of an adapter's functions of a robot."""
 
 
@@ -40,7 +50,18 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
     return list(found)
 
 
-def remarks(robot: Mechanism, adapters: Sequence[str], functions: Sequence[str]) -> tuple[str, ...]:
-    """What users should know of these adapters' functions of a robot, one clause each."""
-    found = (REMARKS[adapter](robot, functions) for adapter in chosen(adapters) if adapter in REMARKS)
+def remarks(
+    robot: Mechanism, adapters: Sequence[str], functions: Sequence[str], l: int = 0
+) -> tuple[str, ...]:
+    """What users should know of these adapters' functions of a robot with l base parameters, one clause each."""
+    found = (REMARKS[adapter](robot, functions, l) for adapter in chosen(adapters) if adapter in REMARKS)
     return tuple(dict.fromkeys(reason for reason in found if reason is not None))
+
+
+def with_own_kernels(package: PackageView, kernels: Mapping[str, Kernel]) -> PackageView:
+    """The package with the functions that its adapters call and that no header declares. `kernels`: of the package."""
+    alone = package.alone
+    own = casadi.own_kernels(kernels, package.adapters, package.info, package.target.costs)
+    views = [make_kernel_view(kernel, package.info.sizes, package.robot, alone.options) for kernel in own]
+    functions = (FunctionView(one.name, one.function.meaning, "", one.function, (one,)) for one in views)
+    return replace(package, private=tuple(functions))

@@ -1,0 +1,161 @@
+"""Derivatives for CasADi that no generated function computes: kernels made of the functions' PROGRAMs.
+
+CasADi's function is the emitted one at q with its quaternions divided by their lengths. Here this division stands in front
+of the PROGRAM, so that all derivatives, also second ones, are by the entries of q of any length. Entries of matrices are in
+CasADi's order, column by column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import prod
+
+from psdmc.backends.info import PackageInfo
+from psdmc.program.differentiate import Block, jacobians, vjp
+from psdmc.program.kernel import Kernel
+from psdmc.program.pipeline import ordered, shortened
+from psdmc.program.program import Op, Program, Slot
+from psdmc.program.replay import Value, replayed
+from psdmc.program.signature import PIVOTS, Q, Quantity, Signature, Sizes
+from psdmc.program.trace import Tracer
+from psdmc.target.costs import Costs
+
+JACOBIAN, ADJOINT, SECOND = "_jac", "_adj1", "_jac_adj1"
+"""Endings of these kernels' names: derivatives of all outputs by all inputs; gradients by all inputs of the outputs' sum
+with weights; and derivatives of these gradients by all inputs and weights."""
+
+MOST = 10_000
+"""Entries up to which a Jacobian is made: those of a quadruped's mass matrix and of its frame Jacobians are fewer."""
+
+THETA = "theta_b"
+
+
+def sizes_of(function: Signature, sizes: Sizes, theta: bool) -> tuple[dict[str, int], dict[str, int]]:
+    """Reals of each input, theta_b included, and of each output."""
+    inputs = {quantity.name: sizes.size(quantity) for quantity in function.inputs}
+    return inputs | ({THETA: sizes.l} if theta else {}), {q.name: sizes.size(q) for q in function.outputs}
+
+
+def has_small_jacobian(function: Signature, sizes: Sizes, theta: bool = False) -> bool:
+    """Whether a function has inputs, and at most MOST derivatives."""
+    inputs, outputs = sizes_of(function, sizes, theta)
+    return 0 < sum(inputs.values()) * sum(outputs.values()) <= MOST
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """The kernels of one function's derivatives; `kernel` is a straight line."""
+
+    kernel: Kernel
+    info: PackageInfo
+    costs: Costs
+
+    @cached_property
+    def _lengths(self) -> tuple[dict[str, int], dict[str, int]]:
+        return sizes_of(self.kernel.function, self.info.sizes, self.kernel.theta)
+
+    @property
+    def jacobian(self) -> Kernel:
+        inputs, outputs = self._lengths
+        blocks = [Block(f"d{o}_d{i}", o, i, outputs[o], inputs[i]) for o, i in product(outputs, inputs)]
+        return self._of_blocks(JACOBIAN, (), self._function, blocks)
+
+    @property
+    def adjoint(self) -> Kernel:
+        inputs, _ = self._lengths
+        outputs = [Quantity(f"adj_{name}", (str(size),)) for name, size in inputs.items()]
+        return self._kernel(ADJOINT, self._seeds, outputs, self._gradients)
+
+    @property
+    def second(self) -> Kernel:
+        inputs, _ = self._lengths
+        by = inputs | {seed.name: int(seed.axes[0]) for seed in self._seeds}
+        blocks = [Block(f"dadj_{i}_d{j}", f"adj_{i}", j, inputs[i], by[j]) for i, j in product(inputs, by)]
+        return self._of_blocks(SECOND, self._seeds, self._gradients, blocks)
+
+    @property
+    def _seeds(self) -> list[Quantity]:
+        return [Quantity(f"seed_{name}", (str(size),)) for name, size in self._lengths[1].items()]
+
+    @cached_property
+    def _function(self) -> Program:
+        """CasADi's function."""
+        function, sizes = self.kernel.function, self.info.sizes
+        at = {q.name: _columns_first(sizes.shape(q.axes)) for q in function.outputs}
+        tracer = Tracer()
+        positions = [q.name for q in function.inputs if q.axes == Q.axes and not function.normalizes]
+        given = dict(
+            one for name, unit in product(positions, self.info.units) for one in _divided(tracer, name, *unit)
+        )
+        values = replayed(self.kernel.single, tracer, given)
+        slots = [
+            Slot(slot.vector, at[slot.vector][slot.index] if slot.vector in at else slot.index)
+            for slot, _ in self.kernel.single.outputs
+        ]
+        return tracer.finish(list(zip(slots, values, strict=True)))
+
+    @cached_property
+    def _gradients(self) -> Program:
+        inputs, outputs = self._lengths
+        found = vjp(
+            self._function,
+            {name: f"seed_{name}" for name in outputs},
+            {name: f"adj_{name}" for name in inputs},
+            inputs,
+        )
+        return _storing(found, [PIVOTS, *(f"adj_{name}" for name in inputs)])
+
+    def _of_blocks(
+        self, ending: str, more: Sequence[Quantity], program: Program, blocks: Sequence[Block]
+    ) -> Kernel:
+        """By the mode that takes fewer operations."""
+        found = min((jacobians(program, blocks, mode) for mode in ("forward", "reverse")), key=len)
+        outputs = [Quantity(block.name, (str(block.rows), str(block.columns))) for block in blocks]
+        return self._kernel(ending, more, outputs, found)
+
+    def _kernel(
+        self, ending: str, more: Sequence[Quantity], outputs: Sequence[Quantity], program: Program
+    ) -> Kernel:
+        own = self.kernel.function
+        function = replace(
+            own,
+            name=own.name + ending,
+            meaning=f"derivatives of {own.name} for CasADi",
+            inputs=(*own.inputs, *more),
+            outputs=tuple(outputs),
+            products=(),
+            thin=(),
+            calls=None,
+            normalizes=True,
+        )
+        stored = _storing(program, [PIVOTS, *(quantity.name for quantity in outputs)])
+        one, _ = ordered(shortened(stored), self.costs)
+        return Kernel(function, self.kernel.theta, one, one, self.kernel.lowering)
+
+
+def matrix_of(shape: Sequence[int]) -> tuple[int, int]:
+    """Rows and columns: the last axis is that of columns, a vector is a column."""
+    return (prod(shape[:-1]), shape[-1]) if len(shape) > 1 else (prod(shape), 1)
+
+
+def _columns_first(shape: Sequence[int]) -> list[int]:
+    """Where CasADi keeps the entries of a row-major array, whose last axis is that of columns."""
+    rows, columns = matrix_of(shape)
+    return [column * rows + row for row in range(rows) for column in range(columns)]
+
+
+def _divided(tracer: Tracer, name: str, first: int, end: int) -> Iterator[tuple[Slot, Value]]:
+    """A part of a position, divided by its length."""
+    slots = [Slot(name, k) for k in range(first, end)]
+    entries = [tracer.symbol(slot) for slot in slots]
+    square: Value = sum((entry * entry for entry in entries), start=0.0)
+    length = tracer.operated(Op.SQRT, [square])
+    yield from zip(slots, (entry / length for entry in entries), strict=True)
+
+
+def _storing(program: Program, names: Sequence[str]) -> Program:
+    """The PROGRAM with outputs of these names alone."""
+    return Program(program.body, tuple(each for each in program.outputs if each[0].vector in names))
