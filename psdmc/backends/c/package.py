@@ -235,7 +235,9 @@ class PackageView:
     @property
     def has_clears(self) -> bool:
         """Whether some body clears runs of zeros."""
-        return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self._all_kernels)
+        return any(
+            kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self._all_kernels
+        )
 
     @property
     def calls(self) -> tuple[CallView, ...]:

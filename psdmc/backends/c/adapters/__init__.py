@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from psdmc.backends.c.adapters import casadi, fmu, wheel
-from psdmc.backends.c.package import PackageView
-from psdmc.errors import InputError
 from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.make_kernel_view import make_kernel_view
+from psdmc.backends.c.package import PackageView
+from psdmc.errors import InputError
 from psdmc.program.kernel import Kernel
 from psdmc.robot.mechanism import Mechanism
 

@@ -22,6 +22,7 @@ from psdmc.backends.c.adapters.casadi_kernels import (
     Derived,
     has_small_jacobian,
     matrix_of,
+    shape_of_input,
 )
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.c.package import PackageView
@@ -233,9 +234,7 @@ def casadi_view(package: PackageView, adapter: str = FIRST) -> CasadiView:
             "calibrate the model first, or write --with casadi_theta, which takes theta_b as an input",
         )
     made = _Externals(kernels, info)
-    externals = tuple(
-        one for name, kernel in kernels.items() if name in RECIPES for one in made.of(kernel)
-    )
+    externals = tuple(one for name, kernel in kernels.items() if name in RECIPES for one in made.of(kernel))
     tangent = kernels[MAP].outputs[0] if info.units else None
     longest = (vector.size for kernel in kernels.values() for vector in kernel.inputs)
     return CasadiView(
@@ -312,7 +311,8 @@ class _Externals:
             yield self._jacobian(kernel, other)
         gradient = self.kernels.get(name + GRADIENT + PARAMETERS * kernel.theta)
         adjoint, second = (self.kernels.get(name + ending) for ending in (ADJOINT, SECOND))
-        if gradient is not None and len(kernel.outputs) == 1:
+        is_of_vectors = len(kernel.outputs) == 1 and all(len(one.shape) < 2 for one in kernel.inputs)
+        if gradient is not None and is_of_vectors:
             yield self._reverse(kernel, gradient)
         elif adjoint is not None:
             yield self._by_program("adj1_", kernel, adjoint)
@@ -323,13 +323,7 @@ class _Externals:
             yield self._forward(kernel, direction)
 
     def _inputs(self, kernel: KernelView) -> tuple[Argument, ...]:
-        """The inputs. A matrix has one column per row of ours, so that the numbers have the same order in memory."""
-        found = [
-            Argument(
-                i.name, self.patterns.of(tuple(reversed(matrix_of(i.shape))) if len(i.shape) > 1 else (i.size,))
-            )
-            for i in kernel.inputs
-        ]
+        found = [Argument(i.name, self.patterns.of(shape_of_input(i.shape))) for i in kernel.inputs]
         return (*found, *([Argument(THETA, self.patterns.of((self.info.l,)))] if kernel.theta else []))
 
     def _inputs_and_outputs(self, kernel: KernelView) -> tuple[Argument, ...]:
@@ -343,7 +337,7 @@ class _Externals:
         for output in kernel.outputs:
             for k, vector in enumerate(kernel.inputs):
                 block = next(one for one in other.outputs if one.name == f"d{output.name}_d{vector.name}")
-                at, shape, zero = call.at(block.name), block.shape, frozenset(block.zero)
+                at, shape, zero = call.at(block.name), (output.size, vector.size), frozenset(block.zero)
                 if call.is_wide(k):
                     at, shape, zero = call.by_entries(block, k)
                 shown.append((f"jac_{output.name}_{vector.name}", at, self.patterns.of(shape, zero)))
@@ -356,12 +350,15 @@ class _Externals:
         """A derivative that one kernel puts out as CasADi wants it."""
         inputs, call = self._inputs_and_outputs(kernel), _Call(kernel, called, self)
         seeds = [
-            Argument(f"adj_{one.name}", self.patterns.of(one.shape)) for one in kernel.outputs if prefix != "jac_"
+            Argument(f"adj_{one.name}", self.patterns.of(one.shape))
+            for one in kernel.outputs
+            if prefix != "jac_"
         ]
         given = [f"given(arg[{len(inputs) + k}])" for k in range(len(seeds))]
         zero = {one.name: one.zero if prefix != "adj1_" else () for one in called.outputs}
         shown = [
-            (one.name, call.at(one.name), self.patterns.of(one.shape, zero[one.name])) for one in called.outputs
+            (one.name, call.at(one.name), self.patterns.of(one.shape, zero[one.name]))
+            for one in called.outputs
         ]
         if prefix == "jac_adj1_":
             shown, seeds = self._with_unread(kernel, shown, seeds)
@@ -372,17 +369,18 @@ class _Externals:
     ) -> tuple[list[tuple[str, int, str]], list[Argument]]:
         """The blocks of a Jacobian of gradients with those by the function's outputs, which are not read; and the inputs
         behind these outputs with the gradients, likewise."""
-        lengths = {one.name: one.size for one in kernel.inputs}
-        lengths |= {THETA: self.info.l} if kernel.theta else {}
         found, blocks = [], iter(shown)
-        for name, length in lengths.items():
-            found += [next(blocks) for _ in lengths]
+        for one in kernel.inputs:
+            found += [next(blocks) for _ in kernel.inputs]
             found += [
-                (f"dadj_{name}_dout_{one.name}", 0, self.patterns.unread((length, one.size)))
-                for one in kernel.outputs
+                (f"dadj_{one.name}_dout_{output.name}", 0, self.patterns.unread((one.size, output.size)))
+                for output in kernel.outputs
             ]
             found += [next(blocks) for _ in seeds]
-        unread = [Argument(f"out_adj_{name}", self.patterns.unread((size,))) for name, size in lengths.items()]
+        unread = (
+            Argument(f"out_adj_{i.name}", self.patterns.unread(shape_of_input(i.shape)))
+            for i in kernel.inputs
+        )
         return found, [*seeds, *unread]
 
     def _reverse(self, kernel: KernelView, gradient: KernelView) -> External:

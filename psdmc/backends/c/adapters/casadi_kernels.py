@@ -65,9 +65,16 @@ class Derived:
 
     @property
     def adjoint(self) -> Kernel:
-        inputs, _ = self._lengths
-        outputs = [Quantity(f"adj_{name}", (str(size),)) for name, size in inputs.items()]
-        return self._kernel(ADJOINT, self._seeds, outputs, self._gradients)
+        sizes, inputs = self.info.sizes, self.kernel.function.inputs
+        shapes = {f"adj_{q.name}": shape_of_input(sizes.shape(q.axes)) for q in inputs}
+        shapes |= {f"adj_{THETA}": (sizes.l,)} if self.kernel.theta else {}
+        at = {name: _columns_first(shape[::-1]) for name, shape in shapes.items()}
+        stored = tuple(
+            (Slot(slot.vector, at[slot.vector][slot.index]) if slot.vector in at else slot, value)
+            for slot, value in self._gradients.outputs
+        )
+        outputs = [Quantity(name, tuple(map(str, shape))) for name, shape in shapes.items()]
+        return self._kernel(ADJOINT, self._seeds, outputs, Program(self._gradients.body, stored))
 
     @property
     def second(self) -> Kernel:
@@ -139,6 +146,11 @@ class Derived:
 def matrix_of(shape: Sequence[int]) -> tuple[int, int]:
     """Rows and columns: the last axis is that of columns, a vector is a column."""
     return (prod(shape[:-1]), shape[-1]) if len(shape) > 1 else (prod(shape), 1)
+
+
+def shape_of_input(shape: Sequence[int]) -> tuple[int, ...]:
+    """What CasADi is told: a matrix has a column for each row of ours, so that the numbers lie in the same order."""
+    return matrix_of(shape)[::-1] if len(shape) > 1 else (prod(shape),)
 
 
 def _columns_first(shape: Sequence[int]) -> list[int]:
