@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,8 +22,8 @@ import psdmc
 FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 STANDING = np.array([0.0, 0.8, -1.6] * 2 + [0.0, -0.8, 1.6] * 2)
 """rad, of the joints at the start and at the end."""
-TORQUE, FRICTION = 2.5, 0.6
-"""N m of a motor; of a foot on the floor."""
+TORQUE, FRICTION, LOAD = 2.5, 0.6, 20.0
+"""N m of a motor; of a foot on the floor; N, the largest vertical force on a foot, three times its share of the weight."""
 PHASES = (24, 18, 18)
 """Nodes on the floor, in the air, and on the floor again."""
 DURATION, DISTANCE = 0.75, 0.2
@@ -145,4 +145,80 @@ def in_friction_pyramids(force: casadi.MX) -> Iterator[casadi.MX]:
     share = FRICTION / np.sqrt(2.0)
     for x, y, z in zip(*(casadi.vertsplit(force[k::3]) for k in range(3)), strict=True):
         yield z >= 0
+        yield z <= LOAD
         yield from (share * z >= part for part in (x, -x, y, -y))
+
+
+def solo12(frames: Sequence[str] = FEET) -> psdmc.DynamicsModel:
+    """On a floating base, with these links as named frames."""
+    wheel = importlib.metadata.distribution("example-robot-data")
+    file = next(file for file in wheel.files or () if file.name == "solo12.urdf")
+    return psdmc.derive(Path(str(wheel.locate_file(file))), floating=True, frames=frames)
+
+
+def with_psdmc(model: psdmc.DynamicsModel, folder: Path) -> Dynamics:
+    """What `psdmc emit-c --with casadi_hessian` and `psdmc build` make in this folder; emitted and built once."""
+    from psdmc.toolchain.build_package import build_package
+
+    library = folder / "build" / "libsolo_casadi_hessian.so"
+    names = ["inverse_dynamics_with_wrenches", "forward_kinematics"]
+    changed = psdmc.emit_c(model, folder, functions=names, name="solo", adapters=["casadi_hessian"])
+    if changed or not library.exists():
+        build_package(folder)
+    return Dynamics(*(casadi.external(f"solo_{name}", str(library)) for name in names))
+
+
+def with_pinocchio(model: psdmc.DynamicsModel) -> Dynamics:
+    """Pinocchio's rnea and forwardKinematics on CasADi's symbols, at q with its quaternion divided by its length."""
+    from psdmc.bench.build import built
+    from psdmc.bench.case import robot_as_numbers
+    from psdmc.bench.rivals.casadi_c import program_on_symbols
+
+    file = Path(__file__).with_name("pinocchio_symbols.cpp")
+    program = program_on_symbols(file.name, file.read_text())
+    lines = [robot_as_numbers(model.mechanism), str(len(FEET))]
+    for foot in model.mechanism.frames:
+        numbers = [*foot.placement.rotation.ravel(), *foot.placement.translation]
+        lines.append(" ".join([str(foot.joint + 1), *(repr(float(number)) for number in numbers)]))
+    made = built("feet.casadi", [str(program), "robot.txt"], {"robot.txt": "\n".join(lines)}).parent
+    torques, feet = (casadi.Function.load(str(made / f"{name}.casadi")) for name in ("torques", "feet"))
+    q, *others = (casadi.SX.sym(torques.name_in(k), *torques.size_in(k)) for k in range(4))
+    at = casadi.vertcat(q[:3], q[3:7] / casadi.norm_2(q[3:7]), q[7:])
+    return Dynamics(
+        casadi.Function("torques", [q, *others], [torques(at, *others)]),
+        casadi.Function("feet", [q], feet(at)),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--folder", type=Path, default=Path("generated/jump"), help="of the C package")
+    parser.add_argument("--plot", type=Path, help="a picture of the motion")
+    parser.add_argument("--animation", type=Path, help="a GIF")
+    parser.add_argument("--quick", action="store_true", help="psdmc with exact Hessians alone")
+    given = parser.parse_args()
+    model = solo12()
+    weight = float(model.gravity(model.neutral())[2])
+    ours = with_psdmc(model, given.folder)
+    ways = {"psdmc, exact Hessian": (ours, "exact")}
+    if not given.quick:
+        ways["psdmc, limited-memory"] = (ours, "limited-memory")
+        ways["Pinocchio on CasADi's symbols, exact Hessian"] = (with_pinocchio(model), "exact")
+    print(f"{'CPU time per iteration':46}{'optimum':>14}{'iterations':>12}{'functions':>11}{'all':>9}")
+    found = {}
+    for name, (dynamics, hessian) in ways.items():
+        one = found[name] = jump(dynamics, weight, hessian=hessian)
+        each = [f"{1e3 * seconds / one.iterations:.1f} ms" for seconds in (one.functions, one.total)]
+        print(f"{name:46}{one.cost:14.9f}{one.iterations:12}{each[0]:>11}{each[1]:>9}", flush=True)
+    if given.plot or given.animation:
+        from jump_plots import animate, plot
+
+        best = next(iter(found.values()))
+        for file, draw in ((given.plot, plot), (given.animation, animate)):
+            if file:
+                draw(best, file)
+                print(f"{file} written")
+
+
+if __name__ == "__main__":
+    main()

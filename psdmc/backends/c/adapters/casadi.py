@@ -5,7 +5,9 @@ library exports what f_n_in, f_sparsity_out and so on return, and jac_f: inputs 
 patterns), to one block per output and input. Matrices are column by column, nonzeros only.
 
 CasADi differentiates by the entries of q. Where q has quaternions, CasADi's f is the emitted one at q with its quaternions
-divided by their lengths, and its derivative is the emitted one, along the tangent, times d tangent / dq.
+divided by their lengths, and its derivative is the emitted one, along the tangent, times d tangent / dq. What no emitted
+function computes is made of PROGRAMs (casadi_kernels.py): Jacobians of other functions, and second derivatives, which CasADi
+asks for as jac_adj1_f, the Jacobian of the gradient adj1_f.
 """
 
 from __future__ import annotations
@@ -142,9 +144,9 @@ def needed_by_theta(functions: Sequence[str], wide: bool) -> list[str]:
 
 
 def _has_blocks(name: str) -> bool:
-    """Whether some function computes all derivatives of this one."""
+    """Whether some function computes all derivatives of this one, whose outputs are vectors."""
     other = RECIPES.get(name + DERIVATIVES)
-    if other is None:
+    if other is None or any(len(output.axes) > 1 for output in RECIPES[name].signature.outputs):
         return False
     own = RECIPES[name].signature
     names = [output.name for output in other.signature.outputs]
@@ -333,7 +335,8 @@ class _Externals:
 
     def _jacobian(self, kernel: KernelView, other: KernelView) -> External:
         call, inputs = _Call(kernel, other, self), self._inputs_and_outputs(kernel)
-        shown = []
+        shown: list[tuple[str, int, str]] = []
+        shape: tuple[int, ...]
         for output in kernel.outputs:
             for k, vector in enumerate(kernel.inputs):
                 block = next(one for one in other.outputs if one.name == f"d{output.name}_d{vector.name}")
@@ -373,7 +376,7 @@ class _Externals:
         for one in kernel.inputs:
             found += [next(blocks) for _ in kernel.inputs]
             found += [
-                (f"dadj_{one.name}_dout_{output.name}", 0, self.patterns.unread((one.size, output.size)))
+                (f"jac_adj_{one.name}_out_{output.name}", 0, self.patterns.unread((one.size, output.size)))
                 for output in kernel.outputs
             ]
             found += [next(blocks) for _ in seeds]

@@ -60,7 +60,7 @@ class Derived:
     @property
     def jacobian(self) -> Kernel:
         inputs, outputs = self._lengths
-        blocks = [Block(f"d{o}_d{i}", o, i, outputs[o], inputs[i]) for o, i in product(outputs, inputs)]
+        blocks = [Block(f"jac_{o}_{i}", o, i, outputs[o], inputs[i]) for o, i in product(outputs, inputs)]
         return self._of_blocks(JACOBIAN, (), self._function, blocks)
 
     @property
@@ -80,7 +80,7 @@ class Derived:
     def second(self) -> Kernel:
         inputs, _ = self._lengths
         by = inputs | {seed.name: int(seed.axes[0]) for seed in self._seeds}
-        blocks = [Block(f"dadj_{i}_d{j}", f"adj_{i}", j, inputs[i], by[j]) for i, j in product(inputs, by)]
+        blocks = [Block(f"jac_adj_{i}_{j}", f"adj_{i}", j, inputs[i], by[j]) for i, j in product(inputs, by)]
         return self._of_blocks(SECOND, self._seeds, self._gradients, blocks)
 
     @property
