@@ -2,8 +2,9 @@
 
     python examples/trajectory_optimisation/jump.py [--plot jump.png] [--animation jump.gif]
 
-Derives the robot, writes and builds its C package with exact Hessians for CasADi (`emit-c --with casadi_hessian`), solves
-the same problem with Pinocchio on CasADi's symbols, and prints optima, iterations and CPU time per iteration.
+Derives the robot, writes and builds its C package with exact Hessians for CasADi (`emit-c --with casadi_hessian`), and
+solves the problem. Then it is solved with limited-memory Hessians, and with Pinocchio on CasADi's symbols. Prints optima,
+iterations and CPU time per iteration.
 """
 
 from __future__ import annotations
@@ -190,6 +191,22 @@ def with_pinocchio(model: psdmc.DynamicsModel) -> Dynamics:
     )
 
 
+def compiled(dynamics: Dynamics) -> Dynamics:
+    """The same functions and their derivatives as C that CasADi generates: one function each, compiled at -O1, as compilers
+    take too long for such long functions at -O3."""
+    from psdmc.bench.build import built
+    from psdmc.toolchain.compiler_command import find_compiler
+
+    code = casadi.CodeGenerator("generated", {"casadi_int": "long long int"})
+    for function in (dynamics.torques, dynamics.feet):
+        gradient = function.reverse(1)
+        for each in (function, function.jacobian(), gradient, gradient.jacobian()):
+            code.add(each)
+    words = [*find_compiler().command, "-O1", "-march=native", "-shared", "-fPIC", "generated.c"]
+    library = built("generated.so", [*words, "-lm", "-o", "generated.so"], {"generated.c": code.dump()})
+    return Dynamics(*(casadi.external(name, str(library)) for name in ("torques", "feet")))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--folder", type=Path, default=Path("generated/jump"), help="of the C package")
@@ -203,7 +220,9 @@ def main() -> None:
     ways = {"psdmc, exact Hessian": (ours, "exact")}
     if not given.quick:
         ways["psdmc, limited-memory"] = (ours, "limited-memory")
-        ways["Pinocchio on CasADi's symbols, exact Hessian"] = (with_pinocchio(model), "exact")
+        theirs = with_pinocchio(model)
+        ways["Pinocchio on CasADi's symbols, exact Hessian"] = (theirs, "exact")
+        ways["the same as C of CasADi, exact Hessian"] = (compiled(theirs), "exact")
     print(f"{'CPU time per iteration':46}{'optimum':>14}{'iterations':>12}{'functions':>11}{'all':>9}")
     found = {}
     for name, (dynamics, hessian) in ways.items():
