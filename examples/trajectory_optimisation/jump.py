@@ -105,7 +105,7 @@ def jump(
             if 0 < k < nodes - 1:  # elsewhere they follow from start and goal
                 opti.subject_to(positions == (ground if k < off else landed))
         torques.append(tau[6:])
-        cost += casadi.sumsqr(tau[6:]) + 1e-2 * casadi.sumsqr(qd[6:, k]) + 1e-5 * casadi.sumsqr(qdd[:, k])
+        cost += casadi.sumsqr(tau[6:]) + 1e-2 * casadi.sumsqr(qd[:, k]) + 1e-4 * casadi.sumsqr(qdd[:, k])
         cost += 1e-3 * casadi.sumsqr(force[:, k])
     opti.subject_to(q[:, 0] == start)
     opti.subject_to(qd[:, 0] == 0)
