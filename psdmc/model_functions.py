@@ -1,7 +1,7 @@
-"""Every generated function of a model in NumPy, from E, P and theta_b or by its recipe's reference: slow, and with nothing
-lowered or compiled.
+"""Evaluates every generated function of a model in NumPy, without compiling code: from E, P and theta_b, or by the
+NumPy reference of the function. It is slower than a compiled robot.
 
-Broadcasting, results, refusals and NaN are those of compiled robots.
+Broadcasting, results, errors and NaN are the same as for compiled robots.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ _ADMITTED: WeakKeyDictionary[DynamicsModel, set[str]] = WeakKeyDictionary()
 
 
 def provider() -> Provider:
-    """The answers of models."""
+    """Return the object through which models compute generated functions."""
     return Provider(lambda: SIGNATURES, function_of)
 
 
 def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
-    """A function of the model by name, as a compiled robot has it."""
+    """Return a function of the model by its name, with the same arguments as the method of a compiled robot."""
     recipe = RECIPES[name]
 
     def function(*given: Any, **named: Any) -> Any:
@@ -78,7 +78,10 @@ def evaluated(
     theta_b: ArrayLike | None = None,
     out: Any = None,
 ) -> Any:
-    """The output, or a named tuple of the outputs, of a function at these states; `out`: arrays to write it to."""
+    """Compute a generated function at the given states. Return its output, or a named tuple if it has several outputs.
+
+    out  arrays into which the results are written
+    """
     signature = recipe.signature
     axes = _axes(model, recipe)
     tails = [axes.sizes.shape(output.axes) for output in signature.outputs]

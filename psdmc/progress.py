@@ -1,4 +1,4 @@
-"""Progress of long work, told step by step."""
+"""Reports the progress of long computations, one step at a time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Progress = Callable[[str], None]
 
 
 class Step(str):
-    """A step's text that also says which share of its stage's work is done, 0 to 1."""
+    """The text of a step, with the share of the stage's work that is done, from 0 to 1."""
 
     __slots__ = ("share",)
     share: float
@@ -24,12 +24,12 @@ class Step(str):
         return step
 
     def within(self, stage: str) -> Step:
-        """The same share under a longer text, `stage: text`."""
+        """Return a step with the same share and the text `stage: text`."""
         return Step(f"{stage}: {self}", self.share)
 
 
 def within(stage: str, progress: Progress) -> Progress:
-    """Progress whose steps are told as `stage: step`."""
+    """Return a progress function that puts the name of a stage before each step, as `stage: step`."""
 
     def tell(step: str) -> None:
         progress(step.within(stage) if isinstance(step, Step) else f"{stage}: {step}")
@@ -38,9 +38,9 @@ def within(stage: str, progress: Progress) -> Progress:
 
 
 def silent(step: str) -> None:
-    """Ignore progress: the default where none is asked for."""
+    """Ignore the step. This function is the default if the caller asks for no progress."""
 
 
 def on_standard_error(step: str) -> None:
-    """Print the step, after the seconds since this module was loaded."""
+    """Print the step to standard error, after the number of seconds since psdmc was loaded."""
     print(f"{time.monotonic() - START:6.0f} s  {step}", file=sys.stderr, flush=True)

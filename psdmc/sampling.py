@@ -1,8 +1,8 @@
-"""Sampling: states of a robot within its limits and its functions' values there, as Parquet files.
+"""Draws random states of a robot within its limits and writes them with the values of functions to Parquet files.
 
-A folder holds a manifest, which fixes what is sampled, and parts. What a part holds follows from the manifest and its
-number alone, and a part is written whole: a sampling that was interrupted goes on with the parts that are missing. Memory
-does not grow with the number of states.
+The output folder has a manifest, which fixes what is sampled, and numbered parts. The manifest and the number of a
+part determine the content of that part. Each part is written as a whole, so an interrupted run continues with the
+missing parts. The memory that psdmc needs does not grow with the number of states.
 """
 
 from __future__ import annotations
@@ -83,16 +83,17 @@ LEAST = 2.0**-53
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """What is sampled.
+    """The settings of a sampling: which states to draw and which functions to evaluate.
 
     states     number of states
-    functions  names, as `--functions` has them
+    functions  names of the functions, as for the option `--functions`
     draw       'uniform': independent states; 'sobol': states that fill the limits more evenly, by a scrambled Sobol sequence
-    seed       states differ with it
+    seed       seed of the random states
     real       precision of states and values
-    spread     0 to 1: masses and inertias of each link, all by one factor from 1 - spread to 1 + spread, are drawn per state
-    given      by the words of LIMITS: plus and minus this is the range of joints whose limit the robot's file lacks
-    rows       states of a part; None: as many as PART_BYTES and PART_STATES allow
+    spread     0 to 1: for each state, the mass and inertia of each link are multiplied by a random factor between
+               1 - spread and 1 + spread
+    given      by the words of LIMITS: range, plus and minus, of joints whose limit is missing in the robot file
+    rows       number of states per part; None: as many as PART_BYTES and PART_STATES allow
     """
 
     states: int
@@ -124,8 +125,8 @@ def _range(option: str, value: float, least: float, most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """What a folder holds then: states, parts and their bytes; how many of the parts were there before; and the length of
-    each column."""
+    """The content of a folder after sampling: number of states, parts and bytes, how many parts were there before, and
+    the length of each column."""
 
     states: int
     parts: int
@@ -141,13 +142,13 @@ def sample(
     progress: Progress = silent,
     scheduler: str | None = None,
 ) -> Sampled:
-    """Write the parts that the folder lacks.
+    """Draw the states, evaluate the functions, and write the parts that are missing in the folder.
 
-    scheduler  address of a scheduler of Dask's, whose workers compute the parts; None: this process does
+    scheduler  address of a Dask scheduler, whose workers compute the parts; None: this process computes them
 
-    Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit, or if
-    a function reads what cannot be drawn. Raises ToolchainError if the disk is full, or too small for the missing parts, or
-    if the scheduler does not answer.
+    Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit,
+    or if a function needs an input that psdmc cannot sample. Raises ToolchainError if the disk is full or too small
+    for the missing parts, or if the scheduler does not answer.
     """
     if find_spec("pyarrow") is None:
         raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'")
@@ -312,7 +313,8 @@ class _Plan:
 
     @cached_property
     def functions(self) -> tuple[Signature, ...]:
-        """InputError where one is unknown, or reads what is not drawn."""
+        """The functions to evaluate. Raises InputError if a function is unknown, or needs an input that psdmc cannot
+        sample."""
         names = [name for name in wanted(self.what.functions, self.model.mechanism) if name not in BY_ROWS]
         found = tuple(SIGNATURES[name] for name in names)
         for function in found:
@@ -328,13 +330,14 @@ class _Plan:
 
     @cached_property
     def reads(self) -> tuple[Quantity, ...]:
-        """The quantities that are drawn."""
+        """The quantities that are sampled as inputs of the functions, such as q and qd."""
         read = {quantity.name: quantity for function in self.functions for quantity in function.inputs}
         return tuple(read[name] for name in LIMITS if name in read)
 
     @cached_property
     def columns(self) -> dict[str, tuple[int, ...]]:
-        """Name -> axes of one state, of what is drawn and then of each function's outputs."""
+        """The columns of the Parquet files: name -> shape for one state. The inputs come first, then the outputs of
+        the functions."""
         model = self.model
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
         found = {quantity.name: sizes.shape(quantity.axes) for quantity in self.reads}
@@ -349,12 +352,13 @@ class _Plan:
 
     @property
     def row_bytes(self) -> int:
-        """Bytes of one state."""
+        """Number of bytes of one state in a part."""
         return (8 if self.what.real == "float64" else 4) * sum(map(math.prod, self.columns.values()))
 
     @cached_property
     def rows(self) -> int:
-        """States of a whole part: a power of two, as Sobol's points are evenest."""
+        """Number of states in a full part. It is a power of two, because such numbers of Sobol points are spread most
+        evenly."""
         fit = max(PART_BYTES // self.row_bytes, 1)
         return self.what.rows or min(1 << (fit.bit_length() - 1), PART_STATES)
 
@@ -363,12 +367,12 @@ class _Plan:
         return -(-self.what.states // self.rows)
 
     def count(self, part: int) -> int:
-        """States of a part."""
+        """Number of states in the part with this number."""
         return min(self.rows, self.what.states - part * self.rows)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[Array, Array]]:
-        """Give the lower and upper bounds of each entry by quantity; InputError where a joint has none."""
+        """Lower and upper bounds of the entries of each quantity. Raises InputError if a joint has no limits."""
         robot, found, lacking = self.model.mechanism, {}, {}
         for quantity in self.reads:
             word, _ = LIMITS[quantity.name]
@@ -385,7 +389,7 @@ class _Plan:
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """All that the parts follow from, as JSON has it."""
+        """Everything that determines the content of the parts, as JSON values."""
         model, what = self.model, self.what
         found = {
             "generator": "psdmc sample",
@@ -412,17 +416,18 @@ class _Plan:
         return plain
 
     def described(self, part: int) -> bytes:
-        """The metadata of a part."""
+        """Return the metadata of a part as bytes."""
         own = {"part": part, "first_state": part * self.rows, "states_of_part": self.count(part)}
         return json.dumps({**self.manifest, **own}).encode()
 
     def files(self, progress: Progress) -> Callable[[int], bytes]:
-        """Compile the functions; the result makes a part's file by its number."""
+        """Compile the functions. Return a function that computes the bytes of a part's file from the number of the
+        part."""
         columns = self.evaluated(progress)
         return lambda part: _file(columns(part), self.described(part))
 
     def evaluated(self, progress: Progress) -> Callable[[int], dict[str, Array]]:
-        """Compile the functions; the result computes a part's columns by its number."""
+        """Compile the functions. Return a function that computes the columns of a part from the number of the part."""
         by_rows = {function.name for function in self.functions if function.theta and self.what.spread}
         names = [
             f"{function.name}{THETA_ROWS}" if function.name in by_rows else function.name
@@ -444,11 +449,11 @@ class _Plan:
 
     @property
     def links(self) -> int:
-        """Factors that are drawn for links."""
+        """Number of links whose masses and inertias are multiplied by a random factor."""
         return len(self.model.mechanism) if self.what.spread else 0
 
     def drawn(self, shares: Array) -> dict[str, Array]:
-        """States, and theta_b where it is drawn, from shares between 0 and 1."""
+        """Map numbers between 0 and 1 to states within the limits, and to theta_b if masses and inertias are sampled."""
         robot, found = self.model.mechanism, {}
         for name, (lower, upper) in self.ranges.items():
             own, shares = shares[:, : len(lower)], shares[:, len(lower) :]

@@ -1,4 +1,7 @@
-"""What the function that computes theta_b from all bodies of a robot needs: its map, and bodies for its self-test."""
+"""The data for the generated function that computes theta_b from the masses and inertias of all bodies of a robot.
+
+They are the map from bodies to theta_b, and one robot's bodies for the self-test of the package.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +25,12 @@ INERTIA = np.array([[0.03, 0.003, -0.002], [0.003, 0.04, 0.001], [-0.002, 0.001,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesMap:
-    """theta_b = constant + columns @ (ten standard parameters of each body), n bodies and l base parameters.
+    """theta_b = constant + columns @ (ten standard parameters of each body), for n bodies and l base parameters.
 
     links     n names, untrusted text
     columns   (l, 10 n)
-    constant  (l,) the share of the drive inertias
-    masses, coms, inertias, theta_b   (n,), (n, 3), (n, 6), (l,) one robot's, for the self-test
+    constant  (l,) the contribution of the drive inertias
+    masses, coms, inertias, theta_b   (n,), (n, 3), (n, 6), (l,) of one robot, for the self-test
     """
 
     links: tuple[str, ...]
@@ -40,7 +43,10 @@ class BodiesMap:
 
 
 def bodies_map(model: DynamicsModel) -> BodiesMap:
-    """The map of a model; InputError where its assumptions exclude a parameter of a body, or a drive inertia is unknown."""
+    """Return the map from bodies to theta_b of a model.
+
+    Raises InputError if the model's assumptions exclude a parameter of a body, or if a drive inertia is unknown.
+    """
     n = model.n
     each = [np.tile(row, n) for row in np.eye(PARAMETERS_PER_LINK)[:BODY_PARAMETERS]]
     refuse_outside(model.mechanism, each, f"{model.mechanism.name}: theta_from_bodies takes bodies whose")

@@ -1,4 +1,4 @@
-"""The robot in words, for the first lines of a package."""
+"""The description of the robot at the top of a generated package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from psdmc.target.target import Target
 
 
 def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
-    """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still unescaped."""
+    """Return joints, limits, gravity, parameters, model and options as text, one fact per line. Names from the robot
+    file are not escaped yet."""
     gx, gy, gz = info.gravity
     return (
         f"Robot: {info.name}, {_extent(info)}",
@@ -66,17 +67,17 @@ def _target(target: Target) -> tuple[str, ...]:
 
 
 def uses_frames(signatures: Iterable[Signature]) -> bool:
-    """Whether some of these functions is about the named frames."""
+    """Whether some of these functions have to do with the named frames."""
     return any("frames" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def uses_contacts(signatures: Iterable[Signature]) -> bool:
-    """Whether some of these functions is about the contacts."""
+    """Whether some of these functions have to do with the contacts."""
     return any("contact_rows" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
-    """The user's choices by name; the target only where it is not the default."""
+    """Return the user's choices by name; the target only if it is not the default."""
     target = {} if options.target == NATIVE else {"target": options.target.name}
     return {"real": options.real, "trig": options.trig, **info.options, **target}
 
@@ -97,7 +98,7 @@ def _places(vector: str, first: int, count: int) -> str:
 
 
 def joint_line(joint: JointInfo) -> str:
-    """A joint and its limits; unknown limits are left out."""
+    """Describe a joint and its limits in one line; unknown limits are left out."""
     parts = [f"{joint.name} ({joint.kind}{': ' if joint.coordinates else ''}{joint.coordinates})"]
     if math.isfinite(joint.lower) or math.isfinite(joint.upper):
         parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")

@@ -1,4 +1,4 @@
-"""manifest.json: what the package is and what its files were when psdmc wrote them."""
+"""The file manifest.json: what the package is, and hashes of its files as psdmc wrote them."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def manifest(
     functions: Sequence[Mapping[str, Any]],
     files: Mapping[str, str],
 ) -> str:
-    """JSON text; `own` is what only this back end says, `files` are all others of the package, which it lists with their
-    SHA-256."""
+    """Return the JSON text of the manifest. `own` are the entries of this back end only. `files` are all other files of
+    the package, which the manifest lists with their SHA-256."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "generator": GENERATOR,
@@ -53,8 +53,11 @@ def manifest(
 
 
 def renamed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Symbols of one manifest's package and their names in another's: of all, `R_*`, where the robot has another name, and
-    of functions that have one. The first manifest may be forged."""
+    """Return pairs of symbols in an older package and their new names.
+
+    If the robot's name changed, the pair `R_*` stands for all symbols. Further pairs are functions that psdmc renamed.
+    The older manifest may be forged.
+    """
     old, new = before.get("robot"), after["robot"]
     if not isinstance(old, str) or not NAME.fullmatch(old):
         return []

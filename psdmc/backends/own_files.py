@@ -1,7 +1,7 @@
-"""Which files of a folder psdmc wrote: by its manifest, or by the journal of an emission that was killed.
+"""Which files of a folder psdmc wrote, according to the manifest or to the journal of an interrupted `emit-c`.
 
-Both lists are files like any other and may be forged: names that psdmc would not give, and whatever lies
-behind a symbolic link, count as foreign.
+Both lists are ordinary files and may be forged. Names that psdmc would not give, and everything behind a symbolic link,
+count as foreign.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ Digests = Mapping[str, frozenset[str]]
 
 
 def listed(path: Path) -> Digests:
-    """Path -> digests as listed in a manifest or journal; empty where there is none, or it is not psdmc's."""
+    """Return the digests of files as listed in a manifest or journal, by path. Empty if there is no such list, or if it
+    is not psdmc's."""
     return {
         name: frozenset([value] if isinstance(value, str) else map(str, value))
         for name, value in _entries(path).items()
@@ -55,7 +56,7 @@ def listed(path: Path) -> Digests:
 
 
 def digest_of(root: Path, path: str) -> str | None:
-    """SHA-256 of a file below root; None where there is none."""
+    """Return the SHA-256 of a file below root; None if there is no such file."""
     try:
         if link_in(root, path) or not stat.S_ISREG((root / path).lstat().st_mode):
             return NOT_REGULAR
@@ -72,9 +73,10 @@ def link_in(root: Path, path: str) -> bool:
 
 
 def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
-    """Paths of a package that are missing or differ from what psdmc wrote; None where the folder holds no package.
+    """Return the paths of a package's files that are missing or differ from what psdmc wrote. None if the folder holds
+    no package.
 
-    The manifest lists all files but itself. InputError where one cannot be read.
+    The manifest lists all files except itself. Raises InputError if a file cannot be read.
     """
     root = Path(directory)
     try:
@@ -92,12 +94,12 @@ def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
 
 
 def content_of(directory: str | os.PathLike[str]) -> dict[str, object]:
-    """What the manifest of a package says; empty where the folder holds no package."""
+    """Return the content of a package's manifest; empty if the folder holds no package."""
     return _content(Path(directory) / MANIFEST)
 
 
 def target_of(directory: str | os.PathLike[str]) -> str | None:
-    """The name of the machine that a package says it was made for; None where it names none."""
+    """Return the name of the target machine in a package's manifest; None if the manifest names none."""
     target = content_of(directory).get("target")
     name = target.get("name") if isinstance(target, dict) else None
     return name if isinstance(name, str) else None

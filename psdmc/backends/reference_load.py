@@ -1,4 +1,4 @@
-"""One load, and what it adds to theta_b at every frame: for the self-test of the functions that add loads at run time."""
+"""A load, and what it adds to theta_b at every frame, for the self-test of the functions that add loads at run time."""
 
 from __future__ import annotations
 
@@ -21,13 +21,16 @@ INERTIA = np.array([[0.02, 0.003, -0.002], [0.003, 0.03, 0.001], [-0.002, 0.001,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceLoad:
-    """added  (1 + frames, l) what the load adds to theta_b: at the tip, then at each named frame."""
+    """A load for the self-test.
+
+    added  (1 + frames, l) what the load adds to theta_b: at the tip, then at each named frame
+    """
 
     added: Array
 
 
 def reference_load(model: DynamicsModel) -> ReferenceLoad:
-    """The load on a model, by the way of DynamicsModel.with_payload."""
+    """Return the self-test's load for a model. What it adds to theta_b is computed by DynamicsModel.with_payload."""
     chain = model.mechanism
     places = [(None, chain.tip_body), *((frame.name, frame.joint) for frame in chain.frames)]
     rows = [

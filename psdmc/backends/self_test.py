@@ -1,4 +1,4 @@
-"""What a package's own test compares: labels, inputs and tolerances, the same in every language."""
+"""What a package's self-test compares: labels, inputs and tolerances, the same in every language."""
 
 from __future__ import annotations
 
@@ -20,12 +20,15 @@ def tolerance(function: Signature, real: str) -> str:
 
 
 def compared_by_row(output: Quantity) -> bool:
-    """Whether each row is compared relative to its own largest value; else all are relative to the largest of all
-    entries."""
+    """Whether each row of an output is compared relative to its own largest value. Otherwise, all entries are compared
+    relative to the largest one."""
     return bool(output.axes) and output.axes[0] in _ROWS
 
 
 def given_name(vector: str, variant: str) -> str:
-    """The reference states' name of an input of a kernel: torques depend on its parameters. They have one name with the
-    compiled-in ones (''), one with theta_b (_theta) and one with theta_b by rows (THETA_ROWS)."""
+    """Return the name of a kernel's input in the reference states.
+
+    Input torques depend on the kernel's parameters and have one name per variant: compiled-in parameters (''), theta_b
+    (_theta) and one theta_b per state (THETA_ROWS).
+    """
     return f"{vector}{variant}" if vector == TAU.name else vector

@@ -1,4 +1,4 @@
-"""One robot of the benchmark: its chain with every number known, and its name in tables."""
+"""One robot of the benchmark: its joints and bodies with all numbers known, and its name in tables."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ FLOOR_MOUNT = (0.0, 0.0, -9.81)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A robot to measure.
+    """A robot of the benchmark.
 
-    name            in tables
-    model           with theta_b known; its chain has no unknown inertia
-    note            where its numbers come from
-    derive_seconds  how long a warm derivation took, None where the model was given
-    derive_bytes    peak memory of a process that did nothing else, None where unknown
-    named           functions to measure; empty: those that every robot's benchmark has
+    name            name in tables
+    model           its model; theta_b and all inertias are known
+    note            where the numbers come from
+    derive_seconds  time of a derivation whose imports are already loaded, None if the model was given
+    derive_bytes    peak memory of a process that only derived the model, None if unknown
+    named           functions to measure; if empty, those that are measured for every robot
     """
 
     name: str
@@ -79,17 +79,17 @@ class Case:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions that the benchmark measures on this robot."""
+        """Names of the functions that the benchmark measures for this robot."""
         return self.named or tuple(name for name in BENCHED if name not in self.costly)
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """The functions that the benchmark leaves out because they are costly."""
+        """Names of the functions that the benchmark leaves out for this robot because they take too long."""
         return () if self.named else self.costly
 
     @property
     def costly(self) -> tuple[str, ...]:
-        """Derivatives of a robot with more rates than MOST_DIFFERENTIATED."""
+        """Names of the derivative functions that take too long for a robot with more than MOST_DIFFERENTIATED rates."""
         large = self.chain.nv > MOST_DIFFERENTIATED
         return tuple(name for name in self.named or BENCHED if large and name.endswith(DIFFERENTIATED))
 
@@ -104,9 +104,10 @@ class Case:
 
 
 def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
-    """The chain's geometry standing on the floor, with generic physical inertias and no drive inertia.
+    """Return a robot of the given geometry with random physically possible inertias, no drive inertia, and gravity along
+    -z.
 
-    So no contestant profits from particular zeros; the same seed gives the same robot.
+    As no inertia is zero, no library profits from zeros. The same seed gives the same robot.
     """
     rng = np.random.default_rng(seed)
     n = len(chain)
@@ -121,7 +122,7 @@ def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
 
 
 def physical_body(rng: np.random.Generator) -> Array:
-    """(10,) standard parameters of eight point masses at random places: a body that could exist, no entry zero."""
+    """Return (10,) random standard parameters of a possible body, made of eight point masses; no entry is zero."""
     masses = rng.uniform(0.1, 0.6, size=8)
     places = rng.normal(scale=0.08, size=(8, 3)) + rng.normal(scale=0.05, size=3)
     second = np.einsum("k,ki,kj->ij", masses, places, places)
@@ -129,7 +130,7 @@ def physical_body(rng: np.random.Generator) -> Array:
 
 
 def refuse_unlike(chain: Mechanism) -> None:
-    """InputError where a robot has joints that the rivals' models are not made for."""
+    """Raise InputError if the robot has joints that the benchmark cannot build in the other libraries."""
     for i, joint in enumerate(chain.joints):
         if joint.type.pinocchio not in JOINTS:
             raise InputError(
@@ -144,11 +145,11 @@ def refuse_unlike(chain: Mechanism) -> None:
 
 
 def robot_as_numbers(chain: Mechanism) -> str:
-    """The chain as plain text for rivals: exact placements and bodies about the joint frames, so that no parser is
-    involved. InputError as of refuse_unlike.
+    """Return the robot as plain text for the C++ programs of other libraries, so that they need no parser for robot
+    files. Raise InputError as refuse_unlike does.
 
-    n and gravity; then per joint Pinocchio's word for its type, parent (0 the base, else counted from 1), rotation (9,
-    row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
+    The text has n and gravity. For each joint follow Pinocchio's name of its type, its parent (0: base, else from 1),
+    its rotation (9, row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
     """
     refuse_unlike(chain)
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]

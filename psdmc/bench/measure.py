@@ -1,4 +1,4 @@
-"""Interleaved trials: every contestant in turn, repeatedly, counted only while the machine is idle."""
+"""Time all compared functions in turn, round by round, and count only rounds in which the machine was otherwise idle."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PATIENCE = 3
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """A figure over several trials: median, quartiles and the best, ns."""
+    """Median, quartiles and smallest value of a time over several trials, ns."""
 
     median: float
     low: float
@@ -37,7 +37,8 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """ns per call over blocks of 64 calls, the clock's own cost subtracted: the worst case for a control loop."""
+    """Slowest calls, ns per call over blocks of 64 calls, without the time of reading the clock. They limit a control
+    loop."""
 
     median: float
     percentile_99_99: float
@@ -47,9 +48,9 @@ class Tail:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """One contestant's times; latency, tail and cold calls only where it takes one state a call.
+    """Times of one compared function. Latency, tail and cold are measured only if a call computes one state.
 
-    cold  over single calls with nothing in the caches; None where they were not measured
+    cold  time of single calls with empty caches; None if not measured
     """
 
     throughput: Spread
@@ -68,7 +69,7 @@ class _Trials:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Times in the runners' order, and whether the machine was idle while they were taken."""
+    """Times of all compared functions, in the order of the runners, and whether the machine was otherwise idle."""
 
     times: tuple[Times, ...]
     rounds: int
@@ -82,8 +83,8 @@ def measure(
     between: Callable[[], None] = lambda: None,
     cold: bool = False,
 ) -> Measured:
-    """Every runner once a round, `rounds` rounds that count; `between` runs before each of them. `cold`: single calls with
-    nothing in the caches, too."""
+    """Time every runner once per round, until `rounds` rounds count. `between` is called before each round. If `cold`,
+    also time single calls with empty caches."""
     _round(runners)  # caches, branch predictors and the clock speed settle
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
@@ -151,8 +152,7 @@ UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 
 @cache
 def swept_memory() -> Array:
-    """Memory of twice the largest cache's size, within LEAST and MOST; every page is written, so that it is one of its
-    own."""
+    """Return memory twice as large as the largest cache, within LEAST and MOST. Reading it empties the caches."""
     largest = max(map(_bytes, CACHES.glob("index*/size")), default=0)
     return np.ones(min(max(2 * largest, LEAST), MOST) // 8)
 
@@ -169,8 +169,8 @@ CODE = frozenset("tTwW")
 
 
 def code_sizes(library: Path) -> dict[str, int]:
-    """Bytes of each function by its name. What a compiler splits off, `name.cold` and the like, counts as the function's.
-    Empty where there is no GNU or LLVM nm: the column then stays empty."""
+    """Return the size in bytes of each function's machine code, by name; empty if there is no GNU or LLVM nm. Parts that
+    a compiler splits off, such as `name.cold`, count as the function's."""
     nm = shutil.which("nm")
     if nm is None:
         return {}
@@ -186,6 +186,6 @@ def code_sizes(library: Path) -> dict[str, int]:
 
 
 def code_bytes(sizes: Mapping[str, int], belongs: Callable[[str], bool]) -> int | None:
-    """Bytes of the functions that belong to one; None where none is known."""
+    """Return the size in bytes of all C functions that belong to one function; None if none is known."""
     own = [size for name, size in sizes.items() if belongs(name)]
     return sum(own) if own else None

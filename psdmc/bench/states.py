@@ -1,4 +1,4 @@
-"""Fresh random states in the memory layout of each contestant."""
+"""Random states for the benchmark, in the memory layout that each library reads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CACHE_LINE = 64
 
 
 def at_cache_line(size: int) -> Array:
-    """(size,) zeros that start at a cache line."""
+    """Return (size,) zeros whose memory begins at a cache line."""
     spare = CACHE_LINE // 8
     memory = np.zeros(size + spare)
     first = -memory.ctypes.data // 8 % spare
@@ -40,19 +40,19 @@ def _further(function: str) -> tuple[Quantity, ...]:
 
 
 def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
-    """What a signature's words mean for a robot with l base parameters."""
+    """Return the lengths of the axes in a function's signature (n, nq, nv, l ...) for a robot with l base parameters."""
     return Sizes(
         len(robot), robot.nq, robot.nv, l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
     )
 
 
 def output_sizes(function: str, sizes: Sizes) -> tuple[int, ...]:
-    """Reals per state of each output of a function of states."""
+    """Number of values per state of each output of a function."""
     return tuple(sizes.size(output) for output in RECIPES[function].signature.outputs)
 
 
 def moved(array: Array) -> Array:
-    """A copy at another place in memory, made while the array still exists."""
+    """Return a copy of an array at another place in memory."""
     copy = at_cache_line(len(array))
     copy[:] = array
     return copy
@@ -60,7 +60,7 @@ def moved(array: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """`count` random states of a chain.
+    """`count` random states of a robot.
 
     q        (count, nq), quaternions of length one
     qd, qdd  (count, nv)
@@ -111,9 +111,9 @@ class States:
         return RobotOnArrays(self.chain, self.chain.parameters.reshape(-1), np.zeros((0, 0)))
 
     def expected(self, function: str) -> Array:
-        """(count, outputs) expected outputs of a function, by psdmc's own Newton-Euler on arrays.
+        """Compute the (count, outputs) expected outputs of a function with psdmc's Newton-Euler recursion in NumPy.
 
-        For regressors the torques, into which each one's parameters must turn them.
+        For a regressor return the torques instead: each library's regressor, times its parameters, must equal them.
         """
         if RECIPES[function].times_theta:
             return self.tau
@@ -123,8 +123,8 @@ class States:
         return np.hstack([values.reshape(self.count, -1) for values in blocks])
 
     def inputs(self, function: str, lanes: int = 1, convention: Convention = "psdmc") -> tuple[Array, ...]:
-        """q, qd, what the function reads third (qdd or tau) and further inputs, flat; with lanes > 1 in blocks
-        [variable][lane]."""
+        """Return a function's inputs as flat arrays: q, qd, the third input (qdd or tau) and further inputs; if lanes >
+        1, in blocks [variable][lane]."""
         x = next((q.name for q in RECIPES[function].signature.inputs[2:]), "qdd")
         given = self.mujocos if convention == "MuJoCo" else {n: getattr(self, n) for n in ("q", "qd", x)}
         first = [self._laid_out(name, given[name], lanes, convention) for name in ("q", "qd", x)]
@@ -135,13 +135,13 @@ class States:
 
     @cached_property
     def mujocos(self) -> dict[str, Array]:
-        """q, qd and qdd in MuJoCo's convention: it is not timed converting them."""
+        """q, qd and qdd in MuJoCo's convention, converted beforehand, so that the conversion is not timed."""
         states = (self.q, self.qd, self.qdd)
         converted = to_mujoco(*states) if self.has_free_root else states
         return dict(zip(("q", "qd", "qdd"), converted, strict=True))
 
     def from_mujoco(self, tau: Array) -> Array:
-        """(count, nv) efforts by psdmc's convention from MuJoCo's."""
+        """Convert (count, nv) torques from MuJoCo's convention to psdmc's."""
         return force_from_mujoco(self.mujocos["q"], tau) if self.has_free_root else tau
 
     @property
@@ -149,13 +149,13 @@ class States:
         return self.chain.has_free_root
 
     def more(self, function: str) -> int:
-        """Reals per state of the function's further input, 0 where it has none."""
+        """Number of values per state of the function's fourth input, 0 if it has none."""
         return sum(self.sizes.size(quantity) for quantity in _further(function))
 
     def move(self) -> None:
-        """Move all inputs to another place in memory. Which physical pages an array gets decides whose lines collide in
-        the caches: up to a fifth of a batch call's time. Moved between trials, this shows in the spread instead of
-        biasing a run."""
+        """Move all inputs to another place in memory, as is done between trials. The place decides which cache lines
+        collide, which changes the time of a batch call by up to a fifth. Moving shows this effect in the spread of
+        the times."""
         for key, array in self._layouts.items():
             self._layouts[key] = moved(array)
 

@@ -1,4 +1,4 @@
-"""Calibration from files: a campaign's four steps, or one linear fit of plain logs."""
+"""Calibrates a model from log files: in four steps from a campaign, or by one linear fit from plain logs."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ from psdmc.robot.derivable import require_axes
 class CalibrateOptions:
     """Options of `psdmc calibrate`.
 
-    physical     whether the result must be possible for a robot: links with a distribution of mass, drive inertias and
-                 friction not negative; False shows the unconstrained fit
+    physical     True: the result must be physically possible, which means real bodies, and no negative drive inertia or
+                 friction; False: the result is the unconstrained fit
     campaign     options of the four steps
     linear       options of the linear fit
-    consistency  options of the physical estimate
+    consistency  options of the physically consistent estimate
     verdict      limits of the verdict
-    choice       of the linear fit's options, before what a log description says; for plain logs only
-    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then count as
-                 knowledge; None: none is stated. For plain logs
+    choice       options of the linear fit that take precedence over a log description; for plain logs only
+    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then act as a
+                 prior; None: no prior. For plain logs
     essential    how parameters that the data do not need are dropped; None: all are kept. For plain logs
     """
 
@@ -75,13 +75,13 @@ def calibrate(
 ) -> Calibration:
     """Calibrate a model from a campaign (its folder or campaign.toml), a log description (log.toml) or plain logs.
 
-    regressor         the compiled model where there is one; else Newton-Euler on arrays
-    torque_constants  N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
-    validation        plain logs that are held out as a whole
+    regressor         a compiled model, which is fast; None: psdmc computes the regressor in NumPy
+    torque_constants  N m/A by joint name, for plain logs of currents, and for joints that no load affects
+    validation        plain logs that are used for validation only
     naming            topic and joint names of plain logs
-    loaded, load      further logs of currents, recorded with that known load: they show the torque constants
+    loaded, load      further logs of currents, and the known load that was on the robot; they determine torque constants
 
-    Raises InputError where a file is missing or a log cannot be used.
+    Raises InputError if a file is missing or a log cannot be used.
     """
     require_axes(model.mechanism, "calibration")
     options, naming = options or CalibrateOptions(), naming or LogNaming()
@@ -157,8 +157,11 @@ def calibrate_campaign(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """The result of the four steps; if physical, the physically consistent values nearest to it, in the metric of its
-    uncertainties and the prior."""
+    """Calibrate a model by the four steps from the logs of a campaign.
+
+    If the result must be physical, it is the physically consistent vector nearest to that of the four steps. The
+    distance is measured by the uncertainties and the prior.
+    """
     progress("checking logs")
     logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(
@@ -210,9 +213,9 @@ def calibrate_logs(
     progress: Progress,
     loaded: LoadedLogs | None = None,
 ) -> Calibration:
-    """The result of one linear fit: theta_b, friction and offsets as one vector.
+    """Calibrate a model by one linear fit of theta_b, friction and offsets.
 
-    loaded  logs with a known load, from which torque constants are found before
+    loaded  logs with a known load; torque constants are determined from them first
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
     if loaded is None:

@@ -1,6 +1,5 @@
-"""A calibration campaign as a folder: `campaign.toml` lists the runs, `trajectories/` holds their motions, `logs/`
-receives what the robot (or `psdmc simulate`) measured.
-"""
+"""Reads and writes the folder of a calibration campaign. `campaign.toml` lists the runs, `trajectories/` holds their
+motions, and `logs/` holds what the robot (or `psdmc simulate`) measured."""
 
 from __future__ import annotations
 
@@ -29,7 +28,8 @@ UNFINISHED = ".psdmc-unfinished"
 
 @contextmanager
 def being_written(folder: str | Path) -> Iterator[None]:
-    """Mark a folder while a campaign is written to it: until the end, psdmc may write it again."""
+    """Mark a folder as incomplete while a campaign is written to it. If the process is killed, psdmc may write the
+    folder again."""
     root = Path(folder)
     make_folder(root)
     write_whole(root / UNFINISHED, "")
@@ -43,10 +43,10 @@ def being_written(folder: str | Path) -> Iterator[None]:
 
 
 def require_free(folder: str | Path) -> None:
-    """InputError where a folder holds a campaign, which writing another one would replace, or files of others; the
-    message lists what is there.
+    """Raise InputError if a folder holds a campaign, which another one would replace, or files that psdmc did not
+    write.
 
-    A campaign that an earlier run left unfinished, and that has no recorded logs, does not count.
+    A campaign that an earlier process left unfinished, and that has no recorded logs, is accepted.
     """
     root = Path(folder)
     if (root / UNFINISHED).is_file() and not _count(root / "logs"):
@@ -72,11 +72,11 @@ def _count(folder: Path) -> int:
 def write_campaign(
     folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str, *, force: bool = False
 ) -> Path:
-    """Write a campaign's folder; returns the path of its campaign.toml.
+    """Write the folder of a campaign. Return the path of its campaign.toml.
 
-    force   replace the plan and the trajectories of an existing campaign; logs are never touched
+    force   True: replace the plan and the trajectories of an existing campaign; logs are never changed
 
-    Raises InputError where there is one and `force` is not given, or the folder cannot be written.
+    Raises InputError if a campaign exists and `force` is not given, or if the folder cannot be written.
     """
     if not force:
         require_free(folder)
@@ -127,7 +127,7 @@ def _toml_text(text: str) -> str:
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
-    """The motion's parameters (22) and the condition reached, as plain values."""
+    """Return the parameters of the exciting motion, (22) in Denso-2022, and its condition number as plain JSON values."""
     motion = found.motion
     return {
         "duration_s": motion.duration,

@@ -1,4 +1,4 @@
-"""campaign.toml: which runs a campaign has, and its logs step by step."""
+"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _LOAD_KEYS = ("mass", "com")
 
 @dataclass(frozen=True, slots=True)
 class ListedRun:
-    """One [[run]] of a campaign.toml, with its paths relative to the working directory."""
+    """One entry [[run]] of a campaign.toml. Its paths are relative to the working directory."""
 
     step: Step
     name: str
@@ -47,19 +47,19 @@ class ListedRun:
 
 
 def is_campaign(path: Path) -> bool:
-    """Whether a path names a campaign: a .toml file, or a folder with a campaign.toml."""
+    """Return whether a path names a campaign: a .toml file, or a folder with a campaign.toml."""
     return path.suffix.lower() == ".toml" or (is_folder(path) and (path / FILE).exists())
 
 
 def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """The runs of a campaign.toml (or its folder); InputError names the run and what it lacks."""
+    """Return the runs of a campaign.toml (or its folder). Raises InputError with the run and the missing entry."""
     path = Path(path)
     path = path / FILE if is_folder(path) else path
     return runs_of(read_toml(path, WHAT), path)
 
 
 def runs_of(content: dict[str, Any], path: Path) -> tuple[ListedRun, ...]:
-    """The runs of a campaign's content; `path` is the file that it came from."""
+    """Return the runs from the content of a campaign.toml; `path` is the path of that file."""
     faults: list[str] = []
     tables = TomlTable(content, "campaign", ("run",), faults).items("run")
     if not tables and not faults:
@@ -93,9 +93,10 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
 
 
 def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
-    """The logs of a campaign of exciting motions alone, which one linear fit takes; None where it has other steps or loads.
+    """Return the logs of a campaign that has only exciting motions without load, for one linear fit. Return None for
+    any other campaign.
 
-    InputError where a run names a joint that the model does not have.
+    Raises InputError if a run names a joint that the model does not have.
     """
     runs = listed_runs(path)
     if any(run.step != "inertial" or run.load is not None for run in runs):
@@ -105,11 +106,11 @@ def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...]
 
 
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
-    """All logs of a campaign, step by step.
+    """Return all logs of a campaign, by the step of the calibration that uses them.
 
-    joint_names  of the robot that it is for
+    joint_names  joints of the robot to calibrate
 
-    Raises InputError where a log is missing, a motor run has no partner, or a run names a joint that does not exist.
+    Raises InputError if a log is missing, if a motor run has no counterpart, or if a run names an unknown joint.
     """
     runs = listed_runs(path)
     if joint_names is not None:

@@ -1,4 +1,5 @@
-"""The plan of a calibration campaign: its motions, checked, and what is said about them."""
+"""Plans a calibration campaign: the motions of its runs, checked against limits and collisions, with notes for the
+user."""
 
 from __future__ import annotations
 
@@ -50,16 +51,16 @@ SINE_SHARES = ((1.0, 0.9), (0.5, 0.6), (0.25, 0.4))
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """Options of a campaign's plan.
+    """Options for the plan of a campaign.
 
-    load          kg and centre of mass (m, tip frame) of the motor step's mass; None: no motor step, for robots that log
-                  torques
-    gravity_runs  sweeps through the workspace, each there and back
+    load          known load of the motor step: mass (kg) and centre of mass (m, tip frame); None: no motor step, for robots
+                  that log torques
+    gravity_runs  number of slow sweeps through the workspace, each forwards and backwards
     repeats       periods of the exciting motion
-    one_log       the exciting motion alone, for one linear fit: columns of all base parameters, friction and offsets count
-    limits        of joints, beside the file's
-    shapes        folders of the collision shapes' meshes; None: collisions are not looked at
-    floor         m, height of a floor above the base's origin; None: none
+    one_log       True: plan only the exciting motion, for one linear fit of all base parameters, friction and offsets
+    limits        limits of joints in addition to the file's
+    shapes        folders of the collision shapes' meshes; None: collisions are not checked
+    floor         height in m of a floor above the base's origin; None: no floor
     table         format of trajectories and logs: csv, npz or parquet
     """
 
@@ -99,7 +100,7 @@ class CampaignOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedRun:
-    """One run of the robot: a motion, for joint `joint` where one is given, with a load or without."""
+    """One run of the robot: a motion of all joints or of one joint, with or without a load."""
 
     step: Step
     name: str
@@ -110,12 +111,12 @@ class PlannedRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """All runs, the exciting motion that was found, and what a user has to know, a sentence each.
+    """All runs of a campaign, the exciting motion, and notes for the user, one sentence each.
 
-    chain       with the limits that the motions keep
-    is_cleared  whether shapes or a floor were looked at
-    looked      what was looked at, and what was not
-    remarks     what is unlike what was asked for, or cannot be found
+    chain       the robot with the limits that the motions keep
+    is_cleared  whether collisions of shapes or with a floor were checked
+    looked      what was checked, and what was not
+    remarks     differences from what the user asked for, and values that the campaign cannot determine
     """
 
     runs: tuple[PlannedRun, ...]
@@ -133,12 +134,13 @@ def plan_campaign(
     progress: Progress = lambda step: None,
     began: float | None = None,
 ) -> Plan:
-    """All runs of the four steps, or of one log, each checked against limits of joints, torques and clearance, and the
-    search for the exciting motion.
+    """Return the runs of the four steps, or of one log. Each motion is checked against limits of joints and torques
+    and for collisions. This includes the search for the exciting motion.
 
-    began  cpu_seconds() from which the search's seconds count; None: now
+    began  value of cpu_seconds() from which the time of the search counts; None: now
 
-    InputError where a joint has no limits to keep, or no motion is allowed; of motions that need no search, before it.
+    Raises InputError if a joint has no limits, or if no motion is allowed. Motions that need no search are checked
+    first.
     """
     if model.mechanism.has_followers:
         raise InputError(
@@ -192,7 +194,7 @@ class _Planner:
         self.remarks: list[str] = []
 
     def motors(self) -> None:
-        """A sweep of each joint that the load acts on, without and with it."""
+        """Plan a sweep of each joint on which the load acts, once without and once with the load."""
         load = self.options.load
         if load is None:
             self.remarks.append(

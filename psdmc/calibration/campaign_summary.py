@@ -1,4 +1,4 @@
-"""What a written campaign asks of its user: runs, minutes, size, what to mount, and what was checked."""
+"""Summarises a written campaign for its user: runs, duration, size, loads to mount, and what was checked."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MIB = 2.0**20
 
 
 def summary(plan: Plan, folder: str | Path) -> tuple[str, ...]:
-    """Lines on a campaign's folder as it was written; sizes are those of its files."""
+    """Return lines of text about the folder of a campaign; sizes are those of its files."""
     runs, listed = plan.runs, listed_runs(folder)
     files = sorted({run.trajectory for run in listed if run.trajectory is not None})
     size = sum(path.stat().st_size for path in files) / MIB

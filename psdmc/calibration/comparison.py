@@ -1,4 +1,4 @@
-"""`psdmc.compare`: how two models of one robot differ, in standard deviations and in torque."""
+"""The function `psdmc.compare`: how two models of one robot differ, in standard deviations and in torque."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ SAME_PLACE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One value of both models; joint std: of b - a, infinite if it is not known."""
+    """One value in both models. `std` is the standard deviation of b - a, infinite if it is not known."""
 
     name: str
     equation: str
@@ -59,16 +59,17 @@ class Difference:
 
     @property
     def sigmas(self) -> float:
-        """b - a in standard deviations; NaN if these are not known."""
+        """The difference b - a in standard deviations; NaN if these are not known."""
         return (self.b - self.a) / self.std if 0.0 < self.std < np.inf else float("nan")
 
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """Torque of b minus that of a over the workspace, N m (N).
+    """The torque of model b minus that of model a for one joint over the workspace, N m (N).
 
-    rms, largest       of the whole torque; typical: RMS of a's torque
-    gravity, friction  RMS of these parts;  inertia  largest share by which the joint's own inertia differs
+    rms, largest       of the whole torque; typical: RMS of the torque of a
+    gravity, friction  RMS of these parts of the difference
+    inertia            largest relative difference of the joint's own inertia
     """
 
     joint: str
@@ -95,7 +96,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Friction torque of one joint, which moves alone, against its speed."""
+    """Friction torque of both models against the speed of one joint, while the other joints rest."""
 
     joint: str
     unit: str
@@ -106,7 +107,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class OnLog:
-    """R^2, RMS and largest error of both models on one joint of the logs, N m (N)."""
+    """The R^2, RMS and largest error of both models for one joint of the logs, N m (N)."""
 
     joint: str
     unit: str
@@ -117,13 +118,13 @@ class OnLog:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How two models of one robot differ.
+    """The result of comparing two models of one robot.
 
     a, b           names of the models
     doubts         what a user should know first
-    parameters, friction   values of both; a's numbering and equations of base parameters
-    chi2, freedom, chance  of all base parameters together; NaN without standard deviations
-    joints, curves, on_log
+    parameters, friction   values of both; base parameters have a's numbering and equations
+    chi2, freedom, chance  test of all base parameters together; NaN without standard deviations
+    joints, curves, on_log   differences of torques, friction curves, and errors on logs, per joint
     """
 
     robot: str
@@ -141,17 +142,17 @@ class Comparison:
 
     @property
     def surely(self) -> tuple[Difference, ...]:
-        """Values that differ by more than three standard deviations, the surest first."""
+        """Values that differ by more than three standard deviations, those with the largest ratio first."""
         own = [row for row in (*self.parameters, *self.friction) if abs(row.sigmas) > SURE]
         return tuple(sorted(own, key=lambda row: -abs(row.sigmas)))
 
     @property
     def noticed(self) -> tuple[JointDifference, ...]:
-        """Joints at which a controller notices the difference."""
+        """Joints whose difference of torque is large enough to matter for a controller."""
         return tuple(joint for joint in self.joints if joint.share > NOTICEABLE)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for a user; numbers that are not finite become null."""
+        """Return the result as plain values; numbers that are not finite become null."""
         values = asdict(self) | {"noticed": [joint.joint for joint in self.noticed]}
         for name in ("parameters", "friction"):
             for row, own in zip(values[name], getattr(self, name), strict=True):
@@ -278,7 +279,8 @@ def _doubts(*sides: _Side) -> list[Remark]:
 
 
 def require_same_robot(a: Mechanism, b: Mechanism) -> None:
-    """InputError, which says what differs, unless joints, axes, link frames and gravity are the same."""
+    """Raise InputError, which says what differs, unless both robots have the same joints, axes, link frames and
+    gravity."""
     hint = "compare two models of one robot, derived with the same --base, --tip, --lock and --gravity"
     if a.joint_names != b.joint_names:
         pairs = (("first", a.joint_names, b.joint_names), ("second", b.joint_names, a.joint_names))
@@ -397,7 +399,8 @@ def _states(chain: Mechanism) -> tuple[Array, Array, Array]:
 
 
 def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
-    """(N, n) friction torque, steady if its law has a state, without springs."""
+    """Return the friction torque (N, n) without springs. For a law with a state (LuGre) it is the torque in steady
+    sliding."""
     names = found.model.joint_names
     if found.prediction.is_linear:
         still = np.zeros_like(q)

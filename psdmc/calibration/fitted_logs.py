@@ -1,4 +1,5 @@
-"""Records of one linear fit: as it is, physically consistent, and without the parameters that are not essential."""
+"""Makes the results (records) of a linear fit: unconstrained, physically consistent, and without parameters that the
+data do not need."""
 
 from __future__ import annotations
 
@@ -26,10 +27,10 @@ MOST_NAMED = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogFit:
-    """What all records of one fit share.
+    """Data that all results (records) of one linear fit share.
 
-    physical     whether a physically consistent record is wanted
-    consistency  its options
+    physical     whether the user wants a physically consistent record
+    consistency  options of the physically consistent estimate
     """
 
     model: DynamicsModel
@@ -41,8 +42,8 @@ class LogFit:
     progress: Progress
 
     def record(self, found: LinearResult) -> Calibration:
-        """The record that is delivered: with the prior, without what is not essential, physically consistent, each where it
-        is wanted."""
+        """Return the final record of the fit: with the prior, without parameters that the data do not need, and
+        physically consistent, as the options say."""
         if len(self.known.bounds) and not self.physical:
             raise InputError(
                 "[[bodies]] bounds masses or centres of mass, and the unconstrained fit knows none",
@@ -110,7 +111,8 @@ class LogFit:
 def with_price(
     fewer: Calibration, whole: Calibration, lesser: Essential, names: Sequence[str]
 ) -> Calibration:
-    """The record of the essential parameters with what was dropped and what that costs, both by their files' figures."""
+    """Return the record with essential parameters only, with a note on what was dropped and how much accuracy this
+    costs. Both accuracies are computed from the contents of model files."""
     gone = [name for name, is_dropped in zip(names, lesser.dropped.tolist(), strict=True) if is_dropped]
     before, after = whole.steps[-1].joints, fewer.steps[-1].joints
     cost = {name: before[name].held_out.r2 - after[name].held_out.r2 for name in after}

@@ -1,4 +1,5 @@
-"""psdmc excite and psdmc simulate: a calibration campaign is planned, and recorded from a virtual robot."""
+"""The commands psdmc excite, which plans a calibration campaign, and psdmc simulate, which records it on a virtual
+robot."""
 
 from __future__ import annotations
 
@@ -187,13 +188,14 @@ LARGEST_ARM = 100.0
 
 
 def joint_numbers(given: Sequence[str] | None, option: str) -> dict[str, float]:
-    """JOINT=NUMBER,... by joint; InputError where a word is none, or a joint is named twice."""
+    """Return the numbers by joint of an option JOINT=NUMBER,... Raise InputError if a word has another form, or a joint
+    two numbers."""
     hint = "write JOINT=NUMBER,JOINT=NUMBER"
     return {name: _number(value, option, hint) for name, value in _named(given, option, hint).items()}
 
 
 def acceleration_limits(given: Sequence[str] | None) -> tuple[float | None, dict[str, float]]:
-    """One number for all joints that have no limit, and JOINT=NUMBER."""
+    """Return the limit for all joints without one, and the limits by joint, from NUMBER and JOINT=NUMBER."""
     words = [word for value in given or () for word in ([value] if "=" in value else value.split(","))]
     alone = [word for word in words if "=" not in word]
     if len(alone) > 1:
@@ -218,7 +220,7 @@ def joint_ranges(given: Sequence[str] | None) -> dict[str, tuple[float, float]]:
 
 
 def load_numbers(given: str | None) -> tuple[float, tuple[float, float, float]] | None:
-    """MASS,X,Y,Z as kg and m; None for the word none."""
+    """Return the load MASS,X,Y,Z in kg and m, or None for the word none."""
     if given is None or given.strip() == "none":
         return None
     hint = "write MASS,X,Y,Z: kg, and m in the tip's frame; or none, where the robot logs torques"

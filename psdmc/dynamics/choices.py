@@ -1,4 +1,4 @@
-"""How the recursions are arranged: choices that change the number of operations, but not the result."""
+"""Choices in the arrangement of the recursions. They change the number of operations, but not the result."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The arrangement of a recursion; w, dw and U are those of motion.py.
+    """The arrangement of a recursion. w and dw are a body's angular velocity and its derivative; a body's point at r
+    accelerates with a + U r.
 
-    compound           consecutive parallel axes turn w and dw once, by the sum of their angles, from the frame before the
+    compound           consecutive parallel axes rotate w and dw once, by the sum of their angles, from the frame before the
                        first
-    fold               a leaf (a body that carries no other) is described in the frame before its joint's turn, where U
-                       differs from its parent's in six entries only; the body's parameters are turned instead
-    fold_double_angle  a folded body's second moments are turned by a sincos(2 q) of their own, not by products of sincos(q)
-    add_sines          a compound turn's sincos is made from those of its parts, not by a sincos of the sum
-    articulated        accelerations are found by articulated bodies, not by a factorized mass matrix
+    fold               a leaf (a body that carries no other) is described in the frame before its joint's rotation, where U
+                       differs from its parent's in six entries only; the body's parameters are rotated instead
+    fold_double_angle  a folded body's second moments are rotated with a separate sincos(2 q), not with products of sincos(q)
+    add_sines          the sine and cosine of a sum of angles are computed from those of its parts
+    articulated        accelerations are computed by articulated bodies, not by a factorized mass matrix
     """
 
     compound: bool = False

@@ -1,14 +1,14 @@
 """Motions of bodies: the outward sweep of Newton-Euler, written once for all its uses.
 
-Each frame gets the matrix U = [w][w_r] + [dw_r] and the acceleration a of its origin, so that the body's point at r
-accelerates with a + U r. newton_euler.py carries the wrenches that this requires inward, to the axes.
+Each frame gets the matrix U = [w][w_r] + [dw_r] and the acceleration a of its origin. A point of the body at r then
+accelerates with a + U r. newton_euler.py adds up the wrenches that these motions require, inward to the joint axes.
 
-w_r is a second ("reference") angular velocity, linear in qd_r. Without qd_r there is one velocity: w_r is w and is not
-computed, and the result is ordinary inverse dynamics. With qd_r the result is M qdd_r + C(q, qd) qd_r + g, where C is
-the matrix of C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T) over the links' pseudo-inertias S_k, for which dM/dt - 2
-C is skew-symmetric: the Slotine-Li form.
+w_r is a second ("reference") angular velocity, linear in qd_r. Without qd_r there is only one velocity: w_r is w and is
+not computed, and the result is ordinary inverse dynamics. With qd_r the result is M qdd_r + C(q, qd) qd_r + g. C is the
+matrix of C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T) over the links' pseudo-inertias S_k, for which dM/dt - 2 C is
+skew-symmetric: the Slotine-Li form.
 
-How the sweep is arranged (choices.py) changes the number of operations, but not the result.
+The arrangement of the sweep (choices.py) changes the number of operations, but not the result.
 """
 
 from __future__ import annotations
@@ -40,23 +40,26 @@ from psdmc.dynamics.twist import combined
 
 
 class LinkMotion(NamedTuple):
-    """How one body moves, in the frame its parameters are about."""
+    """The motion of one body, in the frame that the body's parameters are about."""
 
     acceleration: Vector
     spin: Spin
 
 
 class JointState(NamedTuple):
-    """A joint's position: its turn relative to its parent's frame, and the offset of its origin there."""
+    """A joint's position: its rotation relative to its parent's frame, and the offset of its origin there."""
 
     turn: Turn | Rotation | None
     offset: Vector
 
 
 class Forward(NamedTuple):
-    """Result of the outward sweep, body by body. Bodies are in the frames of `motions` and `rates`: after the joint's
-    turn; for folded ones, motions are before it and rates are their parent's. `joins`: the body turns as one with its
-    parent (compound turns)."""
+    """Result of the outward sweep, body by body.
+
+    `motions` and `rates` are in the frame after the joint's rotation. For folded bodies (choices.py), motions are in
+    the frame before the rotation, and rates are those of the parent. `joins`: the body rotates together with its
+    parent, by the sum of parallel joints' angles.
+    """
 
     states: tuple[JointState, ...]
     compound_turns: tuple[Turn | Rotation | None, ...]
@@ -90,7 +93,7 @@ class _Moved(NamedTuple):
 
     @property
     def compound_turn(self) -> Turn | Rotation | None:
-        """The turn of its group up to it."""
+        """The rotation by all joints of the group of parallel axes up to this one."""
         return self.state.turn if self.group is None else self.group.turn
 
 
@@ -103,7 +106,8 @@ def sweep_outward(
     base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Forward:
-    """Motions of all bodies. `base_acceleration` is the base's acceleration minus gravity (m/s^2, base frame).
+    """Compute the motions of all bodies. `base_acceleration` is the base's acceleration minus gravity (m/s^2, base
+    frame).
 
     qd_r   reference rates; None: there is one velocity, qd
     """

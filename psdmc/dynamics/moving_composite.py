@@ -1,8 +1,9 @@
-"""Moving composites: all bodies from a joint on, and their motion relative to the link before it.
+"""Moving composites: all bodies that a joint carries, and their motion relative to the link before the joint.
 
-Relative to that link, points at r have the velocity r' and the acceleration r'', which depend on the joints from this
-one on alone. Only moments of them over the whole composite are needed: 2 int r r'^T, 2 int r', int r'', int r x r''.
-Composites are built from tip to base like bodies: turned, shifted, joined, and given the motion of one joint more.
+Relative to that link, points at r have the velocity r' and the acceleration r'', which depend only on this joint and
+the joints after it. Only moments over the whole composite are needed: 2 int r r'^T, 2 int r', int r'', int r x r''.
+Composites are built from tip to base like bodies: they are rotated, shifted and joined, and the motion of one more
+joint is added.
 """
 
 from __future__ import annotations
@@ -32,16 +33,16 @@ from psdmc.robot.joints import JointType
 
 
 class Momenta(NamedTuple):
-    """2 int r r'^T dm (row: component of r) and 2 int r' dm."""
+    """Two moments of a composite's velocities r': 2 int r r'^T dm (row: component of r) and 2 int r' dm."""
 
     second: Matrix
     first: Vector
 
 
 class Composite(NamedTuple):
-    """Bodies about a point, their motion relative to a link.
+    """Bodies about a point, and their motion relative to a link.
 
-    wrench   (int r'' dm, int r x r'' dm)
+    wrench   (int r'' dm, int r x r'' dm), with the accelerations r'' relative to the link
     """
 
     body: Body
@@ -50,12 +51,12 @@ class Composite(NamedTuple):
 
 
 def at_rest(body: Body) -> Composite:
-    """The composite of a body that does not move relative to the link."""
+    """Return the composite of a body that does not move relative to the link."""
     return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
 
 
 def both(a: Composite, b: Composite) -> Composite:
-    """Two composites about one point and relative to one link as one."""
+    """Join two composites about the same point and relative to the same link."""
     second = tuple(add(x, y) for x, y in zip(a.momenta.second, b.momenta.second, strict=True))
     return Composite(
         joined(a.body, b.body),
@@ -65,7 +66,7 @@ def both(a: Composite, b: Composite) -> Composite:
 
 
 def moved_to(composite: Composite, offset: Vector) -> Composite:
-    """The composite about the point of the link from which its present origin lies at `offset`."""
+    """Return the composite about another point of the link; `offset` leads from that point to the present origin."""
     (second, first), (force, moment) = composite.momenta, composite.wrench
     rows = tuple(add(row, scale(first, length)) for row, length in zip(second, offset, strict=True))
     return Composite(
@@ -76,7 +77,7 @@ def moved_to(composite: Composite, offset: Vector) -> Composite:
 
 
 def along_parent(frame: Frame, composite: Composite) -> Composite:
-    """Rotate from the axes before a joint's motion to the axes of the link before it."""
+    """Rotate a composite from the axes before a joint's motion to the axes of the link before the joint."""
     if frame.is_parallel:
         return composite
     second, first = composite.momenta
@@ -87,8 +88,8 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
 
 
 def handed_composite(frame: Frame, composite: Composite) -> Composite:
-    """Return the composite that a frame passes to its parent, about the parent's frame: the sum over all limbs that it
-    represents."""
+    """Return the composite that a frame passes to its parent, about the parent's frame: the sum over all limbs that the
+    frame represents."""
     (x, y, z), first = composite.momenta
     second = (handed_vector(frame, x), handed_vector(frame, y), handed_vector(frame, z))
     force, moment = (handed_vector(frame, v) for v in composite.wrench)
@@ -97,7 +98,7 @@ def handed_composite(frame: Frame, composite: Composite) -> Composite:
 
 
 def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite:
-    """The composite in the orientation before a turn."""
+    """Rotate a composite to the orientation before a joint's rotation."""
     if turn is None:
         return composite
     if isinstance(turn, Rotation):
@@ -121,15 +122,19 @@ def _rotated(composite: Composite, turn: Rotation) -> Composite:
 
 
 def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
-    """The composite relative to the link before the joint, from its motion relative to the link beyond the joint."""
+    """Return the composite relative to the link before the joint, from its motion relative to the link after the joint."""
     rate, way = joint.turn(qd), joint.slide(qd)
     found = composite if rate is None else _spinning(composite, rate, joint.turn(qdd))
     return found if way is None else _sliding(found, way, joint.slide(qdd))
 
 
 def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
-    """Drive a joint of several coordinates, whose rates u and s are along the moved axes. r' gets s x r + u, and r''
-    gets du/dt + s x u + U r + 2 s x r', with U of s and ds/dt."""
+    """Return the composite relative to the link before a joint of several coordinates, from its motion relative to the
+    link after it.
+
+    The joint's rates u and s are along the moved axes. r' increases by s x r + u, and r'' by du/dt + s x u + U r + 2 s
+    x r', with the matrix U of s and ds/dt.
+    """
     (u, s), (u_change, s_change) = (
         combined(joint, own_rates(joint, qd)),
         combined(joint, own_rates(joint, qdd)),
@@ -146,7 +151,7 @@ def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scala
 
 
 def swept(second: Matrix, s: Vector) -> Vector:
-    """int r x (2 s x r') dm = (tr P - P^T) s"""
+    """Compute int r x (2 s x r') dm = (tr P - P^T) s, with P the second moments of velocity."""
     trace = second[0][0] + second[1][1] + second[2][2]
     return add(scale(s, trace), scale(transform(transpose(second), s), -1.0))
 

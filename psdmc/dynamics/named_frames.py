@@ -1,4 +1,4 @@
-"""Named frames: placements, Jacobians, drifts, and derivatives of velocities."""
+"""Named frames: their placements, Jacobians and drifts, and the derivatives of their velocities."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Root = tuple[Matrix, Vector]
 def placed_frames(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[tuple[Vector, Matrix]]:
-    """Origin (m) and rotation of each named frame in the base frame."""
+    """Compute the origin (m) and the rotation of each named frame in the base frame."""
     joints = _in_base(frames, q, root)
     return [
         (_point(joints[each.joint], each), multiply(joints[each.joint][0], _rotation(each))) for each in named
@@ -31,7 +31,8 @@ def placed_frames(
 def frame_jacobians(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: linear velocity of its origin, then angular, per unit joint rate, along the base's axes."""
+    """Compute the Jacobian, 6 x nv, of each named frame: linear velocity of its origin, then angular velocity, per unit
+    joint rate, along the base's axes."""
     joints = _in_base(frames, q, root)
     found = []
     for each in named:
@@ -49,7 +50,8 @@ def frame_drifts(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Six per named frame: acceleration of its origin, then angular, at constant joint rates, along the base's axes."""
+    """Compute six values per named frame: acceleration of its origin, then angular acceleration, at constant joint
+    rates, along the base's axes."""
     joints = _in_base(frames, q, root)
     forward = sweep_outward(frames, q, qd, None, [0.0] * first_rates(frames)[-1], ZERO)
     found = []
@@ -70,13 +72,13 @@ def frame_velocity_slopes(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: derivatives of its velocity J qd (linear, then angular) by q, along its tangent, and along the
-    base's axes.
+    """Compute 6 x nv derivatives per named frame: its velocity J qd (linear, then angular) by q along its tangent. The
+    velocity is along the base's axes.
 
-    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. With w the angular
-    velocity of the link before it, and (u, s) the part of the frame's velocity that joints from j on contribute, the
-    frame's velocity changes by (w x v + z x u, z x s): that part, j's own rates in it, is turned, and the frame's origin
-    moves in the velocity field of the link before.
+    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. Let w be the
+    angular velocity of the link before joint j, and (u, s) the part of the frame's velocity that comes from joint j and
+    later joints. The frame's velocity changes by (w x v + z x u, z x s), for two reasons: that part of the velocity is
+    rotated, and the frame's origin moves in the velocity field of the link before the joint.
     """
     first, found = first_rates(frames), []
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):

@@ -1,4 +1,5 @@
-"""Recursive Newton-Euler: outward for motions (motion.py), inward for wrenches; each axis takes its component."""
+"""Recursive Newton-Euler: motions outward (motion.py), then wrenches inward. Each joint's torque is the component of
+the wrench along its axis."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ NO_WRENCHES: Mapping[int, Wrench] = MappingProxyType({})
 
 
 def wrench(motion: LinkMotion, body: Body) -> Wrench:
-    """Force (N) and moment about the frame's origin (N m) that give a body the field a + U r.
+    """Compute the force (N) and moment about the frame's origin (N m) that accelerate the points r of a body with a + U
+    r.
 
     force = m a + U h,  moment = h x a + integral of r x (U r), the latter linear in the second moments.
     """
@@ -49,11 +51,12 @@ def inverse_dynamics(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """Joint torques (N m; N for sliding joints), one per rate: M(q) qdd + C(q, qd) qd_r + g(q), qd_r = qd if not given.
+    """Compute joint torques (N m; N for sliding joints), one per rate: M(q) qdd + C(q, qd) qd_r + g(q). Without qd_r,
+    qd_r = qd.
 
     external   force and moment that the world exerts on link i, about its joint frame's origin along that frame's axes
 
-    Luh, Walker, Paul 1980, with the body's wrench written on its pseudo-inertia.
+    Source: Luh, Walker, Paul 1980. The body's wrench is computed from its pseudo-inertia.
     """
     forward = sweep_outward(frames, q, qd, qd_r, qdd, base_acceleration, choices)
     seen = seen_bodies(frames, bodies, q, forward, choices)
@@ -63,7 +66,7 @@ def inverse_dynamics(
 def seen_bodies(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], forward: Forward, choices: Choices
 ) -> list[Body]:
-    """Bodies in the frames that their motions are in."""
+    """Return the bodies' parameters about the frames in which their motions are given."""
     return [
         _folded_body(frame, body, value, state.turn, choices) if is_folded else body
         for frame, body, value, state, is_folded in zip(
@@ -96,11 +99,13 @@ def sweep_inward(
     external: Mapping[int, Wrench] = NO_WRENCHES,
     yielded: Callable[[int, Sequence[Scalar]], Wrench] | None = None,
 ) -> tuple[Scalar, ...]:
-    """Joint torques: wrenches summed inward to the base, children before parents; each axis takes its component. With
-    compound turns, the x and y moments of a group of parallel axes are summed in the frame before its first turn,
-    their z and the forces joint by joint.
+    """Compute joint torques: wrenches are summed inward to the base, children before parents, and each axis takes its
+    component.
 
-    yielded   gives a further wrench that joint i passes on, from its number and the torques that it takes; about its
+    With compound rotations, the x and y moments of a group of parallel axes are summed in the frame before its first
+    rotation, their z moments and the forces joint by joint.
+
+    yielded   returns a further wrench that joint i passes to its parent, from the joint's number and torques; about its
               body's frame, along its axes
     """
     n = len(frames)

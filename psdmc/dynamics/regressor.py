@@ -1,7 +1,7 @@
-"""The joint-torque regressor: torques as a matrix times the standard parameters.
+"""The joint-torque regressor: the matrix that gives the joint torques when it is multiplied by the standard parameters.
 
-Each body's wrench is linear in its parameters. A column of the regressor is the wrench for one parameter alone, dotted
-with the twist of each joint that carries the body, moved into the body's frame.
+Each body's wrench is linear in the body's parameters. An entry of the regressor belongs to one joint and one parameter.
+It is the body's wrench for this parameter alone, with the value one, dotted with the joint's twist in the body's frame.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Twist = tuple[Vector, Vector]
 
 
 class Placed(Protocol):
-    """The placement of one frame in another: a Placement, or one in another precision."""
+    """The placement of one frame in another, as a Placement or in another floating-point precision."""
 
     @property
     def rotation(self) -> NDArray[Any]: ...
@@ -45,7 +45,8 @@ def regressor(
     base_acceleration: Vector,
     qd_r: Sequence[Scalar] | None = None,
 ) -> tuple[dict[int, Scalar], ...]:
-    """Y with torque[i] = sum over parameters p of Y[i][p] x[p]; entries that are zero for every state are left out.
+    """Compute the regressor Y with torque[i] = sum over parameters p of Y[i][p] x[p]. Entries that are zero at every
+    state are left out.
 
     link_frames  n, the frame that each link's parameters are about, in its joint frame
     wanted       indices into x (11 per link, link by link) whose columns are computed
@@ -74,7 +75,7 @@ def regressor(
 
 
 def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
-    """A twist of the parent's frame, at the origin and along the axes of this frame."""
+    """Return a twist of the parent's frame as a twist at the origin and along the axes of this frame."""
     linear, angular = twist
     moved = add(linear, cross(angular, state.offset))
     return (
@@ -84,7 +85,7 @@ def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
 
 
 def twist_in(place: Placed, twist: Twist) -> Twist:
-    """A joint frame's twist, at the origin and along the axes of a frame placed in it."""
+    """Return a joint frame's twist at the origin and along the axes of a frame that is placed in it."""
     rotation, translation = _plain(place)
     linear, angular = twist
     moved = add(linear, cross(angular, translation))
@@ -93,7 +94,7 @@ def twist_in(place: Placed, twist: Twist) -> Twist:
 
 
 def seen_from(place: Placed, motion: LinkMotion, rates: Rates) -> LinkMotion:
-    """A joint frame's motion, as the motion of a frame placed in it."""
+    """Return the motion of a frame that is fixed to a joint frame, from the joint frame's motion."""
     rotation, translation = _plain(place)
     rows = transpose(rotation)
     acceleration = add(motion.acceleration, transform(motion.spin.field, translation))
@@ -109,7 +110,8 @@ def _plain(place: Placed) -> tuple[Matrix, Vector]:
 
 
 def unit_wrench(name: int, motion: LinkMotion) -> tuple[Vector, Vector]:
-    """Force and moment for one standard parameter of value one (index into PARAMETER_NAMES), others zero."""
+    """Return the force and moment of a body whose standard parameter number `name` (in PARAMETER_NAMES) is one, and whose
+    others are zero."""
     (ax, ay, az), (u, d) = motion
     if name == 0:
         return (ax, ay, az), ZERO

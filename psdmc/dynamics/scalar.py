@@ -1,8 +1,8 @@
 """The scalars that the algorithms run on, and three-vectors of them.
 
-A scalar is anything with + - * / and unary minus that mixes with floats: a float, a NumPy array of states, or a symbol
-that records what is done to it. Exact zeros and ones of the robot stay Python floats, so that a recording scalar can
-drop them; on arrays they cost a little and change nothing.
+A scalar is anything with + - * / and unary minus that mixes with floats: a float, a NumPy array with one value per
+state, or a symbol that records each operation. Exact zeros and ones of the robot stay Python floats, so that symbols
+can drop them. On arrays they cost a little and change nothing.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def fixed(rows: Matrix) -> Fixed:
-    """A matrix of plain floats without its zeros."""
+    """Return a matrix of plain floats in a form that leaves out its zeros."""
     first, second, third = (tuple((k, x) for k, x in enumerate(row) if x != 0.0) for row in rows)
     return first, second, third
 

@@ -1,9 +1,9 @@
-"""Factors of a symmetric positive definite matrix, and what follows from them, written out entry by entry, from the last row
-up.
+"""Factorization of a symmetric positive definite matrix, and solutions from the factors. All loops run entry by entry,
+so that symbols can record them.
 
-Entries that are the number zero, those of joints on different branches, are left out. Where parents come before their
-children, elimination from the last row up changes entries of two joints only where both carry the one that is eliminated, so
-that no zero is lost (Featherstone 2008, section 6.5: branch-induced sparsity).
+Entries of joints on different branches are the number zero and are left out. Parents come before their children, and
+elimination goes from the last row up. It changes an entry of two joints only if both carry the eliminated joint, so no
+zero is lost (Featherstone 2008, section 6.5: branch-induced sparsity).
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class SingularMatrix(Exception):
-    """A pivot is not positive at any state; `row` is its row of the matrix: of the mass matrix, the number of a rate."""
+    """A pivot is not positive at any state; `row` is its row in the matrix. In a mass matrix, this is the number of a
+    rate."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"pivot {row} is not positive at any state")
@@ -28,10 +29,10 @@ class SingularMatrix(Exception):
 class Factors:
     """M = L^T D L with L unit lower triangular and D diagonal.
 
-    pivots    (n)  D, all positive where M is positive definite
+    pivots    (n)  D, all positive if M is positive definite
     inverses  (n)  1 / D
-    lower     row k: L's k entries left of the diagonal
-    scaled    row k: those times D's
+    lower     row k: the k entries of L left of the diagonal
+    scaled    row k: the same entries times D's
     """
 
     pivots: tuple[Scalar, ...]
@@ -41,8 +42,8 @@ class Factors:
 
 
 def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
-    """The factors of M by elimination from the tip, whose entries the composite-rigid-body sweep finishes first. Raises
-    SingularMatrix where a pivot is a constant not above 0."""
+    """Factorize M by elimination from the last row up, the order in which the composite-rigid-body algorithm computes
+    the rows. Raises SingularMatrix if a pivot is a constant not above 0."""
     n = len(matrix)
     rows = [list(row) for row in matrix]
     inverses: list[Scalar] = [0.0] * n
@@ -78,7 +79,7 @@ def _is_zero(entry: Scalar) -> bool:
 
 
 def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """x of L^T D L x = right."""
+    """Solve L^T D L x = right for x, with the factors of a symmetric matrix."""
     load = list(right)
     solution = list(right)
     for k in reversed(range(len(load))):
@@ -92,12 +93,12 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 
 def projected(factors: Factors, rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    """J M^-1 J^T, both triangles, from the rows of J: with Y = J L^-1, it is Y D^-1 Y^T."""
+    """Compute J M^-1 J^T, both triangles, from the rows of J. With Y = J L^-1, it is Y D^-1 Y^T."""
     return half_products(factors, [half_solved(factors, row) for row in rows])
 
 
 def half_products(factors: Factors, halves: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    """Y D^-1 Y^T, both triangles, from the rows of Y."""
+    """Compute Y D^-1 Y^T, both triangles, from the rows of Y and the factor D."""
     found: list[list[Scalar]] = [[0.0] * len(halves) for _ in halves]
     for i, half in enumerate(halves):
         own = _nonzero(half)
@@ -108,7 +109,7 @@ def half_products(factors: Factors, halves: Sequence[Sequence[Scalar]]) -> list[
 
 
 def half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """y of L^T y = right; zero where no joint beyond is in `right`."""
+    """Solve L^T y = right. An entry of y is zero if `right` is zero for the joint and for all joints that it carries."""
     found = list(right)
     for k in reversed(range(len(found))):
         if not _is_zero(found[k]):
@@ -118,7 +119,7 @@ def half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 
 def rest_solved(factors: Factors, half: Sequence[Scalar]) -> list[Scalar]:
-    """x of D L x = half, which solves M x = right if L^T half = right."""
+    """Solve D L x = half. If L^T half = right, the result x also solves M x = right."""
     solution = [value * inverse for value, inverse in zip(half, factors.inverses, strict=True)]
     for k, row in enumerate(factors.lower):
         for i in _nonzero(row):
@@ -127,7 +128,7 @@ def rest_solved(factors: Factors, half: Sequence[Scalar]) -> list[Scalar]:
 
 
 def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    """a . b, of vectors of equal length."""
+    """Return the inner product a . b of vectors of equal length."""
     total: Scalar = 0.0
     for x, y in zip(a, b, strict=True):
         total = total + x * y
@@ -135,7 +136,7 @@ def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
 
 
 def inverse(factors: Factors) -> list[list[Scalar]]:
-    """M^-1 from M = L^T D L, both triangles: L^-1 D^-1 L^-T, of which one triangle is computed."""
+    """Compute M^-1 = L^-1 D^-1 L^-T from M = L^T D L. One triangle is computed, and both are returned."""
     n = len(factors.pivots)
     columns = _inverse_of_lower(factors.lower)
     scaled = [[entry * factors.inverses[k] for k, entry in enumerate(row)] for row in columns]

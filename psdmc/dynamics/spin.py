@@ -1,4 +1,5 @@
-"""Rates of a frame, and the part of its acceleration field that they make: from the rates, or from the parent's field."""
+"""The angular rates of a frame, and the part of its acceleration field that they cause. This part is computed from the
+rates, or from the field of the parent frame."""
 
 from __future__ import annotations
 
@@ -9,10 +10,10 @@ from psdmc.dynamics.scalar import Matrix, Scalar, Vector, rotated_tensor, transp
 
 
 class Spin(NamedTuple):
-    """The velocity-dependent part of a frame's acceleration field.
+    """The part of a frame's acceleration field that depends on its angular rates.
 
-    field        U, so that a point at r accelerates with a + U r
-    differences  (Uzz - Uyy, Uxx - Uzz, Uyy - Uxx), formed from squares where that is cheaper
+    field        the matrix U: a point at r accelerates with a + U r
+    differences  (Uzz - Uyy, Uxx - Uzz, Uyy - Uxx), formed from squares if that is cheaper
     """
 
     field: Matrix
@@ -20,10 +21,11 @@ class Spin(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Rates of one frame along its axes: angular velocity, derivative of the reference angular velocity, and that
-    velocity.
+    """Angular rates of one frame along its axes.
 
-    w_r   None: there is one velocity, w
+    w     angular velocity
+    dw_r  derivative of the reference angular velocity
+    w_r   reference angular velocity; None: there is one velocity, w
     """
 
     w: Vector
@@ -37,7 +39,8 @@ class Rates(NamedTuple):
 
 
 class JointRates(NamedTuple):
-    """Rate, reference acceleration and reference rate of a turn about z or a slide along it; qd_r None: it is qd."""
+    """Rate, reference acceleration and reference rate of a joint that rotates about z or slides along z. qd_r None: it
+    is qd."""
 
     qd: Scalar
     qdd_r: Scalar
@@ -49,7 +52,7 @@ class JointRates(NamedTuple):
 
 
 def spin_of(rates: Rates) -> Spin:
-    """U = [w][w_r] + [dw_r] = w_r w^T - (w . w_r) 1 + [dw_r]."""
+    """Compute the matrix U = [w][w_r] + [dw_r] = w_r w^T - (w . w_r) 1 + [dw_r] from a frame's angular rates."""
     (wx, wy, wz), (rx, ry, rz), (ax, ay, az) = rates.w, rates.reference, rates.dw_r
     xx, yy, zz = wx * rx, wy * ry, wz * rz
     field = (
@@ -61,8 +64,8 @@ def spin_of(rates: Rates) -> Spin:
 
 
 def spin_before_turn(frame: Frame, previous: Spin, before: Rates, turning: JointRates | None) -> Spin:
-    """Compute the spin of a leaf in the frame before its rotation. It is the parent's plus ([qd w_r + qd_r w + qd qd_r
-    z] + qdd_r)[z]."""
+    """Compute the spin of a leaf in the frame before its rotation. It is the parent's spin plus ([qd w_r + qd_r w + qd
+    qd_r z] + qdd_r)[z]."""
     (u, d) = _turned_field(frame, previous)
     if turning is None:
         return Spin(u, d)

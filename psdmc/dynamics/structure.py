@@ -1,7 +1,7 @@
-"""Places of matrix entries that can differ from zero, found from the robot's tree and axes without any state.
+"""The entries of matrices that can differ from zero, found from the robot's tree and axes without any state.
 
-The algorithms run on scalars of which nothing is known but that they may be other than zero. An entry that comes out as
-the number zero is zero at every state, whatever the inertias.
+The algorithms run on scalars that only say that a value may differ from zero. An entry whose result is the number zero
+is zero at every state, whatever the inertias.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ SOMETHING = Something()
 
 
 def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
-    """Return the places in the mass matrix's lower triangle, diagonal included.
+    """Return the (row, column) of entries in the mass matrix's lower triangle, diagonal included, that can differ from
+    zero.
 
     lift  (11 n, l) base parameters to standard parameters about the link frames
     """
@@ -72,7 +73,8 @@ def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
 
 
 def regressor_places(chain: Mechanism, lift: Array) -> Places:
-    """Return the places in the torques' regressor in base parameters, (nv, l); `lift` as in `mass_matrix_places`."""
+    """Return the (row, column) of entries in the regressor by base parameters, (nv, l), that can differ from zero;
+    `lift` as in `mass_matrix_places`."""
     needed = frozenset(np.flatnonzero(lift.any(axis=1)).tolist())
     placed = [joint.link_frame for joint in chain.joints]
     q, rates = [SOMETHING] * chain.nq, [SOMETHING] * chain.nv

@@ -1,13 +1,14 @@
-"""How the end of a step depends on its start and on its way: derivatives of `integrate` along tangents.
+"""Derivatives of `integrate` along tangents: how the end of a step at constant rates depends on its start and on the
+rates.
 
-A joint goes from T to T exp(x), x its constant rates times seconds. Moved by a small e along its own axes at the start,
-or on the way, it ends moved by
+A joint moves from the placement T to T exp(x), where x is its constant rates times the duration. A small displacement e
+along the joint's own axes, of the start or of x, displaces the end by
 
     Ad(exp(-x)) e = (1 - ad(x) J) e   or   J e,   J = 1 - ad(x) / 2! + ad(x)^2 / 3! - ...,
 
-along the axes that it ends with. Every joint type's motions are a group among those of a free body: one formula is for
-all of them, written for a linear part v and an angular part w of x.
-Source: Barfoot, State Estimation for Robotics, 2nd edition, section 8.1 (left Jacobian; here the right one, of -x).
+along the axes at the end. The motions of every joint type are a subgroup of the motions of a free body. One formula is
+therefore enough for all types, written for a linear part v and an angular part w of x. Source: Barfoot, State
+Estimation for Robotics, 2nd edition, section 8.1 (left Jacobian; here the right one, of -x).
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ TERMS = 12
 
 
 class StepSlopes(NamedTuple):
-    """nv x nv: derivatives of where a joint ends, along its tangent there, by its start and by its way."""
+    """Derivatives, nv x nv each, of a joint's end position along its tangent: by the start, and by the way (the rates
+    times the duration)."""
 
     by_start: Rows
     by_way: Rows
@@ -41,7 +43,8 @@ class StepSlopes(NamedTuple):
 def step_slopes(
     frames: Sequence[Frame], rates: Sequence[Scalar], seconds: Scalar = 1.0
 ) -> list[StepSlopes | None]:
-    """Joint by joint, of nv rates for so long. None where both are one, of joints of one rate."""
+    """Return the derivatives of a step for each joint, for nv rates during `seconds`. None for a joint of one rate,
+    whose derivatives are both one."""
     found: list[StepSlopes | None] = []
     used = 0
     for frame in leading(frames):

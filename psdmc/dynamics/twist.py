@@ -1,4 +1,4 @@
-"""Constant twists, such as a joint's motion subspace, applied to vectors; zeros and ones cost nothing."""
+"""Constant twists, such as a joint's motion subspace, multiplied with vectors. Zeros and ones cost no operation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
 
 
 def axis_twist(joint: JointType) -> Twist:
-    """The twist per unit rate of a joint of one rate; ValueError where it has more."""
+    """Return the twist per unit rate of a joint with one rate. Raises ValueError if the joint has more rates."""
     (twist,) = joint.twists
     return twist
 
@@ -33,7 +33,7 @@ def efforts(joint: JointType, force: Vector, moment: Vector) -> tuple[Scalar, ..
 
 
 def combined(joint: JointType, rates: Sequence[Scalar]) -> tuple[Vector, Vector]:
-    """Linear and angular part of the sum of the joint's twists times its rates."""
+    """Return the linear and angular part of the sum of the joint's twists times its rates."""
     parts = [
         weighted([(*linear, *angular)[part] for linear, angular in joint.twists], rates) for part in range(6)
     ]
@@ -41,12 +41,13 @@ def combined(joint: JointType, rates: Sequence[Scalar]) -> tuple[Vector, Vector]
 
 
 def own_rates(joint: JointType, rates: Scalar) -> tuple[Scalar, ...]:
-    """A joint's rates as a tuple, of one rate too."""
+    """Return a joint's rates as a tuple, also for a joint with one rate."""
     return rates if isinstance(rates, tuple) else (rates,)
 
 
 def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
-    """The component of a force and a moment about the joint frame's origin along the joint: N m, or N where it slides."""
+    """Return the component of a force and a moment, about the joint frame's origin, along the joint: N m, or N for a
+    sliding joint."""
     linear, angular = axis_twist(joint)
     return weighted((*linear, *angular), (*force, *moment))
 
@@ -57,7 +58,8 @@ def turned(rotation: Matrix, v: tuple[float, float, float]) -> Vector:
 
 
 def momentum(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Momentum and angular momentum about the frame's origin of a body that moves with a constant twist."""
+    """Return the momentum, and the angular momentum about the frame's origin, of a body that moves with a constant
+    twist."""
     found: tuple[Vector, Vector] | None = None
     for weight, part in zip((*twist[0], *twist[1]), range(6), strict=True):
         if weight == 0.0:

@@ -1,4 +1,4 @@
-"""Friction of a calibrated model as robot files hold it: a constant against the motion, and damping."""
+"""Friction of a calibrated model in the form that robot files can hold: a constant against the motion, and damping."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ ORDINARY_SPEED = 1.0
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
-    """One joint's friction: `constant` N m (N) against the motion, `damping` N m s/rad (N s/m); neither negative.
+    """Friction of one joint as two numbers: `constant` N m (N) against the motion, and `damping` N m s/rad (N s/m).
+    Neither is negative.
 
-    lost  what such a pair cannot say of the calibrated friction, in words
+    lost  in words, which parts of the calibrated friction the two numbers cannot express
     """
 
     constant: float
@@ -30,9 +31,10 @@ class JointFriction:
 
 
 def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
-    """Friction by joint name, of joints for which the model was calibrated; empty where it was not.
+    """Return the friction by joint name, for the joints that were calibrated. It is empty if the model is not
+    calibrated.
 
-    Each law says which constant and which line are nearest to it, if any.
+    Each friction law states the constant and the damping that are nearest to it, if any.
     """
     calibrated = model.calibrated
     if calibrated is None:
@@ -84,7 +86,7 @@ def _of(rows: Sequence[Row], joint: Joint) -> JointFriction:
 
 
 def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """One sentence for each kind of friction that the files do not hold, with the joints."""
+    """Return one sentence for each kind of friction that the files cannot hold, with the names of the joints."""
     by_kind: dict[str, list[str]] = {}
     for name, friction in found.items():
         for what in friction.lost:
@@ -93,7 +95,7 @@ def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def calibrated_friction_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """What of the calibration is in the files."""
+    """Return notes on which part of the calibrated friction is in the files, and which part is not."""
     if not found:
         return ()
     return (

@@ -1,1 +1,1 @@
-"""Compiled robots inside array frameworks that differentiate: JAX and PyTorch."""
+"""Functions of compiled robots for JAX and PyTorch, which can differentiate them."""

@@ -1,4 +1,5 @@
-"""The functions that make robots for array frameworks. The frameworks are optional, and imported when they are asked for."""
+"""The functions `psdmc.jax` and `psdmc.torch`. JAX and PyTorch are optional and are imported when the function is
+called."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction of a robot's joints: terms, and the values that a calibration found for them."""
+"""Friction of all joints of a robot: the terms, and the values that a calibration found for them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ MOST_TERMS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Friction:
-    """Friction torque of n joints: the sum of terms, sizes against the motion first.
+    """Friction torque of n joints, as a sum of terms. Terms that act against the motion come first.
 
-    terms       each with its law
-    values      (n, m) one row for each joint; zero where a joint lacks a term
+    terms       each a friction law with its number, such as viscous friction with an exponent
+    values      (n, m) one row for each joint; zero if a joint lacks a term
     sign_speed  rad/s (m/s) over which friction changes sign, so that it is smooth
-    beyond      what else the calibration found beside rigid bodies, in words without names
+    beyond      what else the calibration found in addition to rigid bodies, in words without names
     """
 
     terms: tuple[Term, ...]
@@ -37,20 +37,22 @@ class Friction:
 
     @property
     def by_position(self) -> bool:
-        """Whether the torque depends on the joints' positions."""
+        """Whether the friction torque depends on the joints' positions."""
         return any("q" in term.reads for term in self.terms)
 
     def by_speed(self, qd: Array) -> Array:
-        """(..., n) torque of the terms that do not depend on positions."""
+        """Return the torque (..., n) of the terms that depend on speeds qd (..., n) but not on positions."""
         here = [(term, own) for term, own in self._rows(list(self.values.T)) if "q" not in term.reads]
         return self._torque(here, np.asarray(qd), 0.0)
 
     def torque(self, qd: ArrayLike, q: ArrayLike = 0.0) -> Array:
-        """(..., n) N m (N) at speeds and positions (..., n), to be added to what the rigid bodies take."""
+        """Return the friction torque (..., n), N m (N), at speeds and positions (..., n). It adds to the torque of the
+        rigid bodies."""
         return self._torque(self._rows(list(self.values.T)), np.asarray(qd, dtype=np.float64), np.asarray(q))
 
     def program(self) -> Program:
-        """One joint's friction tau[0] by its values p[...], its speed v[0] and its position q[0]."""
+        """Return a PROGRAM (list of operations) for one joint. It computes the friction tau[0] from the values p[...],
+        the speed v[0] and the position q[0]."""
         tracer = Tracer()
         p = tracer.symbols("p", self.values.shape[1])
         v = tracer.symbol(Slot("v", 0))
@@ -70,7 +72,7 @@ class Friction:
 
 
 def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """What acts against the motion first, constants last."""
+    """Return the terms in the order that psdmc uses: terms that act against the motion first, constant torques last."""
     return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
 
 
@@ -81,11 +83,13 @@ def found_friction(
     laws: Mapping[str, Law],
     sign_speed: float,
 ) -> Friction:
-    """The friction of values by joint and name, without what depends on the load; KeyError or ValueError where these are
-    damaged.
+    """Return the Friction that has the given values, without terms that depend on the load.
 
+    values      fitted values by the names of the joint and of the value
     everyone_s  terms that each joint must have
-    laws        that values may be of, by name
+    laws        friction laws by name, to which the values may belong
+
+    Raises KeyError if a value is missing, ValueError if a value is not finite or belongs to no law.
     """
     if not sign_speed > 0.0:
         raise ValueError(f"sign_speed {sign_speed:g}")
@@ -110,10 +114,11 @@ def found_friction(
 
 
 def rows_of(values: Mapping[str, float], law: str, laws: Mapping[str, Law]) -> list[Row]:
-    """Terms of one joint with its values by name; names of no law are left out.
+    """Return the friction terms of one joint, each with its values. Values that belong to no law are left out.
 
-    law   the name of a law with a state, if the values are of one
-    laws  that values may be of, by name
+    values  values of the joint by name
+    law     the name of a law with a state (such as LuGre), if the values belong to one
+    laws    friction laws by name, to which the values may belong
     """
     whole = WITH_STATE.get(law)
     if whole is not None and set(whole.parameters) <= set(values):

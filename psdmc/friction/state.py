@@ -1,4 +1,5 @@
-"""A law with a state as PROGRAMs of one joint: its torque, its step, and the number of steps between samples."""
+"""PROGRAMs (lists of operations) for a friction law with an internal state, for one joint: torque, step and number of
+steps."""
 
 from __future__ import annotations
 
@@ -15,7 +16,10 @@ from psdmc.program.trace import Tracer
 
 
 def state_programs(law: Law) -> dict[str, tuple[Program, tuple[str, ...]]]:
-    """By name the PROGRAMs, which put out `out`, and their inputs beside p."""
+    """Return the PROGRAMs 'step', 'pieces' and 'torque' by name, each with the names of its inputs other than p.
+
+    The values of the law are p. Each PROGRAM has one output, `out`.
+    """
     state = law.state
     assert state is not None
     return {

@@ -83,7 +83,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """What contacts change of the accelerations that the torques were computed from, which are exact."""
+    """Return the accelerations from which the torques were computed, which are exact, plus the change by the contacts."""
     free = given["qdd"]
 
     def wanted(jacobian: Array) -> Array:

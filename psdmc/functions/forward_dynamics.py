@@ -21,8 +21,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """The accelerations that the torques were computed from. They are exact; a solution would lose digits by the mass
-    matrix's condition number."""
+    """Return the accelerations from which the given torques were computed. They are exact; solving for accelerations
+    would lose digits if the mass matrix is badly conditioned."""
     return {"qdd": given["qdd"]}
 
 

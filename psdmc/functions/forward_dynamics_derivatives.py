@@ -25,10 +25,12 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration.
+    """Compute d qdd = M^-1 (d tau - d tau_id), where tau_id are the torques of inverse dynamics at the same
+    acceleration.
 
-    M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd. Both blocks
-    are multiplied by M^-1 behind the trace; that by qd comes first, so that its entries need not wait.
+    M and d tau_id / d qd do not depend on the acceleration. The bias is h = (d tau_id / d qd) qd / 2 + g, because h - g
+    is quadratic in qd. Both blocks of derivatives are multiplied by M^-1 after the traced operations. The block by qd
+    comes first, because its entries are known first.
     """
     if any_limbs(g.frames):
         return _in_limbs(g)
@@ -89,7 +91,8 @@ def _with_block(matrix: Matrix, block: Matrix, column: int) -> list[list[Scalar]
 
 
 def multiplied(g: Ingredients) -> Outputs:
-    """Return the function's outputs, for functions that continue with them."""
+    """Return the outputs of this function with all products multiplied out, for functions that compute with them
+    further."""
     found = trace(g)
     by_tau = found["dqdd_dtau"]
     blocks = {

@@ -1,4 +1,4 @@
-"""Forward dynamics and the gradient of its weighted accelerations (reverse mode)."""
+"""Forward dynamics, and the gradient of a weighted sum of its accelerations (reverse mode)."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration. With M
-    weights = cotangent, the gradient is that of weights . (tau - tau_id)."""
+    """Compute gradients from d qdd = M^-1 (d tau - d tau_id), where tau_id are the torques of inverse dynamics at the
+    same acceleration. With the solution of M weights = cotangent, they are the gradients of weights . (tau - tau_id)."""
     qdd, factors = accelerations(g, g.inputs["tau"])
     weights = factors.solved(g.inputs[COTANGENT.name])
     by_q, by_qd = torque_gradients(g, qdd, weights)

@@ -28,8 +28,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's derivatives along the frame's own axes, turned into the base's axes, plus what the turning of the
-    axes contributes."""
+    """Return Pinocchio's derivatives, rotated from the frame's axes to the base's axes, plus the derivative of this
+    rotation times the velocity."""
     import pinocchio as pin
 
     def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:

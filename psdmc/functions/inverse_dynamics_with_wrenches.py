@@ -46,7 +46,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Torques from Pinocchio with each wrench carried from its frame into the joint's, as Pinocchio's fext are given."""
+    """Compute torques by Pinocchio. Its argument fext takes each wrench in the frame of a joint, so wrenches are
+    converted from the named frames first."""
     import pinocchio as pin
 
     def loaded(model: Any, data: Any, q: Array, qd: Array, qdd: Array, wrenches: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The position at which no joint has moved."""
+"""The neutral position q, at which no joint has moved: zeros, and unit quaternions without rotation."""
 
 from __future__ import annotations
 

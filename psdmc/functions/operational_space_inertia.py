@@ -71,7 +71,7 @@ def _inverse_and_sign(rows: Rows, mu: Scalar) -> tuple[Rows, Scalar]:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Also what must be positive for Lambda to mean anything."""
+    """Compute the inertias Lambda, and the pivots and signs that must be positive for Lambda to exist."""
     q, mu = list(given["q"].T), np.reshape(given[MU.name], -1)
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])

@@ -50,7 +50,8 @@ Stage = tuple[Any, Any, Any, Any]
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The regions written out: forward dynamics' derivatives four times, and what they are multiplied with."""
+    """Compute one step by executing the regions as straight-line code: derivatives of forward dynamics four times, and
+    the products with them."""
     nq, nv = len(g.inputs["q"]), len(g.still)
 
     def call(_: str, given: list[list[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
@@ -65,13 +66,15 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame]) -> Regions:
-    """The state after dt and its derivatives: both are the start and a sixth of the stages' slopes, 1, 2, 2, 1 times.
+    """Return the function's body as loops and calls: it computes the state after dt and its derivatives.
 
-    Slopes are those of q's coordinates and of their derivatives; these are along the tangent of q between stages.
+    Both are the start plus a sixth of the weighted sum of the four stages' slopes, with weights 1, 2, 2, 1. Slopes are
+    those of q's coordinates and of their derivatives. Between stages, derivatives are along the tangent of q. The
+    arrays are:
 
-    here, there     q and qd of a stage, and
-    by_q, by_v      nv x 3 nv, their derivatives by q, qd and tau, those of q along its tangent
-    rate, turn      nq + nv and nq + nv x 3 nv, slopes of q's coordinates and of qd, and of their derivatives by the same
+    here, there     q and qd of a stage
+    by_q, by_v      nv x 3 nv, derivatives of q (along its tangent) and of qd, by q, qd and tau
+    rate, turn      nq + nv and nq + nv x 3 nv, slopes of q's coordinates and of qd, and their derivatives by q, qd and tau
     start           the derivatives of coordinates and qd at the start
     total, totals   sums of slopes
     """
@@ -244,7 +247,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's accelerations and their derivatives along the stages; it has no such step of coordinates."""
+    """Compute the step from Pinocchio's accelerations and their derivatives at the four stages. Pinocchio has no
+    Runge-Kutta step of coordinates."""
     maps = CoordinateMaps(robot.joint_types)
     return _on_arrays(given, maps, lambda q, qd: robot.forward_dynamics_derivatives(q, qd, given["tau"]))
 

@@ -1,10 +1,11 @@
-"""The nearest positive definite matrices of an affine family, by Newton's method.
+"""Finds positive definite matrices that depend linearly on parameters z and are nearest to given matrices.
 
     minimise the sum over blocks of  weight (tr(N P(z)) - log det P(z)),  P(z) = constant + sum of z_k slopes_k
 
-whose N is the inverse of what P should resemble. It is convex and its own barrier: no step leaves the positive definite
-matrices. Newton's method does not depend on the units of z or P and ends at rounding, where conic solvers, which weigh
-one link of a gram against one of ten kilograms, stop at 1e-8 or fail (Boyd, Vandenberghe 2004, chapters 9 and 11).
+N is the inverse of the matrix that P should be near to. The problem is convex, and -log det P keeps every step within
+the positive definite matrices. Newton's method does not depend on the units of z or P and reaches rounding accuracy.
+Conic solvers stop at 1e-8 or fail if links of a gram and of ten kilograms occur together. Source: Boyd, Vandenberghe
+2004, chapters 9 and 11.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ MARGIN = 1e-13
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """One symmetric matrix, constant (m, m) + z slopes (k, m, m), and the body that it should resemble (m, m)."""
+    """One symmetric matrix P(z) = constant (m, m) + z slopes (k, m, m), and the matrix (m, m) that it should be near
+    to."""
 
     constant: Array
     slopes: Array
@@ -51,7 +53,8 @@ class Block:
 
 
 def nearest_definite(blocks: Sequence[Block], z: Array) -> Array | None:
-    """(k,) the minimiser, begun at z; None where no z makes all blocks positive definite."""
+    """Return the minimiser z (k,), by Newton's method from the start value z. Return None if no z makes all blocks
+    positive definite."""
     found = feasible_point(blocks, z)
     if found is None:
         return None
@@ -66,10 +69,10 @@ def nearest_definite(blocks: Sequence[Block], z: Array) -> Array | None:
 
 
 def feasible_point(blocks: Sequence[Block], z: Array) -> Array | None:
-    """(k,) some z that makes all blocks positive definite; None where there is none.
+    """Return some z (k,) that makes all blocks positive definite; None if there is none.
 
-    Each block is shifted by s times a rounder form of what it should resemble, s is weighed ever more against the distance
-    from that form, and the search ends as soon as the blocks without their shift are positive definite.
+    The search adds s times a well-conditioned positive definite matrix to each block. It increases the penalty on s
+    until the blocks are positive definite without this addition.
     """
     if _are_definite(blocks, z):
         return z

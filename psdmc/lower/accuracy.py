@@ -1,7 +1,8 @@
-"""Error of the torques that an arrangement gives, relative to the model's own.
+"""The torque errors of an arrangement (a choice of link frames, carriers and recursion), relative to the model's
+torques.
 
-Frames at other feet, or other carriers, lose digits on robots of many scales: where carriers of 100 kg stand for the
-parameters of a gram at a micrometre too, that gram's torque is beyond their last digit.
+On robots of many scales, some frames or carriers lose digits. An example is a robot on which carriers of 100 kg also
+represent a mass of 1 g at 1 um from a joint axis: the torque of this mass is below their last digit.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ WRONG = 1e-8
 
 
 class Accuracy:
-    """Errors of a model's arrangements, most by inverse dynamics, which runs the arithmetic of other functions; and of
-    PROGRAMs.
+    """Computes the errors of a model's arrangements and of single PROGRAMs. Most arrangements are judged by inverse
+    dynamics, whose operations other functions share.
 
     robot    constants of the traces, with theta_b or with theta_b as an input
     theta_b  (l,)
@@ -46,17 +47,20 @@ class Accuracy:
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement, recipe: Recipe = inverse_dynamics.RECIPE) -> float:
-        """Return the error of a function in an arrangement: the mass matrix is compared by itself, others by inverse
-        dynamics. Entries of the mass matrix may be small compared with gravity torques."""
+        """Return the error of a function in an arrangement. The mass matrix is computed itself, because its entries may
+        be small compared with gravity torques. Other functions are judged by inverse dynamics."""
         if recipe.polynomials is not Polynomials.MASS:
             recipe = inverse_dynamics.RECIPE
         return self.error_of(recipe, trace_dynamics(recipe, arrangement, self.robot))
 
     def error_of(self, recipe: Recipe, program: Program) -> float:
-        """Return the largest difference from Newton-Euler of a function that is a part of the torques. Newton-Euler and
-        composite bodies are about the file's link frames. The difference is a torque (accelerations times the mass
-        matrix) relative to the joint's largest one, or one of the mass matrix relative to its row's largest entry;
-        absolute if that is zero."""
+        """Return the largest difference between a PROGRAM's outputs and Newton-Euler or composite bodies in the file's
+        link frames.
+
+        The difference is one of torques (accelerations are multiplied by the mass matrix), relative to the joint's
+        largest torque. For the mass matrix, it is relative to the row's largest entry. It is absolute if that value is
+        zero.
+        """
         signature, part = recipe.signature, recipe.polynomials
         given = self._states | {"tau": self._torques, "theta_b": self.theta_b}
         with np.errstate(all="ignore"):  # accelerations of a mass matrix that has no inverse

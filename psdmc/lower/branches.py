@@ -1,8 +1,8 @@
-"""Estimate of the operations that an exchange of carriers saves, from the branches of a tree that it changes.
+"""An estimate of the operations that an exchange of carriers saves, from the changed branches of a robot's tree alone.
 
-The cost of a function of a tree is nearly a sum over its branches; the bodies that carry them add what branches share. The
-search of a large robot therefore traces the changed branches with these bodies alone, before and after the exchange, and
-traces the whole robot only where that is cheaper: 9 to 11 of talos's 33 joints are traced.
+In a tree, the cost of a function is nearly a sum over branches. For large robots, the search traces only the branches
+that an exchange changes and the bodies that carry them, before and after the exchange. It traces the whole robot only
+if the exchange makes these branches cheaper. For talos, 9 to 11 of 33 joints are traced.
 """
 
 from __future__ import annotations
@@ -36,8 +36,11 @@ class Branches:
     def changed(
         self, recipe: Recipe, before: Arrangement, behind: Arrangement, groups: Sequence[Limbs] = ()
     ) -> tuple[int, ...] | None:
-        """Joints of the branches that two arrangements of one geometry differ in, and of the bodies that carry them; None
-        where that is most of the robot, or of a small one, or where a part of it is no robot for the function.
+        """Return the joints of the branches in which two arrangements with the same geometry differ, and the joints
+        that carry them.
+
+        None if this is most of the robot, if the robot is small, or if the function cannot be computed for a part of
+        the robot.
 
         groups   limbs of which the same joints are kept
         """
@@ -54,7 +57,7 @@ class Branches:
         return found if len(found) <= WORTH * len(frames) else None
 
     def part(self, whole: Arrangement, kept: tuple[int, ...]) -> tuple[Arrangement, RobotConstants]:
-        """The arrangement of these joints alone, and the constants of a robot of them."""
+        """Return the arrangement restricted to these joints, and the constants of a robot with these joints only."""
         number = {joint: i for i, joint in enumerate(kept)}
         links = [divmod(carrier, PARAMETERS_PER_LINK) for carrier in whole.carriers]
         rows = [row for row, (joint, _) in enumerate(links) if joint in number]
@@ -68,8 +71,8 @@ class Branches:
 
 
 def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
-    """Return the limb of each of these joints, and all joints that carry it, ascending. Of a body that carries several
-    limbs the first one: what limbs take from it is needed anyway."""
+    """Return the limb of each of these joints, and all joints that carry it, in ascending order. For a body that
+    carries several limbs, only the first limb is returned; one limb is enough to use what the body computes."""
     children: dict[int, list[int]] = {i: [] for i in range(BASE, len(frames))}
     for i, frame in enumerate(frames):
         children[frame.parent].append(i)
@@ -84,7 +87,7 @@ def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
 
 
 def limbs_in(groups: Sequence[Limbs], kept: tuple[int, ...]) -> tuple[Limbs, ...]:
-    """The groups as far as their limbs are among these joints, which are numbered anew."""
+    """Return the groups of limbs, restricted to the joints in `kept` and renumbered."""
     number = {joint: i for i, joint in enumerate(kept)}
     left = (
         tuple(tuple(number[joint] for joint in limb if joint in number) for limb in limbs) for limbs in groups

@@ -1,6 +1,8 @@
-"""The factored lowering: trace the rigid-body algorithms over a re-framed chain with sparse equivalent parameters.
+"""The factored lowering: generated code from rigid-body algorithms, which are traced over a re-framed robot with few
+nonzero parameters.
 
-One PROGRAM per generated function. What can be chosen freely is in an Arrangement; lower/search.py chooses.
+There is one PROGRAM per generated function. An Arrangement contains everything that can be chosen freely, and
+lower/search.py chooses it.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ from psdmc.robot.mechanism import Array, Mechanism, Placement
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotConstants:
-    """The parts of a model that every trace needs.
+    """The data of a model that are needed to record any function: the robot, its sizes, and how theta_b gives the
+    parameters.
 
     representative  (11 n, l)  theta_b to standard parameters about the link frames
     theta_b         (l,)       None: an input of the PROGRAM
@@ -49,14 +52,14 @@ class RobotConstants:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrangement:
-    """One way to lower a model.
+    """One of many possible choices for the code of a model: frames, unit of length, parameters and recursion.
 
     reframed  geometry
     unit      m, unit of length inside the code (units.py); a length equal to it costs no multiplication
-    carriers  which link parameters carry the model (indices, 11 per link)
-    transfer  (len(carriers), l)  theta_b to their values
-    choices   how the recursions are arranged
-    is_basis  whether no carrier could be left out; else they are all parameters that theta_b has a part in
+    carriers  the link parameters that represent the model (indices, 11 per link); all others are zero
+    transfer  (len(carriers), l)  theta_b to the carriers' values
+    choices   the arrangement of the recursions
+    is_basis  True if no carrier can be left out; else the carriers are all parameters that theta_b contains
     """
 
     reframed: Reframed
@@ -72,18 +75,18 @@ class Arrangement:
 
 
 def trace_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Program:
-    """The PROGRAM of one function that needs bodies. Unknown base parameters become an input."""
+    """Return the PROGRAM of one function that uses masses and inertias. Unknown base parameters become an input."""
     return Recording.of(recipe, arrangement, robot).program()
 
 
 def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Cost:
-    """The cost of the PROGRAM that trace_dynamics would return."""
+    """Return the cost of the PROGRAM that trace_dynamics would return."""
     return Recording.of(recipe, arrangement, robot).cost()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """What one function does in an arrangement, on a tracer's symbols: to be counted, and to become a PROGRAM."""
+    """The operations of one function in an arrangement, recorded on symbols. They can be counted, or become a PROGRAM."""
 
     tracer: Tracer
     outputs: Recorded
@@ -119,7 +122,7 @@ def _recorded(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, t
 
 
 def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) -> Program:
-    """The PROGRAM of one function that needs no theta_b."""
+    """Return the PROGRAM of one function that does not depend on theta_b."""
     tracer = Tracer()
     inputs = _inputs(recipe, robot, tracer)
     return tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
@@ -140,7 +143,7 @@ def traced(
     unit: float,
     by_theta: Callable[[], ByTheta],
 ) -> Recorded:
-    """Record a recipe on these frames, bodies and symbols: every entry of its outputs with its slot."""
+    """Record a recipe on these frames, bodies and symbols; yields every entry of its outputs with its slot."""
     is_scaled = unit != 1.0 and are_scaled((*recipe.signature.inputs, *recipe.signature.stored))
     axes = own_axes(reframed.frames, reframed.named, [NUMBER] * robot.sizes.l) if is_scaled else {}
     for quantity in recipe.signature.inputs if is_scaled else ():
@@ -183,8 +186,8 @@ def _inputs(recipe: Recipe, robot: RobotConstants, tracer: Tracer) -> dict[str, 
 
 
 def stored_entries(signature: Signature, outputs: Outputs) -> Recorded:
-    """Every entry of a trace's outputs with its slot, in order of storing; InternalError where they do not fit the
-    signature."""
+    """Yield every entry of a trace's outputs with its slot, in order of storing. Raises InternalError if the outputs do
+    not fit the signature."""
     if outputs.keys() != signature.traced:
         raise InternalError(f"{signature.name}: its trace gives {', '.join(outputs)}")
     return [
@@ -198,7 +201,7 @@ def _flat(values: Any) -> list[Symbol | Number]:
 
 
 def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
-    """Values of the carriers; of a theta_b that is not known as symbols."""
+    """Return the values of the carriers, as symbols if theta_b is unknown."""
     transfer = arrangement.transfer
     rows, columns = np.nonzero(transfer)
     factors = transfer[rows, columns]
@@ -215,7 +218,7 @@ def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Trac
 
 @lru_cache(maxsize=64)
 def in_unit(reframed: Reframed, unit: float) -> Reframed:
-    """The geometry in another unit of length; a length equal to it becomes exactly one."""
+    """Return the geometry in another unit of length. A length equal to this unit becomes exactly one."""
     if unit == 1.0:
         return reframed
 

@@ -1,4 +1,5 @@
-"""Frames of a model by where they sit on their axes, and the carriers there: computed once, for all searches."""
+"""Frames of a model for each choice of their positions on the joint axes, and the possible carriers there. All searches
+share these results."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ LARGE = 10
 
 
 class Geometry:
-    """The geometry of one model, which does not depend on the function that is lowered, nor on whether theta_b is
-    compiled in."""
+    """The geometry of one model. It depends neither on the function that is lowered, nor on whether theta_b is compiled
+    in."""
 
     def __init__(self, chain: Mechanism, representative: Array) -> None:
         self.chain, self.representative = chain, representative
@@ -25,7 +26,7 @@ class Geometry:
 
     @cached_property
     def feet(self) -> tuple[tuple[Foot, ...], ...]:
-        """Return those of `all_feet` that give different frames: parallel and crossing axes have one foot."""
+        """Return `all_feet` without duplicates: for parallel or crossing axes both feet give the same frame."""
         seen: dict[tuple[Foot, ...], Reframed] = {}
         for feet in all_feet(self.chain):
             reframed = self.reframed(feet)
@@ -34,7 +35,7 @@ class Geometry:
         return tuple(seen)
 
     def reframed(self, feet: tuple[Foot, ...]) -> Reframed:
-        """The frames with their origins on these feet."""
+        """Return the robot's frames with their origins on these feet of common normals."""
         if feet not in self._reframed:
             self._reframed[feet] = reframe(self.chain, feet)
         return self._reframed[feet]
@@ -45,15 +46,18 @@ class Geometry:
         return unmoved(self.chain)
 
     def space(self, reframed: Reframed) -> CarrierSpace:
-        """The sets of link parameters that can carry the model in these frames."""
+        """Return the sets of link parameters that can represent the model in these frames."""
         if reframed not in self._spaces:
             self._spaces[reframed] = carrier_space(reframed, self.representative)
         return self._spaces[reframed]
 
 
 def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
-    """Where frames may sit: all on the normal to the axis before, then each single one on the next, then all on the
-    next. A leaf has no next axis. Of large robots only all of them together."""
+    """Yield the choices of feet, that is, of where frames are on their axes. First, all frames are on the normal to the
+    previous axis. Then each single frame is on the normal to the next axis, and then all. Leaves have no next axis.
+
+    For large robots, only the choices for all frames together are returned.
+    """
     n, leaves = len(chain), chain.leaves
     singly = [(i,) for i in range(n) if i not in leaves] if n <= LARGE else []
     for moved in [(), *singly, tuple(range(n))]:

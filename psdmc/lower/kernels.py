@@ -1,4 +1,4 @@
-"""Lowering of a model to the kernels that emission prints: each function in its cheapest form."""
+"""Lowering of a model to kernels, the arithmetic from which C code is printed. Each function gets its cheapest form."""
 
 from __future__ import annotations
 
@@ -62,12 +62,13 @@ def lower(
     theta_variants: bool = True,
     costs: Costs = COSTS,
 ) -> dict[str, Kernel]:
-    """Kernels by name, `_theta` variants included where wanted, in the order of psdmc.functions.
+    """Return kernels by name, including `_theta` variants if wanted, in the order of psdmc.functions.
 
-    functions  names, or NAME_theta_rows; None takes the default ones; without theta_b only those variants that need none are
-               made
+    functions  names, or NAME_theta_rows; None: the default ones. If theta_b is unknown, only variants that do not need its
+               value
     costs      of the target
-    Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
+
+    Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
     lowered = _Lowered(model, lowering, costs)
@@ -93,9 +94,12 @@ def lower(
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
-    """The names in the order of psdmc.functions, with NAME_theta_rows behind them; None and the word 'default': the default
-    ones, of this robot where one is given; 'all': all but NAME_theta_rows; a text is one name. What a function calls comes
-    along. InputError for one that is unknown."""
+    """Return the names of the wanted functions in the order of psdmc.functions, followed by wanted NAME_theta_rows.
+
+    None and the word 'default' mean the default functions, of this robot if one is given. 'all' means all functions
+    except NAME_theta_rows. A text is one name. Functions that a wanted function calls are added. Raises InputError for
+    an unknown name.
+    """
     default = DEFAULT if robot is None else default_of(robot)
     if functions is None:
         return default
@@ -149,7 +153,7 @@ class _Lowered:
         self._short: list[tuple[Program, Program]] = []
 
     def check(self, recipe: Recipe) -> None:
-        """InputError where a function's trace adds unlike quantities."""
+        """Raise InputError if the function adds unlike quantities, such as a mass and a length."""
         traced = RECIPES[recipe.packs.function] if recipe.packs else recipe
         if traced.regions is None or self.model.nv <= TRACED:
             check_dimensions(
@@ -159,7 +163,7 @@ class _Lowered:
             )
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
-        """The kernel of one function, made once: another one may be a part of it."""
+        """Return the kernel of one function. It is made only once, because another kernel may contain it."""
         key = recipe.name, theta
         if key not in self._kernels:
             self._kernels[key] = (

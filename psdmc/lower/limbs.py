@@ -1,4 +1,5 @@
-"""Trace a function of a robot with limbs of equal structure: one limb of each group, with a constant per limb."""
+"""Tracing of a function for a robot with equal limbs: one limb of each group is traced, with constants that have one
+value per limb."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Placement
 
 @dataclass(frozen=True, slots=True)
 class TracedLimbs:
-    """A PROGRAM of core and limbs, as psdmc.program.limb_stages cuts it, its groups, and products behind it."""
+    """The recorded function of a robot with limbs: a PROGRAM of core and limbs, ready for division into stages; the
+    groups of limbs; and matrix products that follow."""
 
     program: Program
     groups: tuple[LimbGroup, ...]
@@ -40,7 +42,7 @@ class TracedLimbs:
 def trace_limbs(
     recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
 ) -> TracedLimbs:
-    """One function of a robot whose theta_b is known, limbs of each group traced once."""
+    """Record one function of a robot with known theta_b, with the limbs of each group traced once."""
     trace = _Trace(recipe, arrangement, robot, groups)
     return trace.needed(list(trace.outputs(trace.recorded())))
 
@@ -48,7 +50,7 @@ def trace_limbs(
 def cost_of_limbs(
     recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
 ) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
-    """The groups of what trace_limbs would return, and what its stages cost."""
+    """Return the groups that trace_limbs would return, and the cost of each stage."""
     trace = _Trace(recipe, arrangement, robot, groups)
     return trace.counted(list(trace.outputs(trace.recorded())))
 
@@ -72,18 +74,18 @@ class _Group:
 
 
 def has_columns(recipe: Recipe) -> bool:
-    """Whether it puts out a matrix with a column for each base parameter."""
+    """Whether the function's output is a matrix with a column for each base parameter."""
     return any("l" in quantity.axes for quantity in recipe.signature.outputs)
 
 
 def selected(lift: Array) -> dict[int, int]:
-    """The base parameters that are standard ones: column by row of the lift."""
+    """Return the base parameters that are single standard parameters: column by row of the lift."""
     rows, columns = np.nonzero(lift == 1.0)
     return dict(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
 def have_columns_alike(lift: Array, groups: Sequence[Limbs]) -> bool:
-    """Whether each base parameter is a standard one, and those of a group's limbs are the same."""
+    """Whether each base parameter is a single standard parameter, and the limbs of each group have the same ones."""
     found = selected(lift)
     if not len(found) == len(set(found.values())) == lift.shape[1] == np.count_nonzero(lift):
         return False
@@ -152,7 +154,8 @@ class _Trace:
         return [name for name in range(PARAMETERS_PER_LINK) if row + name in self.selected]
 
     def recorded(self) -> Mapping[Slot, Scalar]:
-        """Return the recipe's outputs by slots whose indices count places."""
+        """Return the recipe's outputs by slot. The indices of slots count places (a joint, or equal joints of all
+        limbs)."""
         arrangement, unit = self.arrangement, self.arrangement.unit
         values = carrier_values(arrangement, self.robot.theta_b, self.tracer)
         bodies, drives = bodies_from_carriers(arrangement.n, arrangement.carriers, values, unit)
@@ -192,7 +195,7 @@ class _Trace:
         return [tuple(first[joint] + k for joint in place.joints) for k in counts]
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
-        """Return the stored outputs by slots of the core and of limbs. Zeros are not stored."""
+        """Yield the outputs to store, by slots of the core and of limbs. Zeros are not stored."""
         self.products = self._products(found)
         for quantity in self.signature.stored:
             entries = [
@@ -261,7 +264,7 @@ class _Trace:
         return flat
 
     def counted(self, outputs: list[tuple[Slot, Scalar]]) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
-        """The groups, and the cost of each stage, sums that nothing needs left out."""
+        """Return the groups and the cost of each stage, without sums that no output needs."""
         groups = tuple(group.vectors for group in self.groups)
         stored = self.tracer.stored(outputs)
         return groups, traced_stage_costs(self.tracer.steps, stored, self.sums.summed, groups)

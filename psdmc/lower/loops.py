@@ -1,4 +1,4 @@
-"""Whether products of matrices behind a PROGRAM become loops."""
+"""Decides whether matrix products after a PROGRAM become loops or straight-line code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ SPAN = 4
 
 
 def in_loops(program: Program, products: tuple[Product, ...], n: int, costs: Costs) -> bool:
-    """Whether loops over n x n matrices pay: lines would be too many, or hardly an entry is always zero."""
+    """Whether loops over n x n matrices pay: written out, the products would be too long, or hardly any entry is always
+    zero."""
     if not products or n < costs.loops_from:
         return False
     widths = [n - zero_columns(program, product) for product in products]

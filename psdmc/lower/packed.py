@@ -1,4 +1,4 @@
-"""Packing of a matrix function's kernel: the part that computes some entries of the matrix."""
+"""Kernels of packed matrices: the part of a matrix function's kernel that computes the wanted entries."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Kept = Mapping[Slot, Slot]
 
 
 def packed(kernel: Kernel, function: Signature, columns: int, places: Places) -> Kernel:
-    """The kernel of `function`, whose one output has these entries of the other kernel's matrix one after the other. Its
-    arithmetic is the same, less what no entry needs.
+    """Return the kernel of `function`, whose only output is a vector of these entries of the other kernel's matrix.
+    Operations that no such entry needs are left out.
 
-    columns  of the matrix
+    columns  number of columns of the matrix
     """
     (matrix,), (values,) = kernel.function.outputs, function.outputs
     kept = {

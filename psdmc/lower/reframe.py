@@ -1,13 +1,13 @@
-"""Re-frame a robot to modified DH for cheap arithmetic: z along the joint's axis, frames turned about it and moved
-along it.
+"""New link frames for a robot, with which arithmetic is cheap: modified DH, with z along the joint's axis.
 
-The new frames are for generated code alone. E, P and theta_b do not depend on them, and joint variables keep their
-zero. A frame's x points along the common normal from its axis to its child's, so that the constant rotation between the
-two frames is about x alone and a right angle costs nothing. A body with several children does so towards the first; the
-frames of the others are turned about both z and x. Where on its axis a frame's origin sits is free (`feet`): on the
-normal to its parent's axis ("previous") or to its first child's ("next"). The axis of a sliding joint has only a
-direction and is put through a neighbour's origin. A joint of several coordinates keeps its frame, along whose axes its rates
-are.
+The new frames are used in generated code alone. E, P and theta_b do not depend on them, and joint variables keep their
+zero. A frame's x is along the common normal from its axis to its child's. The constant rotation between the two frames
+is then about x alone, and a right angle costs nothing. A body with several children does so for the first one; the
+frames of the others are rotated about both z and x.
+
+The origin of a frame on its axis can be chosen (`feet`): on the normal to its parent's axis ("previous") or to its
+first child's ("next"). The axis of a sliding joint has only a direction, and is put through a neighbour's origin. A
+joint of several coordinates keeps its frame, because its rates are along this frame's axes.
 """
 
 from __future__ import annotations
@@ -52,15 +52,15 @@ Foot = Literal["previous", "next"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reframed:
-    """A robot's geometry for lowering.
+    """A robot's geometry in new frames, from which code is generated.
 
     frames             n joint frames
     base_acceleration  m/s^2, minus gravity, along base_axes
     link_frames        n, the file's link frames in the new joint frames
     tip                the tip frame in the new joint frame of `tip_body`
-    base_axes          3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
-    tip_body           the body that the tip frame is fixed to
-    base_origin        m, the point that frames on the base have their translations from, in the robot's base frame
+    base_axes          3 x 3, the axes in which the first frame is given, as columns in the robot's base frame
+    tip_body           the body to which the tip frame is fixed
+    base_origin        m, the origin from which frames on the base are given, in the robot's base frame
     named              the robot's named frames in the new joint frames
     """
 
@@ -74,7 +74,7 @@ class Reframed:
     named: tuple[NamedFrame, ...]
 
     def is_same(self, other: Reframed) -> bool:
-        """Whether every number of the two is equal."""
+        """Whether all numbers of the two geometries are equal."""
         return (
             (self.frames, self.base_acceleration, self.base_axes)
             == (other.frames, other.base_acceleration, other.base_axes)
@@ -88,7 +88,8 @@ def _is_same(a: Placement, b: Placement) -> bool:
 
 
 def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
-    """The robot in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
+    """Return the robot in modified DH frames. `feet[i]` chooses the common normal on whose foot the origin of frame i
+    is put."""
     placed, reach = _placed_at_zero(chain), _reach(chain)
     axes = [clean_direction(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
@@ -129,7 +130,7 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
 
 
 def unmoved(chain: Mechanism) -> Reframed:
-    """The robot's own joint frames, turned and moved nowhere: more arithmetic, and no digit but those that its file has."""
+    """Return the robot's own joint frames. They need more arithmetic, but do not change a digit of the file's numbers."""
     return Reframed(
         frames_of(chain),
         base_acceleration(chain),

@@ -1,4 +1,4 @@
-"""Cost of a PROGRAM on a target, as one number that a search compares."""
+"""The cost of a PROGRAM on a target, as one number by which a search compares PROGRAMs."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from psdmc.target.native import COSTS
 
 @dataclass(frozen=True, slots=True)
 class Scoring:
-    """The score of PROGRAMs on a target. In code for one state, the angles share vector sincos calls; with one state
-    per lane each angle has its own."""
+    """The score of PROGRAMs on a target. In code for one state, several angles share a vector sincos call. In code with
+    one state per lane, each angle has its own call."""
 
     costs: Costs
     angles_per_sincos: int
@@ -35,12 +35,12 @@ class Scoring:
 
 
 def for_one_state(costs: Costs) -> Scoring:
-    """The scoring of code for one state a call."""
+    """Return the scoring of code that computes one state per call."""
     return Scoring(costs, costs.angles_per_sincos)
 
 
 def for_lanes(costs: Costs) -> Scoring:
-    """The scoring of code for one state per lane."""
+    """Return the scoring of code that computes one state per SIMD lane."""
     return Scoring(costs, 1)
 
 

@@ -1,8 +1,8 @@
-"""Choose among a model's many lowerings by PROGRAM cost.
+"""The search for the arrangement of a model (frames, parameters, recursion) whose PROGRAM is cheapest.
 
-A coordinate descent over where frames sit on their axes, how the recursions are arranged, the unit of length and which
-parameters carry the model. Deterministic: candidates come in a fixed order, only a strictly lower cost is taken, and the
-budget is a number of traced programs, not a time.
+It is a coordinate descent over the positions of frames on their axes, the choices in the recursions, the unit of
+length, and the parameters that represent the model. The search is deterministic: candidates come in a fixed order, only
+a strictly lower cost is taken, and the budget is a number of traced programs, not a time.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ own."""
 
 
 def distinct(recipe: Recipe, choices: Sequence[Choices]) -> tuple[Choices, ...]:
-    """The choices that make a difference to a function: of equivalent ones the first."""
+    """Return the choices that make a difference to a function: of equivalent ones, only the first."""
     kinds = {tuple(getattr(each, field) for field in recipe.matters): each for each in reversed(choices)}
     return tuple(each for each in choices if each in kinds.values())
 
 
 class Search:
-    """The descent for one model; `geometry` is shared between functions and searches."""
+    """The search for the arrangements of one model's functions; `geometry` is shared between functions and searches."""
 
     def __init__(
         self,
@@ -96,13 +96,16 @@ class Search:
 
     @property
     def has_many_joints(self) -> bool:
-        """Whether less than all that a search knows is tried."""
+        """Whether the robot has so many joints that the search tries fewer candidates."""
         return len(self.robot.chain) > MANY_JOINTS
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
-        """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
-        kept. Where the cheapest is not accurate enough, the search is made again among those that are; InternalError where
-        all are beyond what rounding does."""
+        """Return the cheapest arrangement found for one function. `start` is the arrangement of another function, whose
+        geometry is kept.
+
+        If the cheapest arrangement is not accurate enough, the search is repeated among those that are. Raises
+        InternalError if all errors are larger than rounding explains.
+        """
         found = self._descended(recipe, scoring, start)
         accuracy = self.accuracy
         if accuracy is None or accuracy.error(found, recipe) <= LIMIT:
@@ -191,14 +194,16 @@ class Search:
         return best
 
     def uncarried(self, reframed: Reframed) -> Arrangement:
-        """Return the arrangement in which each parameter is separate. Which of them may stand for others is found by
-        columns of all joints' torques together, of which a small joint's are a small part: on robots of many scales its
-        digits are lost there."""
+        """Return the arrangement in which no parameter represents another one.
+
+        A choice of carriers is based on the columns of all joints' torques together. On robots of many scales, a small
+        joint's share of these columns is so small that its digits are lost. This arrangement keeps them.
+        """
         carriers, transfer = every_parameter(reframed, self.robot.representative)
         return Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0], is_basis=False)
 
     def keeps_digits(self, reframed: Reframed) -> bool:
-        """Whether torques computed on these frames are accurate enough; True where no base parameters are known."""
+        """Whether torques computed in these frames are accurate enough; True if no base parameters are known."""
         return self.accuracy is None or self.accuracy.error(self.uncarried(reframed)) <= LIMIT
 
     def _admits(self, accurate: Arrangement | None, recipe: Recipe) -> Callable[[Arrangement], bool]:
@@ -209,7 +214,8 @@ class Search:
         return lambda arrangement: accuracy.error(arrangement, recipe) <= limit
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
-        """Compute the cost of a function's PROGRAM in an arrangement; it is traced once."""
+        """Return the cost of a function's PROGRAM in an arrangement. The function is traced once, and the cost is
+        cached."""
         key = self._key(recipe, a)
         if key not in self._costs:
             self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
@@ -236,14 +242,18 @@ class Search:
         return other if costs[1] < costs[0] else start
 
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
-        """The PROGRAM of a function in an arrangement that was found for another function or target. Only the choices
-        within the recursion are made again."""
+        """Return the PROGRAM of a function in an arrangement that was found for another function or target. Only the
+        choices within the recursion are made again."""
         return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes; of a robot
-        of more than MANY_JOINTS joints the latter alone, which its long functions share. All others are only counted, those
-        like the found one's first, and no more than have OPERATIONS together."""
+        """Yield the PROGRAMs from which `rearranged` chooses: the cheapest one for one state, and the cheapest one for
+        lanes.
+
+        For a robot with more than MANY_JOINTS joints, this is the latter alone. All other choices are only counted.
+        Those most similar to the found arrangement come first, until the counted PROGRAMs have OPERATIONS operations
+        together.
+        """
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
         recorded: dict[int, Recording] = {}

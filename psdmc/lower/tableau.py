@@ -1,7 +1,7 @@
-"""Columns as combinations of some of them, in extended precision, so that exact zeros and ones come out as such.
+"""Columns of a matrix as combinations of some of its columns, in extended precision. Exact zeros and ones stay exact.
 
-LAPACK's results differ in the last digit from one processor to the next, and so which numbers are equal. Here every
-operation is elementwise, in NumPy's longest float: generated code is the same on every x86.
+The results of LAPACK differ in the last digit between processors, and with them which numbers are equal. Here every
+operation is elementwise, in NumPy's longest float. Generated code is therefore the same on every x86.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SPARSE = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
-    """Coordinates of all columns in a basis of some of them.
+    """The coordinates of all columns of a matrix in a basis of some of them.
 
     basis    r column indices; row i belongs to basis[i]
     entries  (r, columns) columns = columns[:, basis] @ entries; unit vectors in the basis's own columns
@@ -35,7 +35,8 @@ class Tableau:
     def of(columns: Long, basis: Sequence[int]) -> Tableau:
         """Build the tableau by Gauss-Jordan elimination with row pivots; the basis's columns must be independent.
 
-        The other columns are needed in the pivots' rows only: what the basis's ask of those is done to them afterwards.
+        The basis's columns are eliminated first. The other columns are needed in the pivots' rows only, and are changed
+        afterwards.
         """
         inside = set(basis)
         others = [j for j in range(columns.shape[1]) if j not in inside]
@@ -51,7 +52,7 @@ class Tableau:
         return Tableau(tuple(basis), entries)
 
     def within(self, basis: Sequence[int], wanted: Sequence[int] | slice) -> Long:
-        """(r, wanted) some columns' coordinates in another basis, which must be one."""
+        """(r, wanted) the coordinates of some columns in another set of columns, which must be a basis."""
         old, new = set(self.basis), set(basis)
         entering = [j for j in basis if j not in old]
         leaving = [i for i, j in enumerate(self.basis) if j not in new]

@@ -1,4 +1,4 @@
-"""The result of a calibration, as model files hold it and everything that uses a calibrated model reads it."""
+"""The result of a calibration, in the form in which model files contain it and other parts of psdmc read it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WHOLE = "All"
 
 
 class Remark(str):
-    """A sentence for people. Programs go by its code, which is empty if none depends on it."""
+    """A sentence for people with a code for programs. The code is empty if no program depends on it."""
 
     code: str
 
@@ -44,7 +44,7 @@ class Remark(str):
 
 
 def code_of(text: str) -> str:
-    """The code of a remark; empty for any other sentence."""
+    """Return the code of a remark; empty for a sentence without a code."""
     return getattr(text, "code", "")
 
 
@@ -57,12 +57,12 @@ SHOWN = (IDENTIFIED.code, WEAK.code)
 
 @dataclass(frozen=True, slots=True)
 class ParameterRow:
-    """One base parameter of table 4.
+    """One base parameter in table 4 of a calibration report.
 
-    std           infinite where the data do not fix it by itself; value then as near to the prior as they allow
-    identifiable  whether it is "identified": fixed by itself, to less than half of its value
+    std           infinite if the data do not determine it by itself; value then as near to the prior as the data allow
+    identifiable  whether it is "identified": determined by itself, with std less than half of its value
     visibility    what the data show of it: a Remark
-    file          value by the file that was calibrated; None where it has none
+    file          value by the file that was calibrated; None if the file has none
     """
 
     name: str
@@ -82,9 +82,9 @@ class ParameterRow:
 
 @dataclass(frozen=True, slots=True)
 class NumberRow:
-    """A number of one joint (or of the spring of that name) with its standard deviation.
+    """One calibrated number of a joint (or of the spring with that name), with its standard deviation.
 
-    parameters  the number of a friction term that its name states: `exponent` of |v|^d, `speed` of exp(-(v / speed)^2)
+    parameters  the number in the name of a friction term: `exponent` of |v|^d, `speed` of exp(-(v / speed)^2)
     seen        whether the data determine it
     visibility  what the data show of it: a Remark, empty if that is not known
     """
@@ -101,7 +101,7 @@ class NumberRow:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """RMSE (target's unit) and R^2 of one joint in one step; R^2 is NaN where the target does not vary."""
+    """RMSE (target's unit) and R^2 of one joint in one step; R^2 is NaN if the target does not vary."""
 
     rmse: OrNaN
     r2: OrNaN
@@ -109,7 +109,7 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class JointQuality:
-    """Fit and held-out quality of one joint in one step."""
+    """The quality of the fit of one joint in one calibration step, on fitted and on held-out data."""
 
     fit: Quality
     held_out: Quality
@@ -117,7 +117,7 @@ class JointQuality:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """A stretch of measured and predicted torque, for plots: held-out part marked."""
+    """A section of measured and predicted torque for plots, with the held-out part marked."""
 
     joint: str
     abscissa: str
@@ -129,7 +129,8 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepQuality:
-    """One column of table 3: per joint name, and samples to look at, which files do not hold."""
+    """The fit quality of one calibration step, a column of table 3, by joint name. It also has samples for plots, which
+    files do not store."""
 
     step: str
     joints: dict[str, JointQuality]
@@ -138,8 +139,10 @@ class StepQuality:
 
 @dataclass(frozen=True, slots=True)
 class FrictionRunConstants:
-    """Constants of a joint's friction run that are not friction: inertia in that pose (kg m^2), constant torque (N m),
-    and the time between position and current (s)."""
+    """Constants other than friction that a joint's friction run (a log for friction only) determines.
+
+    They are the inertia in that pose (kg m^2), a constant torque (N m), and the time between position and current (s).
+    """
 
     inertia: float
     offset: float
@@ -148,7 +151,10 @@ class FrictionRunConstants:
 
 @dataclass(frozen=True, slots=True)
 class StepUsed:
-    """Filter and split of a step: cut-off (Hz), order and settling periods of the low-pass, share and blocks held out."""
+    """The low-pass filter and the validation split of a calibration step.
+
+    They are the filter's cut-off (Hz), order and settling periods, and the share and blocks of data that are held out.
+    """
 
     cutoff: float
     order: int = 8
@@ -159,13 +165,13 @@ class StepUsed:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Numbers of the prediction that are neither theta_b nor a row of friction or motors.
+    """All numbers for the prediction of torques except theta_b and the tables of friction and motors.
 
     law         of friction: "linear" (a sum of terms), or the name of a law with a state
-    steps       by step: "all" of one log, else motor, gravity, friction, inertial
+    steps       by step: "all" for one log, else motor, gravity, friction, inertial
     sign_speed  rad/s over which friction changes sign, linear law
     exponents   of the terms of every joint, linear law;  offset  whether each joint has one
-    coupling    of the motors, whose the friction then is, linear law
+    coupling    of the motors, if friction is that of the motors, linear law
     runs        constants of the friction runs by joint, law with a state
     columns     tables of springs and further friction with users' own laws, linear law (calibration's read_columns)
     """
@@ -185,13 +191,13 @@ class Prediction:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """Linear friction of every joint; ValueError where an exponent is out of range."""
+        """Return the terms of each joint's linear friction. Raises ValueError if an exponent is out of range."""
         return every_joint_s(self.exponents, self.offset)
 
     @property
     def laws(self) -> dict[str, Law]:
-        """The laws that values may be of: psdmc's, and the user's own that the tables hold; ValueError where these are
-        damaged."""
+        """Return the friction laws that can occur: psdmc's, and the user's own laws in the tables. Raises ValueError if
+        the tables are damaged."""
         return LAWS | laws_of(self.columns.get("friction", {}).get("laws", ()))
 
 
@@ -200,7 +206,7 @@ class JointFigures:
     """The figures by which one joint is judged; NaN where a figure does not exist.
 
     r2, rmse            on held-out data, whole torque (N m, N where the joint slides)
-    gain, gain_std      measured torque, without friction, per torque by the file's own theta_b: one where the file is
+    gain, gain_std      measured torque, without friction, per torque by the file's own theta_b: one if the file is
                         right
     visible             whether the file's torque is large enough for its gain to count
     friction_power      W, mean power that friction takes: positive on any real joint
@@ -223,14 +229,14 @@ class JointFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a calibration can be used, with all grounds.
+    """Whether a calibration can be used, with all reasons.
 
-    against    why it is not usable; empty where it is
+    against    why it is not usable; empty if it is
     doubted    what a user should know before using it
     suspected  possible explanations of a bad fit: joints swapped, signs reversed, units
     joints     figures, in the model's order
     samples_per_unknown   independent samples per fitted unknown, the smallest of all steps
-    delays     of torques behind the motion, log by log
+    delays     of torques relative to the motion, log by log
     """
 
     against: tuple[Ground, ...]
@@ -267,17 +273,17 @@ class Verdict:
 
     @property
     def exit_status(self) -> int:
-        """Exit status of the command line: 0 for both usable verdicts."""
+        """The command line's exit status for this verdict: 0 if the calibration is usable, with or without doubts."""
         return 0 if self.usable else NOT_USABLE_STATUS
 
     @property
     def grounds(self) -> tuple[tuple[str, str], ...]:
-        """Every ground as (kind, sentence), the gravest first."""
+        """Every reason of the verdict as (kind, sentence), the gravest first."""
         kinds = (("not usable", self.reasons), ("likely", self.suspects), ("doubt", self.doubts))
         return tuple((kind, text) for kind, texts in kinds for text in texts)
 
     def lines(self) -> list[str]:
-        """The verdict as text: the word first, then its grounds."""
+        """The verdict as lines of text: first the word, then its reasons."""
         return [f"verdict: {self.word}", *(f"  {kind}: {text}" for kind, text in self.grounds)]
 
 
@@ -297,7 +303,7 @@ class LogUsed:
 
 @dataclass(frozen=True, slots=True)
 class LoadUsed:
-    """The known load: kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass."""
+    """The known load with which a log was recorded: kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass."""
 
     mass: float
     com: tuple[float, ...]
@@ -322,14 +328,14 @@ class Calibrated:
     motors      torque constants
     friction    values of each joint's friction law or terms
     steps       table 3's columns, computed from the model file's content
-    warnings    a user should read; Remarks where a rule depends on one
+    warnings    a user should read; Remarks if a rule depends on one
     facts       plain figures for people: ranks, condition numbers, singular values
-    prediction  what else a prediction needs
+    prediction  further numbers for the prediction of torques
     notes       remarks without consequences for its use
-    verdict     whether it can be used; None before it was judged, and of files of psdmc 0.1
-    springs     values of springs, whose names stand in place of a joint's
+    verdict     whether it can be used; None before it was judged, and for files of psdmc 0.1
+    springs     values of springs, with the spring's name in place of a joint's
     covariance  (l, l) of the base parameters, with the prior's in directions that the data do not show; None: not kept
-    logs, load, versions   what it was computed from and with: logs, known load, versions of programs
+    logs, load, versions   its sources: logs, known load, versions of programs
     """
 
     robot: str
@@ -358,18 +364,18 @@ class Calibrated:
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations of the base parameters; infinite where the data do not fix one by itself."""
+        """(l,) standard deviations of the base parameters; infinite if the data do not determine one by itself."""
         return np.array([row.std for row in self.parameters])
 
     @property
     def unsaid(self) -> tuple[str, ...]:
-        """The warnings that no doubt of the verdict repeats."""
+        """The warnings that are not also doubts of the verdict."""
         doubts = () if self.verdict is None else self.verdict.doubted
         said = {ground.code for ground in doubts}
         return tuple(text for text in self.warnings if SAME.get(code_of(text)) not in said)
 
     def kept(self) -> Calibrated:
-        """What a model file holds of it: the same without samples."""
+        """The part of the result that a model file contains: everything except samples."""
         values = {each.name: getattr(self, each.name) for each in fields(Calibrated)}
         steps = tuple(StepQuality(step.step, step.joints) for step in self.steps)
         return Calibrated(**values | {"steps": steps})
@@ -381,7 +387,7 @@ def by_joint(rows: Iterable[NumberRow]) -> dict[tuple[str, str], float]:
 
 
 def parameters_of(name: str) -> dict[str, float]:
-    """The number that the name of a friction term states, by what it is: an exponent, a speed."""
+    """Return the number in the name of a friction term, by its meaning: `exponent` or `speed`."""
     term, _ = named(name, LAWS) or (None, 0)
     if term is None or term.number is None or term.law.number is None or term.number == term.law.number.usual:
         return {}

@@ -20,7 +20,7 @@ BLOCKS = 5
 
 
 class RowBlocks(NamedTuple):
-    """The rows of E by what they are exponents of: five blocks of n rows, and two ranges of blocks.
+    """The rows of E by the variable whose exponents they contain: five blocks of n rows, and two ranges of blocks.
 
     position  q, sin q and cos q
     rates     qd and qdd
@@ -93,7 +93,7 @@ class Expansion:
 
     @staticmethod
     def of(E: NDArray[Any], P: Sequence[sparse.csr_array]) -> Expansion:
-        """From E and n matrices (p, l); ValueError where their shapes differ."""
+        """Make an Expansion from E and n matrices P (p, l). Raises ValueError if their shapes differ."""
         from scipy import sparse
 
         shapes = {matrix.shape for matrix in P}
@@ -120,7 +120,8 @@ class Expansion:
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...]:
-        """n sparse matrices (p, l), one per joint; made when first asked for, as SciPy is slow to import."""
+        """The n sparse matrices P (p, l), one per joint. They are made on first access, because SciPy is slow to
+        import."""
         if not self._matrices:
             self._matrices.extend(self._made())
         return tuple(self._matrices)

@@ -1,7 +1,7 @@
-"""A model from the arrays and the manifest of a file, checked against each other: the file may be forged.
+"""Construction of a model from the arrays and the manifest of a file. They are checked, because the file may be forged.
 
-All that the stages rely on is checked: kinds, shapes, ranges, finite numbers, and that the base parameters have pivots
-within the chain's span.
+All assumptions of other parts of psdmc are checked: types, shapes, ranges, finite numbers, and that the base parameters
+have pivots within the robot's parameter span.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ HIGHEST_POWER = 2
 
 
 def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
-    """The model; ValueError says which part is wrong, what was found and what was expected."""
+    """Return the model. Raises ValueError that says which part is wrong, what was found and what was expected."""
     _check_kinds(arrays)
     chain = chain_from_json(json.part(manifest, "chain", "the manifest"))
     n, l = len(chain), arrays["B"].shape[0]

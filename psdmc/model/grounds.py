@@ -1,4 +1,4 @@
-"""Grounds of a verdict: codes with their figures, and the one table that makes sentences of them."""
+"""The reasons of a calibration's verdict: codes with their figures, and the table that translates codes to sentences."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ OrInf = float
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """One ground of a verdict.
+    """One reason of a calibration's verdict.
 
-    code    of WORDS: what programs go by
-    values  plain figures that the sentence needs; NaN where one does not exist
+    code    a key of WORDS, by which programs identify the reason
+    values  plain figures that the sentence needs; NaN if one does not exist
     """
 
     code: str
@@ -28,12 +28,12 @@ class Ground:
 
     @property
     def words(self) -> str:
-        """The sentence; KeyError, TypeError or ValueError if the values are not those of the code."""
+        """The reason as a sentence. Raises KeyError, TypeError or ValueError if the values are not those of the code."""
         return WORDS[self.code](self.values)
 
 
 def listed(names: Sequence[str]) -> str:
-    """'a', 'a and b', 'a, b and c'."""
+    """Join names to a list in words: 'a', 'a and b', 'a, b and c'."""
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
@@ -50,9 +50,9 @@ def _each(values: Values, form: str, first: int | None = None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """s by which the torque of logs comes after their motion; std infinite where it may be longer still.
+    """Seconds by which the torque of logs comes after their motion; std is infinite if the delay may be still longer.
 
-    shown  whether the logs show that there is one
+    shown  whether the logs show that there is a delay
     """
 
     log: str
@@ -62,7 +62,7 @@ class Delay:
 
     @property
     def size(self) -> str:
-        """The s without their sign, to two digits of the std."""
+        """The delay in seconds without its sign, to two digits of the std."""
         if not math.isfinite(self.std):
             return f"{abs(self.value):.3g}"
         return f"{abs(self.value):.{self._digits}f}"
@@ -90,7 +90,7 @@ def _late(values: Values) -> str:
 
 
 def at_level(joint: str, level: float, unit: str, share: float) -> str:
-    """A joint whose effort stays at a level, in a share of its moving rows; the unit may be unknown."""
+    """Describe a joint whose effort stays at one level in a share of its moving rows; the unit may be unknown."""
     return f"{joint} at {f'{level:.4g} {unit}'.rstrip()} in {share:.0%}"
 
 
@@ -102,7 +102,7 @@ def _at_levels(values: Values) -> str:
 
 
 def cycles(order: Sequence[int]) -> list[list[int]]:
-    """The cycles of a permutation that are longer than one."""
+    """Return the cycles of a permutation that are longer than one."""
     seen: set[int] = set()
     found = []
     for start in range(len(order)):
@@ -118,7 +118,7 @@ def cycles(order: Sequence[int]) -> list[list[int]]:
 
 
 def exchanges(order: Sequence[int]) -> int:
-    """Number of exchanges of pairs that make a permutation."""
+    """Return the number of pair exchanges that a permutation consists of."""
     return sum(len(cycle) - 1 for cycle in cycles(order))
 
 
@@ -129,8 +129,10 @@ def in_words(
     effort_order: Sequence[int],
     effort_signs: Sequence[int],
 ) -> str:
-    """A sentence for the hypothesis that joint k's position is signs[k] times column order[k] of the log, and its
-    effort likewise."""
+    """Return a sentence for the hypothesis that columns of a log are swapped or reversed.
+
+    Joint k's position is then signs[k] times column order[k] of the log, and its effort likewise.
+    """
     parts = []
     if order == effort_order:
         parts += _permutation(order, names, "position and effort")

@@ -1,4 +1,4 @@
-"""Units of quantities that joints have by name: some turn, others slide."""
+"""Units of quantities that all joints have. The unit differs between revolute and sliding joints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 def joined_units(pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """By a quantity's name the units of its values, each once and in order: 'Nm, N'."""
+    """Return, for each quantity's name, the units of its values without duplicates, in order: 'Nm, N'."""
     found: dict[str, dict[str, None]] = {}
     for name, unit in pairs:
         found.setdefault(name, {})[unit] = None

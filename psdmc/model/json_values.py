@@ -1,6 +1,7 @@
-"""Values of an untrusted JSON text, each checked for kind and size.
+"""Values of an untrusted JSON text, each checked for type and size.
 
-Every function returns its value, or raises ValueError that names it, says what was found and what was expected.
+Every function returns its value, or raises a ValueError that names the value and says what was found and what was
+expected.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 
 def record(value: object, what: str) -> dict[str, Any]:
-    """A JSON object, whose keys are not checked."""
+    """Return a JSON object, whose keys are not checked. Raises ValueError if the value is no object."""
     if not isinstance(value, dict):
         raise _wrong(value, what, "named values")
     return value

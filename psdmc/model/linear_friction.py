@@ -1,4 +1,4 @@
-"""Friction of a calibrated model, which its calibration found in plain logs."""
+"""The friction of a calibrated model, if its calibration used plain logs and linear friction."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from psdmc.robot.limits import shown
 
 
 def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
-    """What a calibration found that neither rigid bodies nor `linear_friction` have, in words without names; none where
-    the model was not calibrated."""
+    """Return sentences about further results of a calibration, which neither rigid bodies nor `linear_friction`
+    contain. The sentences contain no names. Empty if the model was not calibrated."""
     found = model.calibrated
     if found is None:
         return ()
@@ -28,8 +28,8 @@ def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
 
 
 def linear_friction(model: DynamicsModel) -> Friction:
-    """The friction that the model's calibration found; InputError where it was not calibrated from plain logs, or what its
-    file says of friction is damaged."""
+    """Return the friction that the model's calibration found. Raises InputError if the model was not calibrated from
+    plain logs, or if its file's data of friction are damaged."""
     name = shown(model.mechanism.name)
     found = model.calibrated
     if found is None:

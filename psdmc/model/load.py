@@ -1,4 +1,4 @@
-"""Read a model file: one that store.py wrote, or any file that is passed for one."""
+"""Reading of model files. A file may also be damaged, or forged, or no model file at all."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ ROBOT_FILES = (".urdf", ".toml", ".xml", ".xacro", ".mjcf", ".sdf")
 
 
 def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
-    """The model itself, or the one in the model file of that path. InputError for a robot's file, as for anything else that
-    is no model."""
+    """Return the given model, or the one in the model file at the given path. Raises InputError for a robot file, and
+    for anything else that is no model."""
     if isinstance(given, DynamicsModel):
         return given
     if not isinstance(given, str | Path):
@@ -72,7 +72,7 @@ def load(path: str | Path) -> DynamicsModel:
 
 
 def load_bytes(data: bytes, source: Path) -> DynamicsModel:
-    """The model in a file's content; InputError, which names the file, as `load`."""
+    """Return the model in a file's content. Raises InputError, which names the file, as `load` does."""
     try:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):

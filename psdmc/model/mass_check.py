@@ -1,7 +1,8 @@
-"""Whether the mass matrix is positive definite in all poses within the joint limits, which forward dynamics needs.
+"""A test of whether the mass matrix is positive definite in all poses within the joint limits, as forward dynamics
+needs.
 
-A measured or published theta_b need not belong to any distribution of mass. Then some accelerations have negative
-kinetic energy, and a controller that divides by the mass matrix acts in the wrong direction.
+For a measured or published theta_b, there may be no bodies that have these values. Some accelerations then have
+negative kinetic energy, and a controller that divides by the mass matrix acts in the wrong direction.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ matrix's largest eigenvalue, every joint in its own unit."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassCheck:
-    """The mass matrix over `poses` poses within the joint limits.
+    """Result of a test of the mass matrix in `poses` poses within the joint limits.
 
     failing   number of poses in which it is not positive definite
-    smallest  smallest eigenvalue of all poses, kg m^2 (kg where only sliding joints take part)
+    smallest  smallest eigenvalue of all poses, kg m^2 (kg if only sliding joints take part)
     pose      (nq,) pose of that eigenvalue, rad or m
     joint     name of the joint that its eigenvector moves most
     """
@@ -55,7 +56,7 @@ class MassCheck:
 
     @property
     def reason(self) -> str:
-        """A sentence about what is wrong, or that nothing is."""
+        """A sentence that says what is wrong with the mass matrix, or that nothing is."""
         pose = ", ".join(f"{value:.3g}" for value in self.pose)
         found = f"smallest eigenvalue {self.smallest:.3g} at q = [{pose}], mostly joint {self.joint!r}"
         if self.passed:
@@ -67,7 +68,8 @@ class MassCheck:
 
 
 def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
-    """M(q) in POSES seeded poses within the joint limits; None while the base parameters are unknown."""
+    """Test the mass matrix M(q) in POSES random poses within the joint limits. The poses are the same in each call.
+    None if the base parameters are unknown."""
     if model.theta_b is None:
         return None
     poses, mass, rounding = _drawn(model)
@@ -80,11 +82,12 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
 
 
 def is_surely_positive(model: DynamicsModel) -> bool:
-    """Whether M(q) is positive definite in all poses of `check_mass_matrix`, by Cholesky's factors, which take a fraction of
-    the time of eigenvalues. False if eigenvalues have to decide, or if the base parameters are unknown.
+    """Whether M(q) is surely positive definite in all poses of `check_mass_matrix`. False if eigenvalues have to
+    decide, or if the base parameters are unknown.
 
-    A factor of A - s I, where A has a unit diagonal and is n x n, exists only if A's least eigenvalue is above s less the
-    error of the factor, n (n + 1) eps (Higham, Accuracy and Stability of Numerical Algorithms, theorem 10.3).
+    The test uses Cholesky factors, which take a fraction of the time of eigenvalues. A factor of A - s I, where A has a
+    unit diagonal and is n x n, exists only if A's least eigenvalue is above s less the error of the factor, n (n + 1)
+    eps (Higham, Accuracy and Stability of Numerical Algorithms, theorem 10.3).
     """
     if model.theta_b is None:
         return False

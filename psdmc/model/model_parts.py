@@ -1,4 +1,4 @@
-"""What every model has, for files that DynamicsModel imports and that cannot import it."""
+"""The attributes that every model has, for files that DynamicsModel imports and that therefore cannot import it."""
 
 from __future__ import annotations
 

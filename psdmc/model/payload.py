@@ -1,4 +1,5 @@
-"""A rigid load on a frame, as standard parameters of its link. theta_b = B x follows; E, P and B stay."""
+"""A rigid load on a frame, added to the standard parameters x of the frame's link. theta_b = B x changes; E, P and B do
+not."""
 
 from __future__ import annotations
 
@@ -24,11 +25,12 @@ ROTATION_SLACK = 1e-6
 
 
 def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
-    """The chain with the load on one of its links; InputError where the chain's assumptions do not admit it.
+    """Return the robot with the load on one of its links. Raises InputError if the robot's assumptions do not admit the
+    load.
 
     load  (10,) standard parameters of `load_parameters`
     mass  kg, for the note
-    body  number of the joint that the link moves with
+    body  number of the joint that moves the link
     """
     _check_admitted(chain, load, body)
     parameters = chain.parameters.copy()
@@ -38,7 +40,7 @@ def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
 
 
 def body_parameters(body: int) -> NDArray[np.int64]:
-    """(10,) indices in x of the body parameters of the link that moves with a joint."""
+    """Return (10,) indices in x: the body parameters of the link that a joint moves."""
     return PARAMETERS_PER_LINK * body + np.arange(BODY_PARAMETERS)
 
 
@@ -49,7 +51,7 @@ def load_parameters(
     inertia: ArrayLike | None = None,
     frame: Placement | str | None = None,
 ) -> Array:
-    """(10,) the load's standard parameters about the frame of the link that carries it; arguments as in
+    """Return (10,) the load's standard parameters about the frame of the link that carries it; arguments as in
     DynamicsModel.with_payload."""
     centre, about_com = _checked(mass, com, inertia)
     kilograms = float(mass)
@@ -60,9 +62,10 @@ def load_parameters(
 
 
 def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
-    """(l, 10): theta_b that a load at a frame adds, from its mass, first moment and inertia about that frame's origin.
+    """Return the (l, 10) matrix that computes the change of theta_b by a load at a frame. The load is given by its
+    mass, first moment and inertia about the frame's origin.
 
-    InputError where the chain's assumptions do not admit every load there.
+    Raises InputError if the robot's assumptions do not admit every load there.
     """
     place = chain.joints[frame.joint].link_frame.inverse() @ frame.placement
     moving = moving_map(place.rotation, place.translation)
@@ -72,7 +75,8 @@ def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
 
 
 def carrying_frame(chain: Mechanism, frame: Placement | str | None) -> NamedFrame:
-    """The frame in which a load's numbers are given, in the joint frame of the link that carries it."""
+    """Return the frame in which a load's numbers are given, placed in the joint frame of the link that carries the
+    load."""
     tip = chain.tip_frame
     if isinstance(frame, Placement):
         return replace(tip, placement=tip.placement @ _checked_frame(frame))
@@ -132,7 +136,7 @@ def _numbers(values: ArrayLike, shape: tuple[int, ...], what: str, accepted: lim
 
 
 def array_of(values: ArrayLike) -> Array | None:
-    """The values as float64, None where they are none."""
+    """Return the values as float64; None if they are no numbers."""
     try:
         found = np.asarray(values)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Random physical parameters for a robot whose own are unknown."""
+"""Random physical parameters for a robot whose real parameters are unknown."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SEED = 14_630
 
 
 def random_parameters(chain: Mechanism) -> Array:
-    """(11 n,) standard parameters of physical bodies, as far as the chain's assumptions admit them."""
+    """Return (11 n,) random standard parameters of physical bodies, as far as the robot's assumptions admit them."""
     rng = np.random.default_rng(SEED)
     x = np.zeros((len(chain), PARAMETERS_PER_LINK))
     for link in x:

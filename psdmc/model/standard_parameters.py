@@ -1,4 +1,4 @@
-"""Whether the parameters of every single link are known, which torques alone do not determine."""
+"""A test of whether the parameters of every single link are known. Torques alone do not determine them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ BELONGS = 1e-9
 
 
 def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
-    """The reason why mass, centre and inertia of every link cannot be taken from the model's chain; None where they
-    can."""
+    """Return why mass, centre of mass and inertia of every link cannot be read from the model. None if they can."""
     parameters = model.mechanism.parameters
     if np.isnan(parameters).any():
         return "it needs mass and inertia of every link, and some are unknown"

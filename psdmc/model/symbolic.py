@@ -25,14 +25,14 @@ MOST_MONOMIALS = 2000
 def torque_expression(
     robot: Mechanism, expansion: Expansion, joint: int | str, theta_b: Array | None
 ) -> sympy.Expr:
-    """tau of one joint (its number, 0 being the first, or its name) as a SymPy expression: the sum of its monomials times
+    """Return tau of one joint (by number from 0, or by name) as a SymPy expression: the sum of its monomials times
     combinations of theta_b.
 
-    Symbols, real: q1, qd1, qdd1 and so on, joints numbered from 1 as in the base parameters' equations; theta_b0 and so on,
-    as the entries of theta_b. With theta_b (l,) numbers stand for the latter.
+    The symbols are real: q1, qd1, qdd1 and so on, with joints numbered from 1 as in the base parameters' equations; and
+    theta_b0 and so on, numbered as the entries of theta_b. If theta_b (l,) is given, its numbers replace the latter.
 
-    InputError where there is no such joint or the torque has more than MOST_MONOMIALS monomials, ToolchainError where
-    SymPy is not installed.
+    Raises InputError if there is no such joint, or if the torque has more than MOST_MONOMIALS monomials. Raises
+    ToolchainError if SymPy is not installed.
     """
     sp, number = _sympy(), _joint_number(robot, joint)
     entries = expansion.entries

@@ -1,4 +1,4 @@
-"""Terms of base parameters' equations as data: `2 d4 my4`, `mx1/a1`. Text and LaTeX are made of them."""
+"""Terms of base parameters' equations as data, such as `2 d4 my4` or `mx1/a1`. Text and LaTeX are made from them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Symbol(NamedTuple):
-    """A quantity of one joint: `letters` followed by the joint's number, 1 being the first."""
+    """A quantity of one joint: `letters`, followed by the joint's number from 1."""
 
     letters: str
     number: int
@@ -34,8 +34,8 @@ class Term:
     of         the standard parameter
     is_minus   whether it is subtracted
     number     decimal digits; None: one
-    times      lengths that it is multiplied by
-    over       lengths that it is divided by
+    times      lengths in the numerator
+    over       lengths in the denominator
     """
 
     of: Symbol
@@ -54,6 +54,6 @@ class Term:
 
 
 def equation(terms: Sequence[Term]) -> str:
-    """The terms as one line of text, the first of them without sign."""
+    """Return the terms as one line of text, without a plus before the first one."""
     first, *others = terms
     return str(first) + "".join(f" {'-' if term.is_minus else '+'} {term}" for term in others)

@@ -1,4 +1,5 @@
-"""Angles of a PROGRAM: which sines and cosines can be taken together, and what must be known before."""
+"""The angles of a PROGRAM (a list of scalar operations): which sines and cosines can be computed together, and what
+must be computed before."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ TRIGONOMETRIC = frozenset((Op.SIN, Op.COS))
 
 
 def angle_groups(program: Program) -> list[list[int]]:
-    """Angles by the number of nested sines they depend on: each group depends on earlier groups only."""
+    """Return the angles in groups by the number of nested sines on which they depend. Each group depends on earlier
+    groups only."""
     first = next((i for i, (op, _, _, _) in enumerate(program.body) if op in TRIGONOMETRIC), None)
     if first is None:  # as in most parts of a long PROGRAM
         return []
@@ -24,7 +26,7 @@ def angle_groups(program: Program) -> list[list[int]]:
 
 
 def cone(program: Program, roots: list[int]) -> list[int]:
-    """All values that the roots depend on, the roots included, in the PROGRAM's order."""
+    """Return all values on which the roots depend, including the roots, in the PROGRAM's order."""
     needed = [False] * len(program)
     for root in roots:
         needed[root] = True
@@ -36,8 +38,8 @@ def cone(program: Program, roots: list[int]) -> list[int]:
 
 
 def angles_first(program: Program) -> list[list[int]]:
-    """All values, each after its arguments and once, a list per group of angles and one for the rest: what a group's angles
-    are computed from, then their sines and cosines."""
+    """Return all values once, each after its arguments: one list per group of angles, and one for the rest. The list of
+    a group contains what its angles are computed from, then their sines and cosines."""
     taken: dict[int, list[int]] = {}
     for i, (op, args, _, _) in enumerate(program.body):
         if op in TRIGONOMETRIC:

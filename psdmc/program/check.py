@@ -1,4 +1,4 @@
-"""The rules that every PROGRAM obeys; the pipeline checks them between passes."""
+"""The rules that every PROGRAM obeys. The pipeline checks them after each pass."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ _WITH_TWO = frozenset(op for op in Op if op.arity == 2)
 
 
 def check(program: Program, after: str = "tracing") -> Program:
-    """The same program; InternalError where a rule is broken, naming the pass that broke it."""
+    """Return the same program. Raises InternalError if it breaks a rule, with the name of the pass that changed it
+    last."""
     for i, instr in enumerate(program.body):
         op, args, slot, value = instr
         if len(args) == 2 and op in _WITH_TWO and slot is None and value is None:

@@ -1,7 +1,7 @@
 """Derivatives of a PROGRAM as PROGRAMs: forward mode (tangents), reverse mode (adjoints), and Jacobians by either.
 
-They work for every PROGRAM, and are the reference for functions whose derivatives have a recursion of their own. Every
-result keeps the outputs of the PROGRAM that it differentiates.
+They work for every PROGRAM. Functions whose derivatives have a separate recursion are tested against them. Every result
+also has the outputs of the differentiated PROGRAM.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Mode = Literal["forward", "reverse"]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One matrix of derivatives: entry [i, j] = d of[i] / d by[j], stored row-major as vector `name`."""
+    """A matrix of derivatives: entry [i, j] = d of[i] / d by[j], stored row-major as vector `name`."""
 
     name: str
     of: str
@@ -30,7 +30,7 @@ class Block:
 
 
 def jvp(program: Program, tangents: Mapping[str, str], derivatives: Mapping[str, str]) -> Program:
-    """The outputs and their derivatives along given tangents of the inputs (forward mode).
+    """Return a PROGRAM with the outputs and their derivatives along given tangents of the inputs (forward mode).
 
     tangents     input vector -> name of a new input of the same length; inputs that are not named are held fixed
     derivatives  output vector -> name of the new output that is its derivative along the tangents
@@ -54,7 +54,7 @@ def vjp(
     gradients_of: Mapping[str, str],
     sizes: Mapping[str, int],
 ) -> Program:
-    """The outputs and the gradient of (sum of cotangent . output) by inputs (reverse mode).
+    """Return a PROGRAM with the outputs and the gradient of (sum of cotangent . output) by inputs (reverse mode).
 
     cotangents    output vector -> name of a new input of the same length; outputs that are not named do not count
     gradients_of  input vector -> name of the new output that is the gradient by it
@@ -75,10 +75,11 @@ def vjp(
 
 
 def jacobians(program: Program, blocks: Sequence[Block], mode: Mode) -> Program:
-    """The outputs and whole matrices of their derivatives, column by column (forward) or row by row (reverse).
+    """Return a PROGRAM with the outputs and whole matrices of their derivatives, column by column (forward mode) or row
+    by row (reverse mode).
 
-    Both modes give the same numbers up to rounding and differ in what they cost: forward mode a sweep per input,
-    reverse mode a sweep per output.
+    Both modes give the same numbers up to rounding, but cost differently: forward mode takes one sweep per input,
+    reverse mode one sweep per output.
     """
     replay = _Replay(program)
     columns = _columns if mode == "forward" else _rows

@@ -1,4 +1,5 @@
-"""A tracer that knows the dimension of every value, and stops at the first operation whose arguments do not go together."""
+"""A tracer whose values have dimensions. It stops at the first operation with arguments that do not go together, such
+as the sum of a mass and a length."""
 
 from __future__ import annotations
 
@@ -14,11 +15,12 @@ _append = list.append
 
 
 class UnlikeArguments(Exception):
-    """The operation, and the units of its arguments."""
+    """Raised for an operation with arguments of unlike dimensions. It has the operation and the units of the arguments."""
 
 
 class DimensionedTracer(Tracer):
-    """Symbols do their arithmetic in place and append what they record to `steps`, where each step is looked at."""
+    """A tracer that checks the dimensions of each recorded step. Symbols compute in place and append steps to `steps`,
+    which performs the check."""
 
     __slots__ = ("_own",)
 

@@ -1,8 +1,8 @@
-"""The symmetric matrices that functions factorise: how their entries lie, what a pivot that is not positive means, and what
-the caller learns then.
+"""The symmetric matrices that functions factorise: which entries are zero, what a pivot that is not positive means, and
+how the caller is informed.
 
-A matrix A = L^T D L is positive definite if all pivots, the entries of D, are positive. C returns the number of the first
-pivot that is not; Python gives NaN or an error.
+A matrix A = L^T D L is positive definite if all pivots, the entries of D, are positive. C returns the number of the
+first pivot that is not; Python gives NaN or an error.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from enum import StrEnum
 
 
 class Structure(StrEnum):
-    """How the entries of a symmetric matrix lie.
+    """Which entries of a symmetric matrix are zero at every state.
 
     DENSE   no entry is zero at every state
     LIMBS   limbs on a core: entries of two joints are zero if neither joint carries the other. Elimination from the last
@@ -27,17 +27,17 @@ class Structure(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SymmetricMatrix:
-    """A symmetric matrix that must be positive definite for a function to have a result.
+    """A symmetric matrix that a function factorises. If it is not positive definite, the function has no result.
 
-    name       in sentences
-    structure  how its entries lie
-    axes       lengths of what must be positive: pivots, or one sign for each block
-    number     which number a pivot or sign has that is not positive, from 0, in words; C returns 1 more
-    failure    what has happened then, in Python's documentation: words that follow "If "
-    unit, powers  of these, as Quantity has them
+    name       the matrix's name in sentences
+    structure  which entries are zero
+    axes       lengths of the vector of pivots, or of signs with one for each block
+    number     in words, the number from 0 of the pivot or sign that is not positive; C returns 1 more
+    failure    the reason, in Python's documentation: words that follow "If "
+    unit, powers  of the pivots, as Quantity has them
     error      one line that Python raises as an error, in which {axis} stands for the name of an entry of that axis (such
                as {frames}) and {input} for a scalar input; empty: the results of such a state are NaN
-    hint       the remedy, with the error
+    hint       the remedy that is printed with the error
     """
 
     name: str
@@ -55,7 +55,7 @@ class SymmetricMatrix:
             raise ValueError(f"{self.name}: {self.structure} with axes {self.axes}")
 
     def in_blocks(self, count: str, number: str, failure: str) -> SymmetricMatrix:
-        """So many of this matrix, one after the other."""
+        """Return several matrices of this kind, one after the other, as one block-diagonal matrix."""
         return replace(
             self,
             structure=Structure.BLOCKS,

@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 
 def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str, int]) -> dict[str, Array]:
-    """Outputs by vector name, (..., size), from inputs by vector name, (..., length); leading axes broadcast.
+    """Execute a PROGRAM: outputs by vector name, (..., size), from inputs by vector name, (..., length). Leading axes
+    are broadcast.
 
     `sizes` gives the length of each output vector; entries that the program does not store are zero.
     """
@@ -33,7 +34,7 @@ def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str,
 def evaluated(
     program: Program, load: Callable[[Slot], Any], constant: Callable[[float], Any] = float
 ) -> list[tuple[Slot, Any]]:
-    """The outputs of a PROGRAM on any scalars: numbers, arrays or symbols."""
+    """Yield the outputs of a PROGRAM, computed on any scalars: numbers, arrays or symbols."""
     values: list[Any] = []
     for op, args, slot, value in program.body:
         if args:

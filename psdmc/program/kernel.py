@@ -1,4 +1,4 @@
-"""One generated function's arithmetic, as lowering hands it to emission."""
+"""The arithmetic of one generated function, from which emission prints C code."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from psdmc.program.signature import Signature
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """A function and the PROGRAMs that compute it.
+    """A function and the PROGRAMs (lists of scalar operations) that compute it.
 
     function  which quantities it reads and writes
     theta     whether it also reads theta_b, the base parameters, at run time
-    single    arithmetic in an order for one state; empty where `regions` are too long to be written out
-    batch     arithmetic in an order for one state per SIMD lane; may be the same object
-    lowering  how it was made: 'expanded' or 'factored'
-    before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
-              lanes; single and batch have them written out
-    places    of a function that packs a matrix: (row, column) of each entry that it puts out
-    limbs     the same for one state, limbs of equal structure in the lanes of vectors, for machines whose vectors make it
-              worth while; None: none do
-    regions   the same as loops and calls, which the C is made of; None: it is made of the straight lines
+    single    operations in an order for one state; empty if `regions` are too long to be written out
+    batch     operations in an order for one state per SIMD lane; may be the same object
+    lowering  the method that made it: 'expanded' or 'factored'
+    before    if matrix products at the function's end are computed in loops, the operations before these loops, for one
+              state and for lanes; single and batch have the products written out
+    places    for a function that packs a matrix, (row, column) of each entry that it stores
+    limbs     the function for one state, with equal limbs in the lanes of vectors, if that is cheaper on some machine;
+              else None
+    regions   the function as loops and calls, from which C is printed; None: C is printed from the straight lines
     """
 
     function: Signature
@@ -49,7 +49,8 @@ class Kernel:
 
     @property
     def is_loop_of_calls(self) -> bool:
-        """Whether it has no straight line: its C calls another function, and is too long to be written out."""
+        """Whether it has no straight-line code, because its C code calls another function and is too long to be written
+        out."""
         return not self.single.outputs
 
     def _check(self, program: Program, inputs: set[str], outputs: set[str]) -> None:
@@ -60,10 +61,10 @@ class Kernel:
 
     @property
     def name(self) -> str:
-        """Function name, with '_theta' where parameters are given at run time."""
+        """The function's name, with '_theta' if parameters are given at run time."""
         return self.function.name + ("_theta" if self.theta else "")
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the vectors that it reads, in the order of C's arguments."""
+        """Names of the vectors that the kernel reads, in the order of C's arguments."""
         return (*(q.name for q in self.function.inputs), *(("theta_b",) if self.theta else ()))

@@ -1,4 +1,4 @@
-"""Kernels as JSON text and back: the form in which a cache keeps a lowering."""
+"""Conversion of kernels to JSON text and back. A cache stores lowered kernels in this form."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FORMAT = 6
 
 
 def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
-    """The text of kernels in their order; constants read back bit for bit."""
+    """Return the JSON text of kernels in their order. Constants can be read back bit for bit."""
     # One kernel at a time: lists of all of a large robot's instructions together take more memory than its kernels.
     entries = ",".join(_text(_kernel_to_plain(kernel)) for kernel in kernels.values())
     return f'{{"format":{FORMAT},"kernels":[{entries}]}}'
@@ -47,7 +47,8 @@ def _kernel_to_plain(kernel: Kernel) -> dict[str, Any]:
 
 
 def kernels_from_json(text: str, functions: Mapping[str, Signature]) -> dict[str, Kernel]:
-    """Kernels by name, in the order of `kernels_to_json`; InternalError where that did not write the text.
+    """Return kernels by name, in the order of `kernels_to_json`. Raises InternalError if that function did not write
+    the text.
 
     functions  signatures by name, one of which each kernel must have
     """

@@ -1,4 +1,4 @@
-"""Constants of limbs that run in the lanes of a vector: one number per limb."""
+"""Constants of equal limbs (such as legs) that run in the lanes of a vector: one number per limb."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ Scalar = Any
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """Numbers that differ between the limbs of one group. Arithmetic with plain numbers, and with others of the group, is
-    done at once; where all become equal, the result is a plain number. Beside a symbol, the symbol's arithmetic is done.
+    """A constant that has one number for each limb of a group.
+
+    Arithmetic with numbers and with other constants of the group is done at once. If all results are equal, the result
+    is one number. Arithmetic with a symbol is recorded by the symbol.
 
     group   number of the group of limbs
     values  limb by limb
@@ -57,7 +59,7 @@ class Lanes:
         return lanes(self.group, list(map(sin, self.values))), lanes(self.group, list(map(cos, self.values)))
 
     def operated(self, operation: Callable[..., float], arguments: Sequence[Scalar]) -> Scalar:
-        """An operation's value limb by limb; NotImplemented beside a symbol."""
+        """Return an operation's value limb by limb; NotImplemented if an argument is a symbol."""
         if not all(isinstance(each, Lanes | float | int) for each in arguments):
             return NotImplemented
         columns = [
@@ -78,6 +80,6 @@ class Lanes:
 
 
 def lanes(group: int, values: Sequence[float]) -> float | Lanes:
-    """One constant per limb; a plain number where all are equal."""
+    """Return one constant with a number per limb; if all numbers are equal, a plain number."""
     numbers = tuple(float(x) for x in values)
     return numbers[0] + 0.0 if len(set(numbers)) == 1 else Lanes(group, numbers)

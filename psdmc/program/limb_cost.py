@@ -1,7 +1,7 @@
-"""What the stages of core and limbs cost, counted on PROGRAMs, or on a trace before it is one.
+"""The cost of the stages of a function with limbs, counted on PROGRAMs or on a trace that is not yet a PROGRAM.
 
-A search weighs some hundred arrangements and cuts only the cheapest into stages. The count of a trace is that of the
-stages which `limb_stages.staged` would give.
+A search compares some hundred arrangements, and cuts only the cheapest into stages. The cost of a trace equals that of
+the stages which `limb_stages.staged` would return.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _ADD, _SUB, _SIN, _COS = Op.ADD, Op.SUB, Op.SIN, Op.COS
 
 @dataclass(frozen=True, slots=True)
 class StageCost:
-    """Of one stage.
+    """The cost of one stage of a function with a core and limbs.
 
     group   number of the group whose limbs compute it; None: the core does
-    cost    its operations, a limb's once
-    shared  values of the core that limbs read
-    sums    over the limbs
+    cost    its operations, those of a limb counted once
+    shared  number of values of the core that limbs read
+    sums    number of sums over the limbs
     """
 
     group: int | None
@@ -36,14 +36,14 @@ class StageCost:
 
 
 def whole_cost(limbs: LimbProgram) -> Cost:
-    """Of all stages and of the products behind them, a limb's operations once."""
+    """Return the cost of all stages and of the matrix products after them; operations of a limb are counted once."""
     costs = [cost(stage.program) for stage in limbs.stages]
     costs += [limbs.products.cost] if limbs.products else []
     return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))
 
 
 def stage_costs(limbs: LimbProgram) -> Iterator[StageCost]:
-    """Of a function that is cut into stages."""
+    """Return the cost of each stage of a function that is cut into stages."""
     groups = {group.number: group for group in limbs.groups}
     for stage in limbs.stages:
         own_cost = cost(stage.program)
@@ -63,11 +63,12 @@ def traced_stage_costs(
     partial_of: Mapping[int, int],
     groups: Sequence[LimbGroup],
 ) -> list[StageCost]:
-    """Of a trace's steps that its outputs need.
+    """Return the cost of each stage of a trace, counting the steps that its outputs need.
 
-    stored      outputs of core and limbs, partial sums left out
-    partial_of  index of a loaded sum to that of the value which it sums
-    InternalError where limbs of two groups meet in one value, or a limb's value is stored as the core's.
+    stored      outputs of core and limbs, without partial sums
+    partial_of  index of a loaded sum -> index of the value that it sums
+
+    Raises InternalError if values of limbs of two groups are combined, or a limb's value is stored as the core's.
     """
     needed, partials = _needed(steps, stored, partial_of)
     return _Count(steps, partial_of, groups).of(needed, stored, partials)

@@ -1,5 +1,8 @@
-"""Cut a PROGRAM of core and limbs into stages: what the core computes before the limbs, what these compute, what the core
-makes of their sums, and so on."""
+"""Division of a PROGRAM of core and limbs into stages, each of which is computed by the core or by one group of limbs.
+
+First come the core's values that do not depend on limbs, then what the limbs compute, then what the core computes from
+sums over limbs, and so on.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +20,12 @@ THE_CORE = -1
 
 
 def staged(program: Program, groups: Sequence[LimbGroup]) -> tuple[Stage, ...]:
-    """The stages of a PROGRAM that reads groups' inputs, constants and sums beside the function's inputs, and stores their
-    partial sums and outputs beside the function's outputs.
+    """Return the stages of a PROGRAM of core and limbs. The PROGRAM reads inputs, constants and sums of groups in
+    addition to the function's inputs. It stores partial sums and outputs of groups in addition to the function's
+    outputs.
 
-    Keeps: output values, bit for bit; instructions, but for constants and loads that several stages need.
-    InternalError where limbs of two groups meet in one value, or a limb's value is stored as the core's.
+    Keeps: output values, bit for bit; instructions, except that several stages may repeat constants and loads. Raises
+    InternalError if values of limbs of two groups are combined, or a limb's value is stored as the core's.
     """
     return _Split(program, groups).stages()
 

@@ -1,6 +1,7 @@
-"""Sums over limbs in a trace that records one limb of each group for all of them, and which values differ between limbs.
+"""Sums over limbs, in a trace that records one limb of each group for all of them; and which values differ between
+limbs.
 
-A sum is an input of the trace, as `limb_stages` wants it: nothing but this says what it is the sum of.
+A sum is recorded as an input, as `limb_stages` needs it. Only the data here say which value it is the sum of.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ CORE = -1
 
 
 class LimbSums:
-    """The sums of one trace. Its tracer knows them from now on.
+    """The sums over limbs in one trace. Creating the object registers it with the trace's tracer.
 
-    partials  of each group, the index of a value to the number of its sum
-    summed    the index of a sum to that of its value
+    partials  for each group, index of a value -> number of its sum
+    summed    index of a sum -> index of the value that is summed
     """
 
     def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
@@ -34,11 +35,12 @@ class LimbSums:
         tracer.limb_sums = self
 
     def add_input(self, vector: str, group: int) -> None:
-        """Count the entries of a vector among what differs between a group's limbs."""
+        """Declare that the entries of an input vector differ between the limbs of a group."""
         self._owners[vector] = group
 
     def group_of(self, index: int) -> int:
-        """The number of the group whose limbs a value differs between; CORE: of none."""
+        """Return the number of the group between whose limbs a value differs; CORE if the value is the same for all
+        limbs."""
         groups, steps = self._groups, self.tracer.steps
         for k in range(len(groups), index + 1):
             op, a, b = steps[k]
@@ -51,7 +53,7 @@ class LimbSums:
         return groups[index]
 
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
-        """The sum over a group's limbs of a scalar that is one for each of them."""
+        """Return the sum over a group's limbs of a scalar that stands for one value per limb."""
         if isinstance(value, Lanes):
             return math.fsum(value.values)
         if not isinstance(value, Symbol) or self.group_of(value.index) != group:
@@ -63,7 +65,7 @@ class LimbSums:
         return -found if value.negative else found
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Inputs that differ between limbs where values do."""
+        """Return new inputs in place of these values. An input differs between limbs if its value does."""
         return [self._stand_in(vector, k, value) for k, value in enumerate(values)]
 
     def _stand_in(self, vector: str, number: int, value: Symbol | Constant) -> Symbol:

@@ -1,7 +1,7 @@
-"""The operations of a PROGRAM: one entry for each, from which everything that treats operations alike derives.
+"""The operations of a PROGRAM, as a table with one entry for each.
 
-Tracing, interpreting, folding, differentiating, counting, checking, printing and reading PROGRAMs read this table. A back
-end has a table of its own from `Op` to its language, and a test says that none is missing there.
+The code that traces, interprets, folds, differentiates, counts, checks, prints and reads PROGRAMs uses this table. Each
+back end has a table from `Op` to its language, and a test checks that it is complete.
 
 | comparison        | with NaN                              | zeros                                                   |
 |-------------------|---------------------------------------|---------------------------------------------------------|
@@ -9,7 +9,8 @@ end has a table of its own from `Op` to its language, and a test says that none 
 | min a b, max a b  | NaN, whichever of the two is NaN      | of two zeros the second; passes may swap arguments      |
 | select a b x y    | y: no comparison with NaN is true     | y: -0.0 is not less than 0.0                            |
 
-Their derivatives are those of the argument that they take: at a tie the second's (of min and max), 1 (of abs).
+The derivative of a comparison is that of the argument that it returns. At a tie, min and max have the derivative of the
+second argument, and abs has the derivative 1.
 """
 
 from __future__ import annotations
@@ -31,9 +32,10 @@ Scalar = Any
 
 
 class Unit(StrEnum):
-    """What a target's latencies and weights are given for; the words are names of their fields (psdmc/target/costs.py).
+    """The kinds of operations for which a target gives latencies and weights. The words are names of their fields
+    (psdmc/target/costs.py).
 
-    CHOICE  a comparison and what it chooses, without a branch
+    CHOICE  a comparison and the choice by its result, without a branch
     CALL    an elementary function of the C library, one real at a time
     """
 
@@ -50,17 +52,17 @@ class Unit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """What is known of an operation.
+    """The properties of one operation of PROGRAMs.
 
     arity        number of arguments
-    unit         of which it costs one
-    numbers      its meaning on floats and arrays; on symbols, too, where `written` says so
+    unit         the kind as which its cost is counted
+    numbers      its meaning on floats and arrays; on symbols, too, if `written` is set
     partials     derivative by each argument, from its value and its arguments
-    dimension    dimension of its value, from those of its arguments; raises Unlike where they do not go together
-    ulp          largest error of a double, in units in the last place, of `numbers` and of the emitted C; 0.5: rounded once
-    written      whether symbols have it as an operator, and simplify as they record it
+    dimension    dimension of its value, from those of its arguments; raises Unlike if they do not go together
+    ulp          largest error, in units in the last place, of a double in `numbers` and in generated C; 0.5: rounded once
+    written      whether symbols have it as an operator, and simplify it as they record it
     commutative  whether its arguments may be swapped
-    parity       what becomes of the sign of the first argument: 'odd' hands it on, 'even' drops it
+    parity       effect of the first argument's sign: 'odd' changes the result's sign, 'even' does not change the result
     """
 
     arity: int
@@ -108,9 +110,9 @@ def _power_partials(value: Scalar, base: Scalar, exponent: Scalar) -> tuple[Scal
 
 
 class Op(StrEnum):
-    """Operations of a PROGRAM's instructions; their words are those of its text form.
+    """The operations of a PROGRAM's instructions. Their values are the words of PROGRAMs as text.
 
-    Called with arguments, an operation gives its value: `Op.TANH(x)`, of floats, arrays or symbols.
+    Called with arguments, an operation computes its value: `Op.TANH(x)`, of floats, arrays or symbols.
     """
 
     LOAD = "load", Operation(0, Unit.LOAD, _none, _none)
@@ -213,7 +215,7 @@ class Op(StrEnum):
         return self.numbers(*arguments)
 
     def of_numbers(self, values: Sequence[float]) -> float | None:
-        """The value of numbers; None where it is not finite, and no constant."""
+        """Return the operation's value for numbers; None if it is not finite and so cannot be a constant."""
         with np.errstate(all="ignore"):
             value = float(self.numbers(*map(np.float64, values)))
         return value if math.isfinite(value) else None

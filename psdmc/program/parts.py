@@ -1,6 +1,7 @@
-"""Cut a long PROGRAM into parts that are compiled one by one: compilers take more than linear time for long straight lines.
+"""Division of a long PROGRAM into parts that are compiled one by one, because compile time grows faster than the length
+of straight-line code.
 
-A part is a PROGRAM of its own. What later parts read of it, it stores into vectors that lie between them.
+Each part is a PROGRAM. It stores values that later parts read in vectors that pass from part to part.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ LEEWAY = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Parts in their order, and the vectors that lie between them with their lengths."""
+    """The parts of a divided PROGRAM in their order, and the vectors between them with their lengths."""
 
     programs: tuple[Program, ...]
     kept: Mapping[str, int]
@@ -29,13 +30,14 @@ class Parts:
 def in_parts(
     program: Program, kept_in: Sequence[str], groups: Sequence[Collection[Slot]], late: bool, longest: int
 ) -> Parts:
-    """The PROGRAM in parts of about `longest` operations and stores.
+    """Divide the PROGRAM into parts of about `longest` operations and stores.
 
-    kept_in  of each value the vector that takes it where a later part reads it
-    groups   outputs that one part must store; an output that is in none is a group of its own
-    late     the last part stores all outputs; otherwise each part stores what it completes
-    Keeps: output values, bit for bit; all inputs are read before or in the first part that stores an output, and in it
-    before they are stored.
+    kept_in  for each value, the vector that takes it if a later part reads it
+    groups   outputs that one part must store together; an output that is in none of them is stored alone
+    late     the last part stores all outputs; otherwise each part stores the outputs that it completes
+
+    Keeps: output values, bit for bit. All inputs are read before the first output is stored, in an earlier part or in
+    the same one.
     """
     return _Cut(program, kept_in, groups, late, longest).parts()
 

@@ -1,4 +1,4 @@
-"""The passes in their order, with the checker between them."""
+"""The passes that improve a PROGRAM, in their order, with the checker after each of them."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ registers do."""
 
 
 def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
-    """Passes for one state, which is delayed by its longest chain of dependent operations: they shorten it, by the
-    target's latencies."""
+    """Return the last passes for code that computes one state. The time of such code depends on its longest chain of
+    dependent operations. The passes shorten this chain, by the target's latencies."""
 
     @wraps(fuse_sums)
     def fuse(program: Program) -> Program:
@@ -58,17 +58,20 @@ one saves less than a thousandth of a humanoid's Coriolis matrix."""
 
 
 def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> Program:
-    """A PROGRAM with the same outputs in fewer operations, up to rounding, in the order that suits the target; with
-    `lanes`, for one state per SIMD lane.
+    """Return a PROGRAM with the same outputs up to rounding, with fewer operations, in the order that suits the target.
+    With `lanes`, the order suits one state per SIMD lane.
 
-    InternalError, naming the pass, where one breaks a PROGRAM's rules.
+    Raises InternalError, naming the pass, if a pass breaks a rule for PROGRAMs.
     """
     return ordered(shortened(program), costs)[1 if lanes else 0]
 
 
 def shortened(program: Program, of_large: bool = False) -> Program:
-    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order. The first round that
-    saves LITTLE is the last one of a long PROGRAM; `of_large`, of a robot of many joints, LONG_OF_LARGE is long."""
+    """Return a PROGRAM with the same outputs in fewer operations, before its instructions are put in order.
+
+    For a long PROGRAM, rounds end with the first one that saves no more than LITTLE. With `of_large`, for a robot of
+    many joints, a PROGRAM is long from LONG_OF_LARGE operations on.
+    """
     operations, long = _operations(program), LONG_OF_LARGE if of_large else LONG
     for _ in range(LONGEST):
         shorter = _applied(ROUND, program)
@@ -82,9 +85,11 @@ def shortened(program: Program, of_large: bool = False) -> Program:
 
 
 def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
-    """A shortened PROGRAM in two orders: for one state a call, and for one state per SIMD lane. They are the same where
-    the target has no lanes or one order serves both; where spilled values also delay the code for one state, it
-    takes the order that spills less."""
+    """Return a shortened PROGRAM in two orders: for one state per call, and for one state per SIMD lane.
+
+    The orders are the same if the target has no lanes, or if one order serves both. If spilled values also delay the
+    code for one state, this code takes the order that spills less.
+    """
     last = _applied(LAST, short)
     for_lanes = _applied(LAST_FOR_LANES, last)
     for_one = _applied(last_for_one_state(costs), last)

@@ -1,4 +1,5 @@
-"""Products of square matrices behind a PROGRAM: left out of its straight line, multiplied in loops or line by line."""
+"""Products of square matrices at the end of a function. They are not a part of its PROGRAM, and are computed in loops
+or written out entry by entry."""
 
 from __future__ import annotations
 
@@ -18,11 +19,11 @@ hand of four fingers has few lines."""
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """output = - left right, n x n each.
+    """A matrix product at the end of a function: output = - left right, n x n each.
 
-    output  an output of the function that its trace does not give
-    left    an output of the function that it gives, row by row
-    right   what the trace gives in the output's place, column by column: a column of derivatives is by one joint
+    output  an output of the function that its trace does not compute
+    left    an output of the function that the trace computes, row by row
+    right   what the trace computes in place of the output, column by column: a column of derivatives is by one joint
     """
 
     output: str
@@ -31,8 +32,8 @@ class Product:
 
 
 def written_out(program: Program, products: tuple[Product, ...]) -> Program:
-    """The PROGRAM with the products' outputs in the place of their right factors, entry by entry; itself where there are
-    none."""
+    """Return the PROGRAM with each product written out, entry by entry, in place of its right factor; the same PROGRAM
+    if there are no products."""
     if not products:
         return program
     tracer = Tracer()
@@ -61,7 +62,8 @@ def _multiplied(product: Product, values: dict[Slot, Value]) -> list[tuple[Slot,
 
 
 def lines(program: Program, product: Product) -> int:
-    """Multiplications of the product where it is written out: none by entries that are zero at every state."""
+    """Return the number of multiplications if the product is written out; entries that are zero at every state need
+    none."""
     stored = {slot: program.body[i].value != 0.0 for slot, i in program.outputs}
     n = isqrt(sum(slot.vector == product.right for slot in stored))
     left = [sum(stored[Slot(product.left, i * n + k)] for i in range(n)) for k in range(n)]
@@ -70,7 +72,7 @@ def lines(program: Program, product: Product) -> int:
 
 
 def zero_columns(program: Program, product: Product) -> int:
-    """How many of the right factor's first columns are zero at every state."""
+    """Return how many of the right factor's first columns are zero at every state."""
     stored = {
         slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == product.right
     }

@@ -1,4 +1,5 @@
-"""PROGRAM: straight-line, single-assignment arithmetic on scalars: all that lowering hands to emission."""
+"""PROGRAM: a list of scalar operations without branches or loops, in which each value is assigned once. All generated
+code is made from PROGRAMs."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ class Slot(NamedTuple):
 
 
 class Instr(NamedTuple):
-    """One instruction; `args` point at earlier instructions, `slot` belongs to loads, `value` to constants."""
+    """One instruction of a PROGRAM. `args` are the indices of earlier instructions, `slot` is for loads, `value` for
+    constants."""
 
     op: Op
     args: tuple[int, ...] = ()
@@ -34,7 +36,7 @@ class Instr(NamedTuple):
     value: float | None = None
 
     def renumbered(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
-        """The same operation on the values that its arguments have become; itself where none has moved."""
+        """Return the same instruction with renumbered arguments; the instruction itself if no number changes."""
         op, args, _, _ = self
         if len(args) == 2:
             moved: tuple[int, ...] = (new_index[args[0]], new_index[args[1]])
@@ -45,8 +47,8 @@ class Instr(NamedTuple):
         return self if moved == args else tuple.__new__(Instr, (op, moved, None, None))
 
     def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
-        """The same on the values that its arguments have become, commutative ones in ascending order; itself where it is
-        that already."""
+        """Return the same instruction with renumbered arguments, commutative ones in ascending order; the instruction
+        itself if nothing changes."""
         op, args, _, _ = self
         if len(args) != 2:
             return self.renumbered(new_index)
@@ -58,13 +60,14 @@ class Instr(NamedTuple):
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:
-    """Instr(op, args), made in a third of the time: passes make some hundred thousand."""
+    """Return Instr(op, args) in a third of the time. Speed matters because passes make some hundred thousand
+    instructions."""
     return tuple.__new__(Instr, (op, args, None, None))
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Instructions in an order in which every argument precedes its use, and what they put out.
+    """A list of instructions, in which every argument precedes its use, with the values that are stored.
 
     body     instruction i defines value i
     outputs  (slot, index of the value stored there), in order of storing
@@ -77,7 +80,8 @@ class Program:
     )
 
     def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """(k,) the arguments of all instructions in their order, and (k,) the instruction of each; found once."""
+        """Two arrays (k,): the arguments of all instructions in their order, and the instruction to which each belongs.
+        They are computed once."""
         if not self._arguments:
             given = [args for _, args, _, _ in self.body]
             counts = np.fromiter(map(len, given), np.intp, len(given))
@@ -86,11 +90,11 @@ class Program:
         return self._arguments[0]
 
     def inputs(self) -> tuple[Slot, ...]:
-        """Slots read, each once, in order of vector name and index."""
+        """Return the slots that are read, without duplicates, in order of vector name and index."""
         return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
 
     def uses(self) -> list[int]:
-        """How often each value is an argument or an output."""
+        """How often each value is used as an argument or an output."""
         count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
         for _, index in self.outputs:
             count[index] += 1

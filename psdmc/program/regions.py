@@ -1,10 +1,10 @@
-"""A function as a list of regions: straight lines, loops over slices of arrays, and calls of other functions.
+"""A function as a list of regions: straight-line code, loops over slices of arrays, and calls of other functions.
 
-A straight line grows with the square or the cube of the joints if a function multiplies matrices or calls another function
-several times; regions stay short. `run` executes them on arrays of states, to interpret a function, or on symbols, to write
-it out as one straight line.
+If a function multiplies matrices or calls another function several times, straight-line code grows with the square or
+the cube of the number of joints; regions stay short. `run` executes them on arrays of states, to interpret a function,
+or on symbols, to write the function out as straight-line code.
 
-Regions read and write arrays of reals by name: the function's inputs and outputs, and arrays of its own. An entry must be
+Regions read and write arrays of reals by name: the function's inputs and outputs, and internal arrays. An entry must be
 written before it is read.
 """
 
@@ -26,19 +26,20 @@ Scalar = Any
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """A PROGRAM whose vectors are arrays in sight. It reads all entries before it writes one."""
+    """Straight-line code: a PROGRAM whose vectors are arrays of the function. It reads all entries before it writes
+    one."""
 
     program: Program
 
 
 @dataclass(frozen=True, slots=True)
 class Slice:
-    """A part of an array that moves on with each round of a loop.
+    """A view of an array that moves with each iteration of a loop.
 
-    name    that the loop's regions call it by
-    array   outside the loop
-    first   its entry in the first round
-    stride  entries to the next round's
+    name    the slice's name in the loop's regions
+    array   name of the array outside the loop
+    first   index of the view's start in the first iteration
+    stride  number of entries by which the start moves per iteration
     """
 
     name: str
@@ -49,7 +50,8 @@ class Slice:
 
 @dataclass(frozen=True, slots=True)
 class For:
-    """Regions that are repeated a fixed number of times. Inside, slices stand beside the arrays in sight."""
+    """Regions that are repeated a fixed number of times. They can use the loop's slices and all arrays outside the
+    loop."""
 
     count: int
     slices: tuple[Slice, ...]
@@ -60,10 +62,9 @@ class For:
 class Call:
     """A call of another function of the package, with theta_b if the caller takes it.
 
-    given   an array and its first entry for each input, in their order
+    given   for each input, in order, an array and its first entry
     found   the same for each output
-    pivots  entries that must be positive there: where one is not, the caller fails. They number on from those of earlier
-            calls
+    pivots  number of entries that must be positive in the called function; if one is not, the caller fails, too
     """
 
     function: str
@@ -77,9 +78,9 @@ Region = Straight | For | Call
 
 @dataclass(frozen=True, slots=True)
 class Regions:
-    """A function's body.
+    """A function's body as loops, calls and straight-line code.
 
-    arrays     its own arrays, with their lengths
+    arrays     its internal arrays, with their lengths
     constants  arrays of numbers
     """
 
@@ -89,8 +90,8 @@ class Regions:
 
 
 def drop_unread(body: Regions) -> Regions:
-    """The regions without what they store into arrays of their own and never read, and without slices and arrays that this
-    leaves unused.
+    """Return the regions without stores into internal arrays that are never read, and without slices and arrays that
+    are then unused.
 
     Keeps: outputs, bit for bit.
     """
@@ -175,7 +176,8 @@ def _named(regions: Sequence[Region]) -> set[str]:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """Values and the distance of their places in an array, which is 1 in a vector and the width in a matrix's column."""
+    """Values to store in an array at a constant distance, `stride`: 1 in a vector, the number of columns in a matrix's
+    column."""
 
     values: Sequence[Scalar]
     stride: int = 1
@@ -183,7 +185,7 @@ class Column:
 
 
 def straight(record: Callable[[Reader], Mapping[str, Column]]) -> Straight:
-    """The straight line that stores what `record` computes, array by array, of what it reads."""
+    """Return straight-line code that stores what `record` computes, array by array, from the entries that it reads."""
     tracer = Tracer()
     outputs = [
         (Slot(name, column.first + k * column.stride), value)
@@ -210,9 +212,10 @@ Caller = Callable[[str, list[list[Scalar]]], tuple[list[list[Scalar]], list[Scal
 def run(
     body: Regions, inputs: Mapping[str, Sequence[Scalar]], outputs: Mapping[str, int], call: Caller
 ) -> tuple[dict[str, list[Scalar]], list[Scalar]]:
-    """The outputs, whose lengths are given, and what must be positive in the order in which it is found.
+    """Execute the regions. Returns the outputs, whose lengths are given, and the pivots that must be positive, in the
+    order in which they are computed.
 
-    InternalError where an entry is read before it is written.
+    Raises InternalError if an entry is read before it is written.
     """
     arrays: dict[str, list[Scalar]] = {name: list(values) for name, values in inputs.items()}
     arrays |= {name: list(values) for name, values in body.constants.items()}

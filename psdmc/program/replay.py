@@ -1,4 +1,4 @@
-"""A PROGRAM recorded again on symbols, to compute with its values or to give it other inputs."""
+"""Recording of a PROGRAM again on symbols, to compute further with its values or to give it other inputs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Value = Symbol | Constant
 
 
 def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> list[Value]:
-    """The PROGRAM's outputs, in its order, with these values for its inputs. Inputs that are not given stay inputs."""
+    """Return the PROGRAM's outputs, in its order, with these values for its inputs. Inputs without a value stay inputs."""
 
     def load(slot: Slot) -> Value:
         found = given.get(slot)
@@ -23,8 +23,8 @@ def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> l
 
 
 def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:
-    """Recorded values, with other values in place of some of the inputs that they are computed from. Of sums over limbs, the
-    values that it sums are replaced."""
+    """Return recorded values, computed from other values in place of some of their inputs. In a sum over limbs, the
+    summed values are replaced."""
     tracer = inputs[0].tracer
     if any(symbol.slot is None for symbol in inputs):
         raise InternalError("only inputs can be replaced")

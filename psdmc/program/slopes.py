@@ -1,9 +1,10 @@
-"""Derivatives of recorded values, recorded beside them: along tangents (forward mode) and as gradients (reverse mode).
+"""Derivatives of recorded values, recorded in the same trace: along tangents (forward mode) and as gradients (reverse
+mode).
 
-Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are taken by inputs (`Tracer.symbols`) and by
-inputs times a constant, not by other computed values: constants along a product are merged into one, so that a recorded
-product may no longer contain the value that it was written with. To differentiate at computed values, trace with inputs and
-put the values in their place afterwards (replay.py).
+Source: Griewank, Walther 2008, chapters 3 (modes) and 4 (costs). Derivatives can be by inputs (`Tracer.symbols`) and by
+inputs times a constant, but not by other computed values. The tracer merges constants along a product, so a recorded
+product may no longer contain the value with which it was written. To differentiate by computed values, trace with
+inputs in their place, and substitute the values afterwards (replay.py).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ Value = Symbol | Constant
 
 
 def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) -> list[Value]:
-    """The derivative of each value along a tangent: sum over j of (d of[i] / d by[j]) along[j]."""
+    """Compute the derivative of each value along a tangent: sum over j of (d of[i] / d by[j]) along[j]."""
     inputs, factors = _inputs(by)
     sources = _Sources.of(of, inputs)
     if sources is None:
@@ -38,7 +39,7 @@ def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) ->
 def gradients(
     of: Sequence[Value], weights: Sequence[Value], by: Sequence[Sequence[Symbol]]
 ) -> list[list[Value]]:
-    """The derivative of sum(weights[i] of[i]) by every value, vector by vector."""
+    """Compute the derivatives of sum(weights[i] of[i]) by every input, vector by vector."""
     known = [_inputs(vector) for vector in by]
     sources = _Sources.of(of, [symbol for inputs, _ in known for symbol in inputs])
     if sources is None:
@@ -93,7 +94,8 @@ class _Bars:
         self.from_limbs: dict[int, dict[int, Value]] = {}
 
     def add(self, index: int, value: Value, group: int) -> None:
-        """What a value of this group's gives to that at `index`."""
+        """Add a contribution to the derivative by value `index`. It comes from a value that belongs to this group of
+        limbs."""
         if group in (CORE, self.sources.group_of(index)):
             self.own[index] = self.own[index] + value
         else:
@@ -101,7 +103,8 @@ class _Bars:
             given[group] = given.get(group, 0.0) + value
 
     def of(self, index: int) -> Value:
-        """The derivative by one value, when all that are computed from it have been passed; 0 if nothing is."""
+        """Return the derivative by one value, after the contributions of all values that are computed from it; 0 if
+        there are none."""
         if index >= len(self.own):
             return 0.0
         for group, value in self.from_limbs.pop(index, {}).items():
@@ -136,17 +139,17 @@ class _Sources:
         return _Sources(symbols[0].tracer, [symbol.index for symbol in symbols], held)
 
     def group_of(self, index: int) -> int:
-        """The group of limbs that a value belongs to; CORE: none."""
+        """Return the group of limbs to which a value belongs; CORE if it belongs to none."""
         sums = self.tracer.limb_sums
         return CORE if sums is None else sums.group_of(index)
 
     def total(self, group: int, value: Value) -> Value:
-        """The sum over a group's limbs of what one of them gives."""
+        """Return the sum over a group's limbs of a value that stands for one value per limb."""
         sums = self.tracer.limb_sums
         return value if sums is None else sums.total(group, value)
 
     def slope(self, index: int, moved: Mapping[int, Value]) -> Value:
-        """The derivative of a value along a tangent, from those of its arguments."""
+        """Compute the derivative of a value along a tangent, from the derivatives of its arguments."""
         total: Value = 0.0
         for argument, partial in self.partials(index):
             tangent = moved.get(argument, 0.0)
@@ -160,7 +163,7 @@ class _Sources:
         return self.tracer.limb_sums is not None and index in self.tracer.limb_sums.summed
 
     def partials(self, index: int) -> Iterator[tuple[int, Value]]:
-        """(argument, derivative of value `index` by it) for each argument; the same argument may come twice."""
+        """Yield (argument, derivative of value `index` by it) for each argument; the same argument may come twice."""
         turned = self._pairs.of(index)
         if turned is not None:
             yield turned.angle, turned.slope

@@ -1,7 +1,7 @@
-"""Functions of as many robots as states: a variant of each function with theta_b that reads one theta_b per state.
+"""Variants of functions that read one theta_b per state, for batches of robots with different parameters.
 
-Its arithmetic is that of the variant with one theta_b for all states. As `thetas` is an input like q, it lies in rows and
-lanes as q does, and nothing that is computed from it is shared between states.
+Their arithmetic is that of the variant with one theta_b for all states. `thetas` is an input like q, and has the same
+layout in rows and lanes. Nothing that is computed from it is shared between states.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def by_rows(function: Signature) -> Signature:
 
 
 def kernel_by_rows(kernel: Kernel) -> Kernel:
-    """The variant of a kernel with theta_b.
+    """Return the variant of a kernel that reads one theta_b per state.
 
     Keeps: output values, bit for bit; the PROGRAMs' order.
     """

@@ -1,7 +1,9 @@
-"""Products with the inverse of a matrix of limbs on a core (dynamics/arrow.py), done behind a function's limb stages.
+"""Products with the inverse of a matrix of limbs on a core (dynamics/arrow.py), computed after a function's limb
+stages.
 
-Entries of an output in the rows of one limb and the columns of another belong to both. Stages cannot compute them, and need
-not: they are the limb's shares T times rows of the core, which are in memory by then. There, all columns are neighbours.
+An entry of an output in the row of one limb and the column of another belongs to both limbs, so stages cannot compute
+it. It is a product of the limb's factor T with rows of the core. These rows are in memory after the stages, with all
+columns next to each other.
 """
 
 from __future__ import annotations
@@ -22,10 +24,10 @@ INVERSE = "core_inverse"
 
 @dataclass(frozen=True, slots=True)
 class Thin:
-    """A function's output that a trace with limbs gives as factors.
+    """An output of a function that a trace with limbs computes as factors of a matrix product.
 
     name   of the output
-    known  its first columns, which the trace gives themselves where a free joint carries the whole robot
+    known  number of its first columns that the trace computes directly if a floating base carries the whole robot
     """
 
     name: str
@@ -34,11 +36,11 @@ class Thin:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """Limbs of a group.
+    """The factor T of one group of limbs in matrix products (ThinProducts).
 
-    vector    of T: for each row of each limb an entry per carrier
-    rows      of the outputs, limb by limb
-    carriers  numbers of the core's rows that T's columns belong to
+    vector    name of the vector of T: for each row of each limb an entry per carrier
+    rows      the rows of the outputs that belong to the group, limb by limb
+    carriers  numbers of the core's rows to which T's columns belong
     """
 
     vector: str
@@ -53,14 +55,14 @@ class Shares:
 
 @dataclass(frozen=True, slots=True)
 class ThinProducts:
-    """Outputs n x n with x = - V E in the rows of the core, and Y - T x in those of a limb. Stages store V, T and E, and
-    store Y in the outputs.
+    """Outputs n x n that are x = - V E in the rows of the core, and Y - T x in the rows of a limb. Stages compute V, T
+    and E, and store Y in the outputs.
 
-    outputs  their names, and
-    known    how many of their first columns stages store themselves
-    n        rows, and columns
+    outputs  names of the outputs
+    known    for each output, how many of its first columns stages store themselves
+    n        number of rows and columns
     core     rows of the core
-    groups   of limbs
+    groups   the factor T of each group of limbs
     """
 
     outputs: tuple[str, ...]
@@ -71,24 +73,24 @@ class ThinProducts:
 
     @staticmethod
     def right(output: str) -> str:
-        """Vector of E: the core's rows, one after the other."""
+        """Return the name of the vector of E: the core's rows, one after the other."""
         return f"{output}_core"
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Vectors of V, T and E with their lengths."""
+        """The vectors of V, T and E with their lengths."""
         wide = len(self.core)
         found = {INVERSE: wide**2} | {group.vector: group.size for group in self.groups}
         return found | {self.right(output): wide * self.n for output in self.outputs}
 
     @property
     def narrowest(self) -> int:
-        """The least number of columns of an output that are computed here."""
+        """The least number of columns that these products compute in an output."""
         return self.n - max(self.known)
 
     @property
     def written(self) -> set[Slot]:
-        """The outputs' rows of the core, and entries of E that are not read."""
+        """The slots that stages need not store: the outputs' rows of the core, and entries of E that are not read."""
         wide, n = len(self.core), self.n
         found: set[Slot] = set()
         for output, known in zip(self.outputs, self.known, strict=True):
@@ -98,14 +100,15 @@ class ThinProducts:
 
     @property
     def cost(self) -> Cost:
-        """Operations on AT_ONCE columns: a multiply-add for each entry of V and T but the first of each row of V."""
+        """The operations on AT_ONCE columns: a multiply-add for each entry of V and T except the first of each row of
+        V."""
         blocks = sum(-(-(self.n - known) // AT_ONCE) for known in self.known)
         mul = blocks * (len(self.core) ** 2 + sum(group.size for group in self.groups))
         add = mul - blocks * len(self.core)
         return Cost(mul, add, div=0, neg=0, sincos=0, fused=add)
 
     def place(self, slot: Slot, factors: str) -> Slot:
-        """Where an entry of a trace's outputs is stored; `factors`: the name of V and T there."""
+        """Return the slot in which an entry of a trace's outputs is stored. `factors` is the trace's name for V and T."""
         row, column = divmod(slot.index, self.n)
         known = dict(zip(self.outputs, self.known, strict=True)).get(slot.vector, self.n)
         if row in self.core and column >= known:
@@ -119,7 +122,8 @@ class ThinProducts:
         return Slot(group.vector, group.rows.index(row) * len(group.carriers) + group.carriers.index(number))
 
     def multiplied(self, stored: Mapping[Slot, Any]) -> Iterator[tuple[Slot, Any]]:
-        """The outputs, entry by entry, from all that stages have stored; what they have not stored is zero."""
+        """Compute the outputs, entry by entry, from all that stages have stored. Slots that they have not stored are
+        zero."""
         n, wide = self.n, len(self.core)
         for output, known in zip(self.outputs, self.known, strict=True):
             for column in range(known, n):

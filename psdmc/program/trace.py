@@ -1,11 +1,11 @@
-"""Symbols that record the arithmetic done to them as a PROGRAM, and simplify it as they go.
+"""Symbols that record each operation on them as a PROGRAM, and simplify it at the same time.
 
-Equal expressions are recorded once: values are hash-consed, commutative arguments sorted, and a sign is kept beside a
-value instead of being computed, so that a - b and b - a, or x * y and x * -y, are one instruction. Exact zeros and ones
+Equal expressions are recorded once: values are hash-consed, and commutative arguments sorted. A sign is stored with the
+symbol and costs no operation. a - b and b - a, or x * y and x * -y, are therefore one instruction. Exact zeros and ones
 disappear; constants fold and merge along products (which reorders floating point).
 
-A search traces some hundred programs. The arithmetic of symbols is therefore written out in place, on plain tuples,
-which become instructions only in `finish`.
+A search traces some hundred programs. To be fast, the arithmetic of symbols is written out without calls, on plain
+tuples, which become instructions only in `finish`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LOAD, _CONST = Op.LOAD, Op.CONST
 
 
 def arguments_of(step: Step) -> tuple[int, ...]:
-    """The indices of the values that a step is computed from."""
+    """Return the indices of the values that are the arguments of a step."""
     op, a, b = step
     if b is not None:
         return (a, b)
@@ -45,32 +45,33 @@ Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
 
 
 def group_name(group: int) -> str:
-    """What the names of a group's vectors begin with."""
+    """Return the beginning of the names of a limb group's vectors."""
     return f"group{group}"
 
 
 def constants_of(group: int) -> str:
-    """Name of the vector of a group's constants."""
+    """Return the name of the vector with the constants of a group of limbs."""
     return f"{group_name(group)}_constants"
 
 
 class SumsOverLimbs(Protocol):
-    """What a tracer knows of its sums over limbs (limb_sums.py)."""
+    """The interface through which a tracer uses its sums over limbs (limb_sums.py)."""
 
     summed: dict[int, int]
 
     def group_of(self, index: int) -> int:
-        """The number of the group whose limbs a value differs between; -1: of none."""
+        """Return the number of the group between whose limbs a value differs; -1 if the value is the same for all
+        limbs."""
 
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
-        """The sum over a group's limbs of a scalar that is one for each of them."""
+        """Return the sum over a group's limbs of a scalar that stands for one value per limb."""
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Inputs that differ between limbs where values do."""
+        """Return new inputs in place of these values. An input differs between limbs if its value does."""
 
 
 class Tracer:
-    """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
+    """Records steps; `symbols` makes inputs, and `finish` makes the PROGRAM."""
 
     __slots__ = ("_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
@@ -87,7 +88,7 @@ class Tracer:
         return [self.symbol(Slot(vector, i)) for i in range(count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Inputs that stand for values until these are put in their place (replay.py)."""
+        """Return new inputs in place of these values, until the values are substituted (replay.py)."""
         if self.limb_sums is None:
             return self.symbols(vector, len(values))
         return self.limb_sums.stand_ins(vector, values)
@@ -97,7 +98,7 @@ class Tracer:
         return Symbol(self, self.record((_LOAD, slot, None)))
 
     def record(self, step: Step) -> int:
-        """The index of a step's value, recorded now or before."""
+        """Return the index of a step's value. The step is recorded, unless an equal one was recorded before."""
         index = self.known.get(step)
         if index is None:
             index = self.known[step] = len(self.steps)
@@ -105,7 +106,7 @@ class Tracer:
         return index
 
     def constant(self, value: Constant) -> Symbol:
-        """A constant; its sign is kept beside it."""
+        """Return a symbol for a constant; the sign is stored in the symbol."""
         if isinstance(value, Lanes):
             return self._lanes(value)
         # A Python number even where it is NumPy's: signs are compared by identity, which fails for its booleans.
@@ -135,14 +136,14 @@ class Tracer:
         return index
 
     def arguments(self, index: int) -> tuple[int, ...]:
-        """The indices of the values that a value is computed from; of a sum over limbs the one that is summed."""
+        """Return the indices of a value's arguments; for a sum over limbs, the index of the summed value."""
         if self.limb_sums is not None and index in self.limb_sums.summed:
             return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
 
     def finish(self, outputs: Outputs) -> Program:
-        """The PROGRAM that stores the given values; a negative one costs a negation. Steps that no output needs are left
-        out."""
+        """Return the PROGRAM that stores the given values. Steps that no output needs are left out. A negative value
+        costs a negation."""
         stored = self.stored(outputs)
         steps = self.steps
         needed = [False] * len(steps)
@@ -164,8 +165,7 @@ class Tracer:
         return Program(tuple(body), tuple((slot, places[i]) for slot, i in stored))
 
     def cost(self, outputs: Outputs) -> Cost:
-        """The cost of the PROGRAM that `finish` would give, values that no output needs left out. For searches, which
-        only compare."""
+        """Return the cost of the PROGRAM that `finish` would return, without making it. Searches only compare costs."""
         stored = self.stored(outputs)
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
@@ -200,7 +200,7 @@ class Tracer:
         return counted(others, mul, len(sums), len(angles), fused)
 
     def stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
-        """The outputs with the indices of their values, recorded where they are constants or negative."""
+        """Return the outputs with the indices of their values. Constants and negative values are recorded."""
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
             if isinstance(value, Lanes):
@@ -212,7 +212,8 @@ class Tracer:
         return stored
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """An operation that symbols have no operator for; of numbers a constant, where it is finite."""
+        """Record an operation for which symbols have no operator, and return its value. If all arguments are numbers,
+        the result is a constant, if it is finite."""
         given = [each if isinstance(each, Symbol) else self.constant(each) for each in arguments]
         known = [value for each in given if isinstance(value := each.constant_value(), float)]
         if len(known) == len(given):
@@ -312,16 +313,16 @@ class Symbol:
         return Symbol(self.tracer, sine, self.negative), Symbol(self.tracer, cosine)
 
     def root(self) -> Symbol:
-        """The square root; of a constant a constant."""
+        """Return the square root; for a constant, a constant."""
         return self.tracer.operated(Op.SQRT, (self,))
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """The value of an operation on symbols and constants, of which this is one."""
+        """Return the value of an operation on symbols and constants; this symbol is one of its arguments."""
         return self.tracer.operated(op, arguments)
 
     @property
     def slot(self) -> Slot | None:
-        """The input that this is; None where it is computed."""
+        """The input slot if this symbol is an input; None if it is computed."""
         op, slot, _ = self.tracer.steps[self.index]
         return slot if op is _LOAD and not self.negative else None
 

@@ -1,9 +1,9 @@
-"""Turned pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Each is the derivative of the other by the
-angle, up to sign.
+"""Rotated pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Each is the derivative of the other by
+the angle, up to sign.
 
-The derivative by the angle of a sum of two products with its sine and cosine is another such sum. Where that sum is
-recorded already, as it is wherever a vector is turned, a derivative takes it instead of differentiating sine and
-cosine: one product instead of two, and one sum.
+The derivative, by an angle, of a sum of two products with the angle's sine and cosine is another such sum. If a vector
+is rotated, this other sum is recorded already. The derivative then uses it instead of differentiating sine and cosine.
+This takes one product instead of two products and one sum.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ _SUMS = (Op.ADD, Op.SUB)
 
 
 class Part(NamedTuple):
-    """A value that a turned one is linear in: its index, and the sine or cosine, with sign, that multiplies it."""
+    """A value on which a rotated value depends linearly: its index, and the sine or cosine, with sign, by which it is
+    multiplied."""
 
     value: int
     factor: Symbol
 
 
 class Turned(NamedTuple):
-    """One value of a turned pair, by the angle and by what is turned.
+    """One value of a rotated pair, as a function of the angle and of the rotated values.
 
     angle  index of the angle
-    slope  the recorded derivative by it
-    parts  what is turned
+    slope  the recorded derivative by the angle
+    parts  the rotated values
     """
 
     angle: int
@@ -49,7 +50,7 @@ class _Product(NamedTuple):
 
 
 class TurnedPairs:
-    """Finds turned pairs among a tracer's values.
+    """Finds rotated pairs among a tracer's values.
 
     needed  for each value whether it is used anyway; other values are not worth computing
     """
@@ -59,7 +60,8 @@ class TurnedPairs:
         self._uses = _uses(tracer, needed)
 
     def of(self, index: int) -> Turned | None:
-        """Value `index` as one of a turned pair; None where it is none, or its slope is not recorded."""
+        """Return the rotated pair to which value `index` belongs. None if there is none, or if its derivative is not
+        recorded."""
         op, a, b = self._tracer.steps[index]
         if op is Op.MUL:
             for product in self._products(index):

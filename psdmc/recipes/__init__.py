@@ -1,1 +1,1 @@
-"""The parts that a generated function is made of; the functions themselves are in psdmc/functions."""
+"""The parts from which generated functions are made; the functions themselves are in psdmc/functions."""

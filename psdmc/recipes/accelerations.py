@@ -1,4 +1,4 @@
-"""Forward dynamics on a trace's ingredients, which several functions need."""
+"""Forward dynamics, recorded on symbols for all functions that need it."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ MASS_MATRIX = SymmetricMatrix(
 
 
 def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Arrow]:
-    """n accelerations M^-1 (tau - h), and the factors of M.
+    """Return n accelerations M^-1 (tau - h), and the factors of M.
 
-    The mass matrix is factorized before the bias is found: its divisions depend on each other, and the processor
-    computes the recursion meanwhile.
+    The mass matrix is factorized before the bias h is computed. Its divisions depend on each other, and the processor
+    can compute the recursion for h meanwhile.
     """
     factors = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
@@ -38,7 +38,8 @@ def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], 
 def accelerations_and_pivots(
     g: Ingredients, tau: Sequence[Scalar]
 ) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
-    """nv accelerations M^-1 (tau - h) and the nv pivots of M, by the way that the choices say."""
+    """Return nv accelerations M^-1 (tau - h) and the nv pivots of M, by a factorized mass matrix or by articulated
+    bodies, as `choices` says."""
     if not g.choices.articulated:
         found, factors = accelerations(g, tau)
         return found, factors.pivots

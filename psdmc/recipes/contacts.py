@@ -1,4 +1,4 @@
-"""Contacts on a trace's ingredients, on arrays and in Pinocchio, which several functions need."""
+"""Contacts, for several functions: on symbols that record code, on arrays of states, and in Pinocchio."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 class Held(NamedTuple):
-    """Which rows of the contacts the world holds, and how.
+    """The contacts' active rows, that is, the rows whose accelerations the world prescribes, and the regularisation.
 
     named   the named frames
     active  an entry for each contact
     mu      regularisation
-    si      gives a constant from its value and its unit
+    si      returns a constant from its value and its unit
     """
 
     named: Sequence[NamedFrame]
@@ -77,7 +77,7 @@ class Held(NamedTuple):
     def solved(
         self, factors: Factors, jacobian: Rows, load: Sequence[Scalar], wanted: Sequence[Scalar]
     ) -> tuple[Constrained, list[Scalar]]:
-        """The solution of `constrained`, and a sign for each contact: -1 where there is none."""
+        """Return the solution of `constrained`, and a sign for each contact, which is -1 if there is no solution."""
         si, rows = self.si, [each.rows for each in self.named if each.rows]
         shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
         unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
@@ -105,7 +105,8 @@ class Held(NamedTuple):
 def held_on_arrays(
     robot: RobotOnArrays, given: Mapping[str, Array], wanted: Callable[[Array], Array]
 ) -> tuple[Array, Array, Array]:
-    """(k, nv) x, (k, rows) f and the pivots of `constrained` without a load; `wanted` (k, rows) from J (k, rows, nv)."""
+    """Return x (k, nv), f (k, rows) and the pivots of `constrained` without a load. `wanted` computes (k, rows) from J
+    (k, rows, nv)."""
     q, count = list(given["q"].T), len(given["q"])
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])
@@ -124,7 +125,8 @@ def held_on_arrays(
 def dense_solution(
     robot: Reference, given: Mapping[str, Array], jacobian: Array, load: Array, wanted: Array
 ) -> tuple[Array, Array]:
-    """(k, nv) x and (k, rows) f of the dense systems [[M, -J^T], [J, mu]] of the active rows, by Pinocchio's M."""
+    """Solve the dense systems [[M, -J^T], [J, mu]] of the active rows for x (k, nv) and f (k, rows), with Pinocchio's
+    M."""
     counts = [rows for _, rows in robot.contacts]
     masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
     found = np.concatenate([load, np.zeros_like(wanted)], axis=1)

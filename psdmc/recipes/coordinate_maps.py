@@ -1,4 +1,4 @@
-"""How coordinates and rates of joints go over into each other, as matrices on arrays of states."""
+"""Matrices that convert changes of joint coordinates to joint rates and back, on arrays of states."""
 
 from __future__ import annotations
 
@@ -15,31 +15,32 @@ from psdmc.robot.mechanism import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateMaps:
-    """Of the joints in a row; q (k, nq), qd (k, nv)."""
+    """Conversions between coordinate changes and rates, for a sequence of joints; q (k, nq), qd (k, nv)."""
 
     joints: Sequence[JointType]
 
     def rates(self, q: Array) -> Array:
-        """(k, nq, nv) rates of the coordinates by rates."""
+        """Return (k, nq, nv) the derivatives of the coordinates' rates of change by the joint rates."""
         parts = self._parts(q, None)
         return _diagonal(
             [_columns(partial(kind.coordinate_rates, own), kind.nv, len(q)) for kind, own, _ in parts]
         )
 
     def bent(self, q: Array, qd: Array) -> Array:
-        """(k, nq, nv) the same rates of the coordinates, at fixed rates, by small motions along the tangent."""
+        """Return (k, nq, nv) the derivatives of the coordinates' rates of change, at fixed joint rates, by small
+        motions along the tangent."""
         parts = self._parts(q, qd)
         return _diagonal(
             [_columns(partial(kind.rates_bent, own, way), kind.nv, len(q)) for kind, own, way in parts]
         )
 
     def tangents(self, q: Array) -> Array:
-        """(k, nv, nq) motions along the tangent of the restored q by those of its coordinates."""
+        """Return (k, nv, nq) the derivatives of motions along the tangent of the normalized q by the coordinates."""
         parts = self._parts(q, None)
         return _diagonal([_columns(partial(kind.tangent, own), kind.nq, len(q)) for kind, own, _ in parts])
 
     def restored(self, q: Array) -> Array:
-        """(k, nq) with quaternions of length one and so on."""
+        """Return (k, nq) the nearest valid coordinates; for example, quaternions get length one."""
         return columns([x for joint, own, _ in self._parts(q, None) for x in joint.restored(own)], len(q))
 
     def _parts(self, q: Array, qd: Array | None) -> Iterator[tuple[JointType, list[Array], list[Array]]]:

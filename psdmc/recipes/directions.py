@@ -1,4 +1,5 @@
-"""Derivatives along a direction: tangents of inputs, cotangents of outputs, and torques differentiated by both."""
+"""Derivatives along directions: tangents of inputs, cotangents (weights) of outputs, and derivatives of torques by
+both."""
 
 from __future__ import annotations
 
@@ -68,7 +69,8 @@ _FREE = "free_qdd"
 def torque_gradients(
     g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
-    """Gradients of the weighted torques by q (nv, along the tangent) and by qd, at fixed computed accelerations."""
+    """Return the gradients of the weighted torques by q (nv, along the tangent) and by qd. The computed accelerations
+    are held fixed."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
     found = substituted([*by_q, *by_qd], free, qdd)
@@ -76,7 +78,8 @@ def torque_gradients(
 
 
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
-    """l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, Y their regressor."""
+    """Return l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, where Y is the
+    regressor."""
     theta_b, bodies, drives = g.by_theta()
     loose, free = replace(g, bodies=bodies, drives=drives), _free(g, qdd)
     (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base_acceleration), weights, (theta_b,))
@@ -84,7 +87,7 @@ def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[
 
 
 def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
-    """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
+    """Return the torques' derivatives along the inputs dq and dqd. The computed accelerations are held fixed."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     along = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name]]
     return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
@@ -120,7 +123,8 @@ def with_parameter_gradient(
     reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
     pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
 ) -> Recipe:
-    """The recipe of `state`'s function with the gradient by theta_b as one more output, called NAME_parameters."""
+    """Return the recipe of a function NAME_parameters, which is the function of `state` with the gradient by theta_b as
+    one more output."""
     known = state.signature
     return Recipe(
         Signature(

@@ -1,4 +1,4 @@
-"""A robot's dynamics on arrays of states by psdmc.dynamics, for the NumPy references of functions."""
+"""A robot's dynamics on arrays of states, for the NumPy references with which generated functions are compared."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RobotOnArrays:
-    """A chain with standard parameters x, (11 n,) about the link frames, which have the torques of theta_b.
+    """A robot with standard parameters x, (11 n,) about the link frames, that give the same torques as theta_b.
 
     lift   (11 n, l) theta_b to such parameters
     """
@@ -36,7 +36,7 @@ class RobotOnArrays:
 
     @staticmethod
     def of(model: DynamicsModel, theta_b: Array) -> RobotOnArrays:
-        """The robot of a model, with these base parameters."""
+        """Return the robot of a model, with these base parameters."""
         return RobotOnArrays(model.mechanism, times(model.representative, theta_b), model.representative)
 
     @property
@@ -65,7 +65,7 @@ class RobotOnArrays:
 
     @cached_property
     def solids(self) -> tuple[Body, ...]:
-        """The links' own bodies, from the chain's standard parameters."""
+        """The real bodies of the links, from the robot's standard parameters."""
         return bodies_of(self.chain, self.chain.parameters)
 
     def torques(
@@ -77,8 +77,8 @@ class RobotOnArrays:
         qd_r: Array | None = None,
         external: Mapping[int, Wrench] = NO_WRENCHES,
     ) -> Array:
-        """(k, n) joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, with the base's acceleration and external
-        wrenches."""
+        """Compute (k, n) joint torques M qdd + C(q, qd) qd_r, with this acceleration of the base and external wrenches.
+        Without qd_r, qd_r = qd."""
         rates = None if qd_r is None else list(qd_r.T)
         given = (list(q.T), list(qd.T), list(qdd.T))
         torques = inverse_dynamics(
@@ -87,7 +87,7 @@ class RobotOnArrays:
         return columns(torques, len(q))
 
     def torque_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """(k, n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
+        """Compute the derivatives of the torques by q, qd and qdd, (k, n, n) each; row i has the derivatives of tau[i]."""
         given = (list(q.T), list(qd.T), list(qdd.T))
         found = inverse_dynamics_derivatives(
             self.frames, self.bodies, self.drives, *given, self.base_acceleration
@@ -114,12 +114,12 @@ def columns(values: Sequence[Scalar], count: int) -> Array:
 
 
 def matrix(rows: Sequence[Sequence[Scalar]], count: int) -> Array:
-    """(count, rows, columns) from numbers or (count,) arrays."""
+    """Return an array (count, rows, columns) from rows whose entries are numbers or (count,) arrays."""
     return np.stack([columns(row, count) for row in rows], axis=1)
 
 
 def entries(values: Any, count: int) -> Array:
-    """(count, ...) from a number, a (count,) array, or nested sequences of them."""
+    """Return an array (count, ...) from a number, a (count,) array, or nested sequences of them."""
     if isinstance(values, list | tuple):
         return np.stack([entries(value, count) for value in values], axis=1)
     return np.broadcast_to(np.asarray(values, dtype=np.float64), (count,))

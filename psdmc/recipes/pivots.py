@@ -1,4 +1,4 @@
-"""Pivots of matrices that are singular at some states."""
+"""Tests for matrices that are singular at some states, from their pivots and inverses."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ so many roundings: 7.1e-15 in float64, 3.8e-6 in float32. That of arms with too 
 
 
 def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], Scalar]:
-    """The inverse of a symmetric matrix, and 1 if the matrix is positive definite, -1 if it is not, or is singular but for
-    rounding.
+    """Return the inverse of a symmetric matrix, and a sign: 1 if the matrix is positive definite, else -1. A matrix
+    that is singular within rounding has the sign -1, too.
 
-    Rounding gives a singular matrix pivots of any sign, but its inverse is large, in whatever order it is eliminated. In
-    x < x + 1 the 1 is lost if x is too large for the precision of the code's reals. Nothing is less than NaN.
+    Rounding gives a singular matrix pivots of any sign, but its inverse is large, in whatever order it is eliminated.
+    The comparison x < x + 1 is false if x is so large that the 1 is lost in rounding. All comparisons with NaN are
+    false.
     """
     factors = factorize(rows)
     found, sign = inverse(factors), 1.0
@@ -28,7 +29,9 @@ def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar
 
 
 def regular(sign: Scalar, pivot: Scalar, entry: Scalar, inverse_entry: Scalar) -> Scalar:
-    """The sign, -1 if a pivot is not positive, or the matrix is singular but for rounding, by this entry of its diagonal and
-    that of its inverse."""
+    """Return the given sign, or -1 if the pivot is not positive or the matrix is singular within rounding.
+
+    The test uses one entry of the matrix's diagonal and the same entry of the inverse's diagonal.
+    """
     x = LOST * (entry * inverse_entry)
     return Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)

@@ -1,4 +1,5 @@
-"""The form in which a file of psdmc/functions says how one generated function is made and compared with others."""
+"""The recipe of a generated function. It says how the function is computed and with what it is compared. Each file of
+psdmc/functions contains one."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ Arrays = dict[str, Array]
 
 
 class ByTheta(NamedTuple):
-    """l base parameters as symbols, and the bodies and drives that stand for them."""
+    """Base parameters as l symbols, and the bodies and drive inertias that depend on them."""
 
     theta_b: list[Any]
     bodies: tuple[Body, ...]
@@ -38,29 +39,29 @@ class ByTheta(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ingredients:
-    """What a trace runs on: symbols, and one robot's constants.
+    """Everything from which a function is recorded: symbols for its inputs, and one robot's constants.
 
-    They are quantities: each has a dimension and a value in units that lowering chooses (lower/units.py). A sum of unlike
-    ones is an error.
+    Each is a quantity with a dimension and a value in units that lowering chooses (lower/units.py). A sum of unlike
+    quantities is an error.
 
     frames             n joint frames
-    base_acceleration  minus gravity, along the axes that the first frame turns from
-    bodies             n bodies about the joint frames, and
-    drives             n drive inertias, from theta_b: they have the torques of the real ones and nothing else of them.
-                       Empty for functions without theta_b
-    choices            how the recursions are arranged
-    base_axes          axes that the first frame turns from as columns in the base frame, and
-    base_origin        their origin there
+    base_acceleration  minus gravity, along the base's axes (see base_axes)
+    bodies             n bodies about the joint frames, from theta_b. They have the torques of the real ones, but not
+                       their masses. Empty for functions without theta_b
+    drives             n drive inertias, from theta_b; empty likewise
+    choices            the arrangement of the recursions
+    base_axes          the axes in which the first frame is given, as columns in the base frame
+    base_origin        the origin from which the first frame is given, in the base frame
     link_frames        n, the file's link frames in the joint frames
     named              the named frames, placed in the joint frames
-    tip                the tip frame, in the joint frame of
-    tip_body           the body that it is fixed to
+    tip                the tip frame, in the joint frame of tip_body
+    tip_body           the body to which the tip frame is fixed
     lift               (11 n, l) theta_b to standard parameters about the link frames
-    link_bodies        gives the links' own n bodies about the joint frames, of NaN where unknown
-    si                 gives a constant, from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'); a number without unit is
-                       itself
+    link_bodies        returns the links' real n bodies about the joint frames; NaN if unknown
+    si                 returns a constant from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'). A number without unit
+                       needs no si
     inputs             the function's inputs by name
-    by_theta           theta_b as symbols, also where it is compiled in, for derivatives by it: the derivatives of
+    by_theta           returns theta_b as symbols, also if it is compiled in, for derivatives by it. The derivatives of
                        quantities that are linear in theta_b, such as torques, do not depend on its values
     """
 
@@ -83,7 +84,7 @@ class Ingredients:
 
     @property
     def root(self) -> tuple[Matrix, Vector]:
-        """Axes that the first frame turns from and their origin, in the base frame."""
+        """The axes and the origin, in the base frame, in which the first frame is given."""
         return self.base_axes, self.base_origin
 
     @property
@@ -93,7 +94,7 @@ class Ingredients:
 
 
 class Polynomials(StrEnum):
-    """Which part of the torques expanded in E, P and theta_b a function is; the expanded lowering needs it."""
+    """Which part of the torques' polynomials (in E, P and theta_b) a function computes. The expanded lowering uses it."""
 
     TORQUE = "all terms"
     MASS = "terms of qdd"
@@ -104,7 +105,7 @@ class Polynomials(StrEnum):
 
 
 class Needs(StrEnum):
-    """What a model must have beyond theta_b."""
+    """What a model must have for a function, in addition to theta_b."""
 
     POSITIVE_MASS = "a positive definite mass matrix"
     STANDARD = "standard parameters of its links"
@@ -112,10 +113,10 @@ class Needs(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """Entries of a matrix.
+    """The entries of a matrix that a function with packed output stores.
 
-    function     name of the function that puts out the whole matrix and nothing else
-    places       their (row, column), from the robot and the lift of its base parameters
+    function     name of the function whose only output is the whole matrix
+    places       returns their (row, column), from the robot and the lift of its base parameters
     is_triangle  whether they are a symmetric matrix's lower triangle
     """
 
@@ -128,31 +129,31 @@ class Packing:
 class Recipe:
     """One generated function.
 
-    signature    what it reads and puts out
+    signature    its name, inputs and outputs
     title        its name in prose
-    trace        its arithmetic over psdmc.dynamics on symbols
-    reference    the same in NumPy on the MODEL's own frames and bodies, no lowering involved: (robot, given) to the values
-                 of all outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
-    against      name of Pinocchio's function that it is compared with
+    trace        records its arithmetic on symbols, with the algorithms of psdmc.dynamics
+    reference    the same in NumPy on the MODEL's own frames and bodies, without lowering: (robot, given) to the values of
+                 all outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
+    against      name of Pinocchio's function with which it is compared
     pinocchio    the values of Pinocchio's function: (model on arrays, given)
-    starts       name of the function whose search decides where frames sit and the unit of length
-    shares       name of the function whose whole arrangement is used; only the choices within it are made again
+    starts       name of the function whose search chooses the positions of frames and the unit of length
+    shares       name of the function whose whole arrangement is used; only the choices of recursion are made again
     matters      fields of Choices that make a difference to it
-    polynomials  what the expanded lowering needs; None: there is none for this function
-    times_theta  whether its outputs times theta_b are torques and are compared as such: `pinocchio` gives these torques
-    gradient     name of its output that is the gradient by theta_b of a number linear in theta_b. It is compared as that
-                 number, times theta_b, which `pinocchio` gives
-    beside       name of the function whose values this one's are differences of: errors are measured relative to those
-    needs        what the model must have; left out: a positive definite mass matrix where the signature factorises one
-    in_limbs     whether its algorithms say what they sum over limbs (Frame.limbs), so that these can run in lanes
-    accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
-    default      whether it is generated where no functions are named, and
-    default_where_wide  whether it is then where some joint has several coordinates
+    polynomials  which part of the torques' polynomials it is; None: it has no expanded lowering
+    times_theta  whether its outputs times theta_b are torques and are compared as such: `pinocchio` returns these torques
+    gradient     name of its output that is the gradient, by theta_b, of a number linear in theta_b. Multiplied by
+                 theta_b, the gradient is compared with that number, which `pinocchio` returns
+    beside       name of a function if outputs are differences of that function's values: errors are relative to those
+    needs        what the model must have; left out: a positive definite mass matrix if the signature factorises one
+    in_limbs     whether its algorithms mark sums over limbs (Frame.limbs), so that limbs can run in SIMD lanes
+    accelerates  whether it computes accelerations, by the cheaper of two algorithms (Choices.articulated)
+    default      whether it is generated if the user names no functions
+    default_where_wide  the same for robots with joints of several coordinates
     benched      whether `make bench` measures it
-    packs        the matrix some of whose entries it puts out: its own function is lowered, and the other entries are left
-                 out. Its `trace`, and the values of `pinocchio`, are that function's
-    regions      its body as regions, which the C is made of; its `trace` is those regions written out. None: the C is the
-                 straight line
+    packs        the entries of another function's matrix that it stores: that function is lowered, and the other entries are
+                 left out. `trace`, and the values of `pinocchio`, are those of that function
+    regions      its body as loops and calls, from which C is printed; `trace` executes them. None: C is printed from
+                 straight-line code
     """
 
     signature: Signature

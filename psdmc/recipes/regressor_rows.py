@@ -1,4 +1,5 @@
-"""The torques' coefficients of theta_b, over symbols and on arrays, for both regressors."""
+"""The rows of the regressor, whose entries multiply theta_b, on symbols and on arrays. Both regressor functions use
+them."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from psdmc.robot.mechanism import Array
 def traced_rows(
     g: Ingredients, qdd: Sequence[Scalar], qd_r: Sequence[Scalar] | None = None
 ) -> list[list[Scalar]]:
-    """n rows of l entries: torques M qdd + C(q, qd) qd_r + g by theta_b, qd_r = qd if not given."""
+    """Return n rows of l entries: the derivatives of torques M qdd + C(q, qd) qd_r + g by theta_b. Without qd_r, qd_r =
+    qd."""
     needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
     q, qd = g.inputs["q"], g.inputs["qd"]
     found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base_acceleration, qd_r)
@@ -34,7 +36,7 @@ def _entry(weights: Sequence[tuple[int, float]], row: dict[int, Scalar]) -> Scal
 
 
 def rows_on_arrays(robot: RobotOnArrays, q: Array, qd: Array, qdd: Array, qd_r: Array | None = None) -> Array:
-    """(k, n, l): `traced_rows` on arrays of states."""
+    """Return (k, n, l), the same as `traced_rows` on arrays of states."""
     wanted = np.flatnonzero(robot.lift.any(axis=1)).tolist()
     places = [joint.link_frame for joint in robot.chain.joints]
     states = (list(q.T), list(qd.T), list(qdd.T))

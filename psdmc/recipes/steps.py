@@ -1,4 +1,4 @@
-"""One step of an integrator: its quantities, and its Jacobians from the derivatives of accelerations."""
+"""One step of an integrator: its inputs and outputs, and its Jacobians from the derivatives of accelerations."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ def stepped(values: Sequence[Scalar], rates: Sequence[Scalar], dt: Scalar) -> li
 
 
 def turned(frames: Sequence[Frame], q: Array, way: Array) -> Array:
-    """(k, nq) positions where constant rates lead from q (k, nq); `way` (k, nv) are these times seconds."""
+    """Return (k, nq) the positions after motion from q (k, nq) at constant rates; `way` (k, nv) are the rates times
+    seconds."""
     return columns(integrated(frames, list(q.T), list(way.T)), len(q))
 
 
@@ -66,10 +67,11 @@ def step_on_arrays(given: Mapping[str, Array]) -> Array:
 def semi_implicit(
     by_q: Rows, by_qd: Rows, by_tau: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]
 ) -> tuple[list[Any], list[Any]]:
-    """A and B of semi-implicit Euler from the derivatives of accelerations, nv x nv each, along the tangents at both ends.
+    """Return the Jacobians A and B of a semi-implicit Euler step from the derivatives of accelerations, nv x nv each.
+    They are along the tangents at both ends.
 
-    d qd_next = d qd + dt d qdd and, where q is a vector, d q_next = d q + dt d qd_next; `slopes` have what takes the place
-    of the ones of joints of several rates.
+    d qd_next = d qd + dt d qdd and, if q is a vector, d q_next = d q + dt d qd_next. For joints of several rates,
+    `slopes` replace the factors one in the latter.
     """
     rates = [
         [dt * x for x in row] + _plus_one(i, [dt * x for x in own])
@@ -112,8 +114,8 @@ def _plus_one(i: int, row: list[Scalar]) -> list[Scalar]:
 def semi_implicit_on_arrays(
     by_q: Array, by_qd: Array, by_tau: Array, dt: Array, slopes: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """(k, 2 nv, 2 nv) and (k, 2 nv, nv): `semi_implicit` on arrays, as matrices of the two half steps; `slopes` (k, nv, nv)
-    are how `integrate` moves with either of its arguments."""
+    """Return the Jacobians (k, 2 nv, 2 nv) and (k, 2 nv, nv) of `semi_implicit`, computed on arrays as products of the
+    two half steps. `slopes` (k, nv, nv) are the derivatives of `integrate` by its two arguments."""
     by_start, by_way = slopes
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
@@ -124,7 +126,7 @@ def semi_implicit_on_arrays(
 
 
 def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:
-    """(k, nv, nv) each: how where `integrate` comes to moves with its start, and with the way (k, nv)."""
+    """Return (k, nv, nv) each: the derivatives of the end position of `integrate` by its start and by the way (k, nv)."""
     count, nv = way.shape
     by_start, by_way = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
     first = first_rates(frames)

@@ -1,4 +1,4 @@
-"""Newton-Euler on a trace's ingredients, which several functions need."""
+"""Newton-Euler, recorded on symbols for all functions that need it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def torques(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """n joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, for this acceleration of the base, less the
-    torques of external wrenches on the links."""
+    """Return n joint torques M qdd + C(q, qd) qd_r, for this acceleration of the base. Without qd_r, qd_r = qd. The
+    torques of external wrenches on the links are subtracted."""
     q = g.inputs["q"]
     return inverse_dynamics(
         g.frames, g.bodies, g.drives, q, qd, qdd, base_acceleration, g.choices, qd_r, external
@@ -29,7 +29,8 @@ def torques(
 
 
 def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
-    """The bodies that one rate moves, with those that carry them, as a robot, and the whole robot's numbers of its rates."""
+    """Return a robot of the bodies that one rate moves and those that carry them, and the numbers of its rates in the
+    whole robot."""
     frames, owners = g.frames, joints_of_rates(g.frames)
     moved: set[int] = set()
     for i, frame in enumerate(frames):

@@ -1,5 +1,5 @@
-"""Coordinates of joints: each joint's q is a coordinate of its own, follows another's (q_joint = ratio q_leader +
-offset), or is constant."""
+"""Coordinates of joints. The position q of a joint is a coordinate of its own, follows another joint (a mimic joint,
+q_joint = ratio q_leader + offset), or is constant."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from psdmc.robot.joints import JointType
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """One joint's q as ratio * q[leader] + offset.
+    """Describes the position q of one joint as ratio * q[leader] + offset.
 
-    leader   number of the joint that has the coordinate; None: the joint is held at `offset`
-    ratio    of the two rates, in the joint's unit per the leader's
+    leader   index of the joint that has the coordinate; None: the joint is locked at `offset`
+    ratio    ratio of the two rates, in the joint's unit per the leader's unit
     offset   rad or m
     """
 
@@ -33,18 +33,18 @@ class Coordinate:
 
 
 def own_coordinates(n: int) -> tuple[Coordinate, ...]:
-    """The coordinates of n joints that follow no other."""
+    """Return the coordinates of n joints of which none is a mimic joint."""
     return tuple(Coordinate(i) for i in range(n))
 
 
 def leaders(coordinates: Sequence[Coordinate]) -> tuple[int, ...]:
-    """The joints that have a coordinate of their own, in order: q has one entry for each."""
+    """Return the indices of the joints that are not mimic joints, in order. Each of them has entries in q."""
     return tuple(i for i, coordinate in enumerate(coordinates) if coordinate == Coordinate(i))
 
 
 def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coordinate, ...]:
-    """The coordinates, each joint's own where none are given; ValueError where a joint follows one that follows
-    another."""
+    """Return the coordinates of n joints. If none are given, each joint has its own. Raises ValueError if a mimic
+    joint follows another mimic joint."""
     if not coordinates:
         return own_coordinates(n)
     if len(coordinates) != n:
@@ -60,11 +60,12 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Following:
-    """How all joints move with the coordinates: q_joints = shares q + offsets, rates_joints = ratios rates.
+    """Matrices that give the positions and rates of all joints, mimic joints included, from q and qd: q_joints =
+    shares q + offsets, rates_joints = ratios qd.
 
-    shares   (all joints' coordinates, nq)
-    offsets  (all joints' coordinates,)
-    ratios   (all joints' rates, nv)
+    shares   (coordinates of all joints, nq)
+    offsets  (coordinates of all joints,)
+    ratios   (rates of all joints, nv)
     """
 
     shares: NDArray[np.float64]
@@ -82,15 +83,19 @@ class Following:
         )
 
     def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All joints' (..., n) from (..., nq)."""
+        """Return the positions (..., n) of all joints, mimic joints included, from q (..., nq)."""
         return np.asarray(times(q, self.shares.T) + self.offsets)
 
     def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All joints' (..., n) from (..., nv)."""
+        """Return the rates (..., n) of all joints, mimic joints included, from qd (..., nv)."""
         return np.asarray(times(qd, self.ratios.T))
 
     def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
-        """Torques of the joints, or whatever has an axis of them, summed onto the coordinates."""
+        """Add the torques of mimic joints, times their ratios, to those of the joints that they follow.
+
+        values  array with an axis of all joints, which becomes an axis of length nv
+        axis    that axis
+        """
         return np.moveaxis(times(np.moveaxis(values, axis, -1), self.ratios), -1, axis)
 
 

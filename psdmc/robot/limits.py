@@ -1,7 +1,7 @@
-"""Limits of a robot file: sizes and magnitudes. Every message that refuses one states it.
+"""Limits of the sizes and numbers in a robot file. An error message about such a limit states it.
 
-No robot has numbers beyond them. With such numbers, squares and products of lengths and masses would exceed the range
-of 64-bit numbers, and the error would show far from its cause.
+The limits are far beyond any real robot. With larger numbers, squares and products of lengths and masses would exceed
+the range of 64-bit floats, and the error would appear far from its cause.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ TINIEST = 1e-300
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Accepted magnitudes of one quantity: zero, or from `least` to `most`, in `unit`."""
+    """The accepted magnitudes of a quantity: zero, or from `least` to `most`, in `unit`."""
 
     least: float
     most: float
@@ -93,7 +93,7 @@ LONGEST_LENGTH = Range(1e-6, 1e4, "m")
 
 
 def shown(value: object) -> str:
-    """A file's text or value for a message: quoted as Python quotes it, shortened where it is long."""
+    """Return a text or value of a file for a message: quoted as in Python, and shortened if it is long."""
     try:
         text = repr(value)
     except ValueError:
@@ -103,13 +103,13 @@ def shown(value: object) -> str:
 
 
 def joined(faults: Sequence[str]) -> str:
-    """Faults in one line, shortened where there are many."""
+    """Return a list of faults as one line, shortened if there are many."""
     more = [f"and {len(faults) - MOST_FAULTS} more"] if len(faults) > MOST_FAULTS else []
     return "; ".join([*faults[:MOST_FAULTS], *more])
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:
-    """Names in quotes for a message, shortened where there are many."""
+    """Return names in quotes for a message, shortened if there are many."""
     quoted = [f"'{name}'" for name in names]
     return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
 

@@ -1,13 +1,13 @@
-"""Parameters assumed zero: the values that a link keeps, and the parameter vectors that remain possible.
+"""Applies assumptions that link parameters are zero: which values remain, and which parameter vectors are possible.
 
-A zero about the link frame ("Ixz") removes a coordinate. A zero about the centre of mass ("rx", "Ixz@com") does not:
-the frame's Ixz is Ixz@com - m rx rz, and remains while rx and rz do. The result is the span of all parameter vectors
-that fulfil the statement. They are polynomials in m, r and the inertia about the centre of mass,
+A zero about the link frame ("Ixz") removes a parameter. A zero about the centre of mass ("rx", "Ixz@com") does not:
+the frame's Ixz is Ixz@com - m rx rz and can differ from zero while rx and rz do. The result is the span of all
+parameter vectors that fulfil the assumption. They are polynomials in m, r and the inertia about the centre of mass,
 
     (m, m r, I_com + sum over i, j of m r_i r_j V_ij),
 
-whose monomials are linearly independent, so that the span is that of the coefficient vectors of the monomials that the
-zeros leave: exact, without sampling.
+The monomials are linearly independent. So the span is exactly that of the coefficient vectors of the remaining
+monomials.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """Complete an assumption, in a fixed order: no mass means no body, no first moment puts the centre of mass at the
-    origin."""
+    """Return the assumptions with their consequences, in a fixed order. Zero mass implies a massless link; zero first
+    moments imply that the centre of mass is at the origin."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY_PARAMETERS]) | set(COM_NAMES)
@@ -40,7 +40,7 @@ def canonical(names: Collection[str]) -> tuple[str, ...]:
 
 
 def link_span(names: Collection[str]) -> Array:
-    """(11, k) columns that span one link's parameters when `names` are zero, in reduced echelon form."""
+    """Return a basis (11, k) of one link's parameters if `names` are zero, in reduced column echelon form."""
     zero = canonical(names)
     generators = [] if "m" in zero else [_unit("m"), *_moments(zero), *_second_moments(zero)]
     generators += [_unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)]
@@ -52,7 +52,7 @@ def link_span(names: Collection[str]) -> Array:
 
 
 def link_values(parameters: Array, names: Collection[str]) -> Array:
-    """(11,) standard parameters with the statements applied, those about the centre of mass first."""
+    """Return the standard parameters (11,) with the assumed zeros applied, first those about the centre of mass."""
     zero = canonical(names)
     values = np.array(parameters, dtype=float)
     if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY_PARAMETERS]).any():
@@ -67,7 +67,7 @@ def link_values(parameters: Array, names: Collection[str]) -> Array:
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:
-    """(11 n, k) from n blocks (11, k_i)."""
+    """Return the block-diagonal matrix (11 n, k) of n blocks (11, k_i)."""
     span = np.zeros((sum(b.shape[0] for b in blocks), sum(b.shape[1] for b in blocks)))
     row = column = 0
     for block in blocks:
@@ -79,9 +79,10 @@ def block_diagonal(blocks: Sequence[Array]) -> Array:
 def parse_statements(
     statements: Iterable[str], link_names: Sequence[str], joint_names: Sequence[str], source: str
 ) -> tuple[tuple[str, ...], ...]:
-    """Zero names per link from texts such as "link5:rx" or "link5:Ixz@com"; joints' names do too.
+    """Return the names of zero parameters per link, from texts such as "link5:rx" or "link5:Ixz@com". A joint's name
+    can replace the name of its link.
 
-    InputError names every text that does not fit, and what would.
+    Raises InputError with every wrong text and the accepted names.
     """
     found: list[list[str]] = [[] for _ in link_names]
     problems = []
@@ -104,9 +105,9 @@ def parse_statements(
 
 
 def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
-    """Reduced column echelon form of (rows, k) columns, dependent ones dropped.
+    """Return the reduced column echelon form of (rows, k) columns, without dependent columns.
 
-    The entries met here are small integers, so elimination is exact; `tolerance` only guards a division.
+    The entries in this module are small integers, so the elimination is exact. `tolerance` only protects a division.
     """
     work = np.array(columns, dtype=float)
     rank = 0
@@ -123,13 +124,14 @@ def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
 
 
 def leading_rows(span: Array) -> NDArray[np.int64]:
-    """(k,) row of each column's leading one, for (rows, k) columns in reduced echelon form."""
+    """Return for each column of a reduced echelon form (rows, k) the row of its leading one, (k,)."""
     leads: NDArray[np.int64] = np.argmax(span != 0.0, axis=0).astype(np.int64)
     return leads
 
 
 def outside(span: Array, x: Array) -> Array:
-    """Magnitudes by which x misses the vector of the span that has its leading entries: zero where it lies in the span."""
+    """Return the magnitudes by which x differs from the vector in the span with the same leading entries. They are
+    zero if x is in the span."""
     missed: Array = np.abs(x - span @ x[leading_rows(span)])
     return missed
 

@@ -1,4 +1,5 @@
-"""The default target: fixed figures, and C that uses the vectors of whatever machine the compiler builds for."""
+"""The default target: costs that are the same on every machine, and C code that uses the vectors of the machine that
+the compiler builds for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Functions beyond E, P and theta_b compared with Pinocchio: each recipe's NumPy reference with its counterpart."""
+"""Compares the generated functions that do not follow directly from E, P and theta_b with Pinocchio's, by their NumPy
+references."""
 
 from __future__ import annotations
 
@@ -35,8 +36,11 @@ ROUNDED = 1e-4
 def function_errors(
     model: DynamicsModel, theta: Array, robot: OnCoordinates, solvable: bool
 ) -> Iterator[tuple[Recipe, float, str]]:
-    """(recipe, largest error relative to each output's largest value, why there is none) for all functions that are no
-    part of the expansion; `solvable`: whether the mass matrix can be inverted."""
+    """Return for each such function its recipe, the largest error relative to the largest value of each output, and
+    the reason if it was not compared.
+
+    solvable  whether the mass matrix can be inverted
+    """
     arrays = RobotOnArrays.of(model, theta)
     # States and all else that functions read, (STATES, ...) each.
     rng = np.random.default_rng(SEED)

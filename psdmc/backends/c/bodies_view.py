@@ -1,4 +1,4 @@
-"""The function that computes theta_b from all bodies of the robot, as templates print it."""
+"""The function that computes theta_b from all bodies of the robot, in the form that templates print."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesView:
-    """The map as C text, printed for one real type."""
+    """The map from all bodies' parameters to theta_b as C text, for one real type."""
 
     robot: str
     real: CReal
@@ -37,7 +37,7 @@ class BodiesView:
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """{base parameter, factor} of every entry of the map that is not zero, column by column."""
+        """The map's nonzero entries, column by column, as C text {base parameter, factor}."""
         return tuple(
             f"{{{row}, {number(float(column[row]), self.real)}}}"
             for column in self.map.columns.T
@@ -46,7 +46,7 @@ class BodiesView:
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """For each body where the entries of each of its ten parameters end."""
+        """For each body and each of its ten parameters, the index at which the entries of this parameter end."""
         ends = np.cumsum((self.map.columns != 0.0).sum(axis=0)).reshape(self.count, -1)
         return tuple(", ".join(map(str, row)) for row in ends.tolist())
 

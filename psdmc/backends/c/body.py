@@ -1,6 +1,7 @@
-"""The straight-line body of one PROGRAM, line by line, for the body template.
+"""The C code of one PROGRAM (a list of scalar operations), line by line, for the template of function bodies.
 
-Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share vectors.
+Sines and cosines are computed in groups, as early as their angles are known. The angles of one state can then share a
+SIMD vector.
 """
 
 from __future__ import annotations
@@ -40,14 +41,14 @@ def make_body(
     products: Sequence[Product] = (),
     uniform: Collection[str] = UNIFORM_VECTORS,
 ) -> Body:
-    """Lay out a PROGRAM, and products of what it puts out.
+    """Lay out a PROGRAM, and the matrix products that follow it, as sections of C statements.
 
     inputs        vectors of the signature that may be read
     sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
     suffix        of constants: '' or 'f'
     stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
-    in_groups     vectors that are also stored in groups of four, as soon as the last of them is known; where there are
-                  others beside them, STORE_BLOCK stores those
+    in_groups     vectors that are also stored in groups of four, as soon as the last of the four is known; if there are
+                  other vectors, STORE_BLOCK stores those
     uniform       vectors that are the same in all lanes
     """
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
@@ -57,13 +58,13 @@ def make_body(
 
 
 def without_products(sizes: Mapping[str, int], products: Sequence[Multiplication]) -> dict[str, int]:
-    """Vectors that a PROGRAM stores, with their lengths, where it also has the products' outputs."""
+    """Return the vectors that a PROGRAM itself stores, with their lengths, if it also has the outputs of products."""
     outputs = {product.output for product in products}
     return {name: size for name, size in sizes.items() if name not in outputs}
 
 
 def unread(program: Program, inputs: Sequence[str]) -> tuple[str, ...]:
-    """Inputs that the PROGRAM never reads, by name."""
+    """Return the names of the inputs that the PROGRAM never reads."""
     read = {slot.vector for slot in program.inputs()}
     return tuple(name for name in inputs if name not in read)
 
@@ -83,7 +84,8 @@ def sections_of(
     uniform: Collection[str],
     with_zeros: bool = True,
 ) -> tuple[Section, ...]:
-    """The sections of a PROGRAM; `with_zeros`: entries of the vectors in `sizes` that it does not store become zero."""
+    """Return the sections of a PROGRAM's C code. With `with_zeros`, entries of the vectors in `sizes` that the PROGRAM
+    does not store become zero."""
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
     apart = frozenset(beside.difference(in_groups))

@@ -1,7 +1,8 @@
-"""PROGRAM -> C expressions: a value that is used once is written at its use, other values get names.
+"""Translation of a PROGRAM to C expressions. A value that is used once is written at its use; other values get names.
 
-The texts are the same for one state and for one state per lane: a value is `V` (a real, or a vector of them) or uniform
-(the same for all states: constants and what is computed from parameters alone), and C combines scalars with vectors.
+The C text for one state is the same as for one state per SIMD lane. A value has the type `V`, a real or a vector of
+reals, or is uniform, that is, the same for all states. Constants, and values computed from parameters only, are
+uniform.
 """
 
 from __future__ import annotations
@@ -29,23 +30,23 @@ _SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), 
 
 
 class Expr(NamedTuple):
-    """C text of a value, the binding strength of its outermost operator, and its depth of nesting."""
+    """C text of a value, with the binding strength of its outermost operator and its depth of nesting."""
 
     text: str
     binding: int = _ATOM
     depth: int = 0
 
     def beside(self, binding: int, is_right: bool) -> str:
-        """The text as an operand: in brackets unless C would parse the same tree without them."""
+        """Return the text as an operand of another operator, in brackets unless C parses it the same without them."""
         loose = self.binding < binding or (is_right and self.binding in (binding, _UNARY))
         return f"({self.text})" if loose else self.text
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of a PROGRAM's values in C, decided before any text is made.
+    """The C names of a PROGRAM's values, decided before any expression is written.
 
-    named    values that get a name: outputs, and whatever is used more than once
+    named    values that get a name: outputs, and values that are used more than once
     uniform  values that are the same for all states
     """
 
@@ -55,7 +56,7 @@ class Names:
 
     @staticmethod
     def of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> Names:
-        """`shared` are vectors that are the same in all lanes."""
+        """Decide the names of a PROGRAM's values; vectors in `shared` are the same in all lanes."""
         named = [count > 1 for count in program.uses()]
         for _, index in program.outputs:
             named[index] = True
@@ -64,7 +65,7 @@ class Names:
 
 
 def uniform_of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> tuple[bool, ...]:
-    """Of each value whether it is the same for all states."""
+    """For each value of the PROGRAM, whether it is the same for all states."""
     uniform: list[bool] = []
     for op, args, slot, _ in program.body:
         if len(args) == 2 and op in _OPERATORS:
@@ -92,18 +93,19 @@ def _cut_deep_trees(program: Program, named: list[bool]) -> None:
 
 
 def is_call(op: Op) -> bool:
-    """Whether the operation is a macro of its name: what C has no operator for, sines aside."""
+    """Whether the generated C writes this operation as a macro, because C has no operator for it. Sines and cosines are
+    not among these macros."""
     return op in _CALLS
 
 
 def literal(value: float, suffix: str) -> Expr:
-    """A constant that reads back as the same number; with suffix 'f' as the nearest float."""
+    """Return C text of a constant that reads back as the same number; with suffix 'f', as the nearest float."""
     value = rounded_out(value, "float" if suffix else "double")
     return Expr(f"{value!r}{suffix}", _UNARY if str(value).startswith("-") else _ATOM)
 
 
 def combine(op: Op, operands: list[Expr]) -> Expr:
-    """One operation on texts, brackets only where they change the meaning."""
+    """Return C text of one operation on given texts, with brackets only if they change the meaning."""
     if op is Op.NEG:
         return Expr(f"-{operands[0].beside(_UNARY, is_right=True)}", _UNARY, 1 + operands[0].depth)
     symbol, binding = _SYMBOL[op]

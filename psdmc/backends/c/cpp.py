@@ -1,4 +1,4 @@
-"""The C++17 class over the C functions: which members it has and how each calls C."""
+"""The C++17 class that wraps the C functions: its members, and how each member calls C."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from psdmc.backends.c.prototypes import Prototype
 
 @dataclass(frozen=True, slots=True)
 class CppMethod:
-    """One member function.
+    """One member function of the C++ class.
 
-    parameters  on raw pointers
-    call        of the C function, with the class's own theta_b where it takes one
+    parameters  raw pointers
+    call        C++ text of the call of the C function, with the theta_b of the class if the function takes it
     """
 
     name: str
@@ -30,9 +30,10 @@ class CppMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppArrayMethod:
-    """A member function on std::array.
+    """A member function that takes and returns std::array.
 
-    output  what is returned, of type result_type; '' where several results, or a result beside a status, are parameters
+    output  the output that is returned, of type result_type; '' if all outputs are parameters, because there are several or
+            the C function returns a status
     """
 
     name: str
@@ -45,9 +46,10 @@ class CppArrayMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppClass:
-    """A class: the functions that need no parameters, those with the robot's own, or with a user's.
+    """One C++ class. There are three: for functions without parameters, with the robot's own parameters, or with a
+    user's.
 
-    theta  whether it holds theta_b
+    theta  whether the class holds theta_b
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Friction of a calibrated model, as templates print it."""
+"""The friction of a calibrated model, in the form that templates print."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class FrictionView:
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """What else the calibration found, in words without names from files."""
+        """What the calibration found besides this friction, in sentences without names from files."""
         return self.friction.beyond
 
     @property
@@ -79,13 +79,16 @@ class FrictionView:
 
     @property
     def speeds(self) -> tuple[str, ...]:
-        """Of the self-test: rest, a tenth of the speed over which the sign changes, both directions beyond it, and the
-        numbers of laws that have some."""
+        """The joint speeds at which the self-test compares friction, as C text.
+
+        They are zero, a tenth of the speed over which friction changes sign, speeds in both directions, and speeds that
+        are constants of a friction law.
+        """
         return self._printed(self._states)
 
     @property
     def expected(self) -> tuple[str, ...]:
-        """Friction at these, positions being equal to the speeds."""
+        """The expected friction at the speeds of the self-test, as C text. Positions are equal to the speeds there."""
         return self._printed(self.friction.torque(self._states, self._states))
 
     @property

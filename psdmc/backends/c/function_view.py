@@ -1,4 +1,4 @@
-"""Functions in the form that templates print: each with its kernels, and its C files."""
+"""The generated functions in the form that templates print: each with its kernels and its C files."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from psdmc.robot.mechanism import BASE_FRAME
 
 @dataclass(frozen=True, slots=True)
 class FunctionView:
-    """A function with its kernels, baked first.
+    """One function with its kernels; the kernel with compiled-in parameters comes first.
 
-    shape  of its outputs, and of inputs that are no vectors of all joints, in words
+    shape  in words, the shape of its outputs, and of inputs that are not vectors with an entry per joint
     """
 
     name: str
@@ -34,7 +34,7 @@ class FunctionView:
 
     @property
     def is_regions(self) -> bool:
-        """Whether it is made of loops and calls."""
+        """Whether the function's C code consists of loops and calls instead of a straight line."""
         return any(kernel.regions for kernel in self.kernels)
 
     @property
@@ -44,14 +44,15 @@ class FunctionView:
 
     @property
     def limbs(self) -> tuple[int, ...]:
-        """Numbers of limbs in lanes, over all kernels."""
+        """The numbers of limbs (such as 4 legs) that the function's kernels compute in SIMD lanes."""
         return tuple(
             sorted({count for kernel in self.kernels if kernel.limbs for count in kernel.limbs.counts})
         )
 
     @property
     def units(self) -> tuple[FunctionView, ...]:
-        """One for each C file, which has its name: the whole function, or a kernel each where bodies are in parts."""
+        """The C files of the function: one for the whole function, or one per kernel if long bodies are divided into
+        parts."""
         if not any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels):
             return (self,)
         return tuple(replace(self, name=kernel.name, kernels=(kernel,)) for kernel in self.kernels)
@@ -68,8 +69,8 @@ def function_views(
     options: EmitOptions,
     base_frame: str = BASE_FRAME,
 ) -> tuple[FunctionView, ...]:
-    """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order. `base_frame`: what
-    their meanings call it."""
+    """Return the functions of these kernels, in the order of their signatures. `base_frame` is the name of the base
+    frame in their descriptions."""
     views = []
     for found in functions_of(kernels, base_frame):
         function = found.signature

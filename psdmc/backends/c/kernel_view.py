@@ -1,4 +1,5 @@
-"""A kernel in the form that templates print: names, sizes and bodies, and the C text of its signatures and calls."""
+"""A kernel (the code of one function variant) in the form that templates print: names, sizes, bodies, and the C text of
+signatures and calls."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ LOOPED = 10
 
 @dataclass(frozen=True, slots=True)
 class VectorView:
-    """A quantity of a signature, `size` reals per state, with its axes' lengths."""
+    """An input or output of a C function: `size` reals per state, and the lengths of its axes."""
 
     name: str
     size: int
@@ -28,9 +29,9 @@ class VectorView:
 
 @dataclass(frozen=True, slots=True)
 class OutputView(VectorView):
-    """An output.
+    """One output of a C function.
 
-    direct  a batch call writes its rows straight from registers, without a block of them on the stack
+    direct  a batch call writes its rows straight from registers, without first storing a block of them on the stack
     zero    entries that are zero at every state
     """
 
@@ -40,14 +41,14 @@ class OutputView(VectorView):
 
 @dataclass(frozen=True, slots=True)
 class KernelView:
-    """One kernel: the file(s) with its body, its C functions and their signatures.
+    """One kernel, the code of one variant of a function: its body files, C functions and their signatures.
 
-    single_file  body file, included once per instantiation; also `lanes_file` where one order serves both
-    limbs        a further body for one state; None where there is none
-    positive     what must be positive and is not put out; None where there is no such thing
-    pivot_order  its entries in the order in which they are found
+    single_file  body file, included once per instantiation; also `lanes_file` if one order of operations serves both
+    limbs        a further body for one state, with limbs in SIMD lanes; None if there is none
+    positive     the vector that must be positive and is not an output; None if there is no such vector
+    pivot_order  the order in which the entries of `positive` are computed
     places       of a packed matrix: (row, column) of each entry
-    regions      loops and calls, in the place of all bodies; None where there are none
+    regions      loops and calls, which replace all bodies; None if there are none
     """
 
     name: str
@@ -70,19 +71,20 @@ class KernelView:
 
     @property
     def variant(self) -> str:
-        """Ending of its name that says where its parameters come from: '' if they are compiled in."""
+        """The ending of the kernel's name: '_theta' or '_theta_rows' for parameters at run time, '' for compiled-in
+        ones."""
         if self.name.endswith(THETA_ROWS):
             return THETA_ROWS
         return "_theta" if self.theta else ""
 
     @property
     def pivots_in_loop(self) -> bool:
-        """Whether one state's pivots are looked at in a loop."""
+        """Whether the code for one state tests its pivots in a loop."""
         return len(self.pivot_order) >= LOOPED and self.pivot_order == tuple(range(len(self.pivot_order)))
 
     @property
     def single_parts(self) -> str:
-        """File of the functions that a long body consists of."""
+        """Name of the file that contains the C functions of a long body."""
         return self.single_file.replace(".inc", "_parts.inc")
 
     @property
@@ -91,30 +93,30 @@ class KernelView:
 
     @property
     def by_state(self) -> bool:
-        """Whether its forms for many states take one after the other: lines for lanes would be too many."""
+        """Whether batch functions compute one state after the other, because code for SIMD lanes would be too long."""
         return any(product.shape.n >= LARGE for product in self.single_body.products)
 
     @property
     def direct(self) -> bool:
-        """Whether a batch call writes rows of some output straight from registers."""
+        """Whether a batch call writes the rows of at least one output straight from registers."""
         return any(output.direct for output in self.outputs)
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some outputs are written from registers and others, or what must be positive, are not."""
+        """Whether some outputs are written from registers while others, or the pivots, are stored in a block first."""
         return self.direct and (
             self.positive is not None or not all(output.direct for output in self.outputs)
         )
 
     @property
     def fails_alone(self) -> bool:
-        """Whether the outputs that become NaN are one vector, as long as what must be positive."""
+        """Whether exactly one output vector becomes NaN on failure, and this vector is as long as the pivots."""
         shapes = [output.shape for output in self.outputs]
         return self.positive is not None and shapes == [self.positive.shape]
 
     @property
     def mark_rows(self) -> str:
-        """C expression for the first row of a block that fails."""
+        """C expression for the number of the first failing row of a block."""
         assert self.positive is not None
         block = f"{self.positive.name}_block"
         if self.fails_alone:
@@ -123,12 +125,12 @@ class KernelView:
 
     @property
     def needs_lanes(self) -> bool:
-        """Whether anything calls the form that leaves its outputs lane by lane."""
+        """Whether another function calls the variant that leaves its outputs lane by lane."""
         return not self.direct or "batch_soa" in self.prototypes
 
     @property
     def lanes(self) -> str:
-        """The static function that computes one state per lane."""
+        """The static C function that computes one state per SIMD lane."""
         return f"{self.name}_lanes"
 
     @property
@@ -137,7 +139,7 @@ class KernelView:
 
     @property
     def rows(self) -> str:
-        """The static function that computes one state per lane and writes direct outputs into rows."""
+        """The static C function that computes one state per lane and writes direct outputs into the caller's rows."""
         return f"{self.name}_rows"
 
     @property
@@ -166,7 +168,7 @@ class KernelView:
 
     @property
     def row_arguments(self) -> str:
-        """What the function for one state is called with for a row."""
+        """C text of the arguments with which the function for one state is called for a row."""
         inputs, outputs = (
             [f"{vector.name} + row * {vector.size}" for vector in vectors]
             for vectors in (self.inputs, self.outputs)
@@ -175,7 +177,7 @@ class KernelView:
 
     @property
     def one_arguments(self) -> str:
-        """The same for one state that was taken out of its block of lanes."""
+        """C text of the arguments for one state that was copied out of its block of lanes."""
         return ", ".join(f"{vector.name}_one" for vector in (*self.inputs, *self.outputs))
 
     def _arguments(self, outputs: Iterable[str]) -> str:
@@ -187,12 +189,12 @@ class KernelView:
 
     @property
     def cost_text(self) -> str:
-        """Operations of one state, as text for the header."""
+        """The number of operations for one state, as text for the header."""
         limbs = f"; one state with limbs in lanes: {self.limbs.cost}" if self.limbs else ""
         return f"{self.name}: {self.cost}, {self.lowering}{limbs}"
 
     @property
     def blocks(self) -> tuple[VectorView, ...]:
-        """Buffers of a batch call: every vector lane by lane, except those whose rows are written directly."""
+        """Buffers of a batch call, lane by lane: all vectors except those whose rows are written directly."""
         outputs = (output for output in self.outputs if not output.direct)
         return (*self.inputs, *outputs, *((self.positive,) if self.positive else ()))

@@ -1,4 +1,5 @@
-"""The vectors of the generated C: which widths there are, and how a square of them is transposed in registers."""
+"""The SIMD vectors of the generated C: which widths exist, and how a square block of vectors is transposed in
+registers."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from psdmc.target.vectors import VectorUnit
 class TransposeStage:
     """One step of Eklundh's transposition: vectors i and i + distance exchange blocks of `distance` lanes.
 
-    first, second  lanes of the pair (0 ... 2 width - 1) that the new vectors i and i + distance consist of
+    first, second  lanes of the pair (0 ... 2 width - 1) that form the new vectors i and i + distance
     """
 
     distance: int
@@ -23,7 +24,7 @@ class TransposeStage:
 
 @dataclass(frozen=True, slots=True)
 class VectorWidth:
-    """One vector size that the target may have: reals per vector, and the integer as wide as a real."""
+    """One vector size of a target: reals per vector, and the integer type as wide as a real."""
 
     lanes: int
     unit: VectorUnit
@@ -31,7 +32,7 @@ class VectorWidth:
 
     @property
     def angles(self) -> VectorWidth:
-        """The vectors that take one state's angles where these are the widest."""
+        """The vectors that compute the sines of one state's angles, if vectors of this width are the widest."""
         narrower = self.unit.narrower
         if narrower is None:
             return self
@@ -39,18 +40,18 @@ class VectorWidth:
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose `lanes` vectors of `lanes` reals."""
+        """The steps of a transposition, in registers, of a square block: `lanes` vectors of `lanes` reals."""
         distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
         return tuple(transpose_stage(self.lanes, distance) for distance in distances)
 
     @property
     def piece(self) -> int:
-        """Neighbours of a row that are stored at once where outputs go into rows group by group."""
+        """The number of neighbouring outputs of a row that are stored at once, if outputs go into rows group by group."""
         return min(self.lanes, GROUP)
 
     @property
     def piece_stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose each square of `piece` vectors and lanes."""
+        """The steps of the transpositions, in registers, of square blocks of `piece` vectors and `piece` lanes."""
         return tuple(stage for stage in self.stages if stage.distance < self.piece)
 
 
@@ -63,7 +64,7 @@ def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
 
 
 def transpose_stage(width: int, distance: int) -> TransposeStage:
-    """The step that exchanges blocks of `distance` lanes, in vectors of `width`."""
+    """Return the step of a transposition that exchanges blocks of `distance` lanes, in vectors of `width` lanes."""
     first = [k - distance + width if k & distance else k for k in range(width)]
     second = [k + width if k & distance else k + distance for k in range(width)]
     return TransposeStage(distance, ", ".join(map(str, first)), ", ".join(map(str, second)))

@@ -1,7 +1,8 @@
-"""How limbs' outputs are stored: each limb's neighbours side by side, as one vector, instead of one by one out of lanes.
+"""How the outputs of limbs (such as legs) are stored: neighbouring outputs of one limb as one vector, not one by one.
 
-What a limb puts out is one lane of many vectors. Where several of its outputs are neighbours for every limb, as in the rows
-of a mass matrix, four of its vectors are transposed: each limb's four reals are stored at once.
+Each output of a limb is one lane of a vector that holds the same output of all limbs. If several outputs are neighbours
+in memory for every limb, as in the rows of a mass matrix, four vectors are transposed in registers. Four neighbouring
+reals of each limb are then stored at once.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ Lane = tuple[int, Slot, int]
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Up to four neighbours of every limb of a group, whose vectors are transposed.
+    """Up to four neighbouring outputs of every limb of a group, whose vectors are transposed before they are stored.
 
     slots   of the group, in the order of the neighbours; None: zero
-    at      of each limb the index that its first neighbour has in the function's output
-    widths  of each limb how many reals are stored
+    at      for each limb, the index of its first neighbour in the function's output
+    widths  for each limb, how many reals are stored
     """
 
     vector: str
@@ -46,7 +47,8 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """Two or three neighbours of every limb of a group, the limbs side by side: vectors that are woven into each other."""
+    """Two or three neighbouring outputs of every limb of a group, with the limbs next to each other in memory. The
+    vectors are interleaved to store them."""
 
     vector: str
     group: LimbGroup
@@ -67,7 +69,7 @@ class Packed:
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """One output, or four neighbours, from any lanes; None: zero."""
+    """One output, or four neighbouring outputs, taken from any lanes of any vectors. None stands for zero."""
 
     vector: str
     first: int
@@ -83,10 +85,11 @@ Stored = Rows | Packed | Gathered
 
 
 def stores(limbs: LimbProgram, sizes: Mapping[str, int]) -> Iterator[Stored]:
-    """Stores of what limbs put out, and of zeros, in an order in which they have to be done; `sizes` are those of outputs.
+    """Yield the stores of all limb outputs and of zeros, in the order in which they must be executed. `sizes` are the
+    lengths of the outputs.
 
-    Keeps: what the core's stages have stored. A store may write over neighbours that a later one puts right.
-    Leaves out: what products store.
+    Keeps: what the core's stages have stored. A store may overwrite neighbours if a later store corrects them. Leaves
+    out: outputs that products store.
     """
     own = {slot for stage in limbs.stages for slot, _ in stage.program.outputs}
     own |= limbs.products.written if limbs.products else set()
@@ -105,13 +108,13 @@ class _Run:
 
     @property
     def is_packed(self) -> bool:
-        """Whether fours of them are full, and woven of two or three vectors."""
+        """Whether this run of outputs can be stored as full vectors of four by interleaving two or three vectors."""
         count, wide = len(self.at), len(self.slots)
         side_by_side = tuple(range(self.at[0], self.at[0] + wide * count, wide))
         return wide < FOUR and count % FOUR == 0 and self.at == side_by_side
 
     def rows(self, vector: str, before: int) -> Iterator[Rows]:
-        """In pieces of four, the first of which begins that many places before it."""
+        """Split the run of outputs into rows of four. The first row starts `before` entries early, filled with None."""
         padded = (*(None,) * before, *self.slots, *(None,) * (-(before + len(self.slots)) % FOUR))
         for k in range(0, len(padded), FOUR):
             first = tuple(index - before + k for index in self.at)

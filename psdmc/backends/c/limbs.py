@@ -1,4 +1,5 @@
-"""A kernel whose limbs run in the lanes of a vector, and the vectors that it needs, in the form that templates print."""
+"""A kernel that computes limbs (such as legs) in SIMD lanes, one limb per lane, in the form that templates print; and
+the vector types that it needs."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ each is then stored as soon as it is known."""
 
 @dataclass(frozen=True, slots=True)
 class LimbWidth:
-    """`count` limbs in registers of `lanes` reals, the lanes behind the last limb's being filled with the first's."""
+    """A vector type that holds one real per limb for `count` limbs, made of registers with `lanes` reals each. Lanes
+    after the last limb repeat the first limb."""
 
     count: int
     lanes: int
@@ -40,7 +42,7 @@ class LimbWidth:
 
     @property
     def filled(self) -> str:
-        """C: initialiser of all parts, from one macro argument per limb."""
+        """C initialiser of all registers of the vector, from one macro argument per limb."""
         names = [names_of(self.count)[k if k < self.count else 0] for k in range(self.parts * self.lanes)]
         parts = (names[k : k + self.lanes] for k in range(0, len(names), self.lanes))
         return ", ".join(f"{{{', '.join(part)}}}" for part in parts)
@@ -52,28 +54,28 @@ class LimbWidth:
 
     @property
     def folds(self) -> tuple[str, ...]:
-        """Lanes in the order in which a whole part is added to itself, half onto half, until two are left."""
+        """Lane orders that sum a whole register: in each step its two halves are added, until two lanes are left."""
         distances = [self.lanes >> k for k in range(1, self.lanes.bit_length() - 1)]
         return tuple(", ".join(str(lane ^ distance) for lane in range(self.lanes)) for distance in distances)
 
     @property
     def piece(self) -> int:
-        """Neighbours of a limb that a vector of four is made of."""
+        """The number of a limb's neighbouring outputs in one vector, at most four."""
         return min(self.lanes, FOUR)
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose each square of `piece` vectors and lanes."""
+        """The steps of the transpositions, in registers, of square blocks of `piece` vectors and `piece` lanes."""
         return tuple(transpose_stage(self.lanes, distance) for distance in (1, 2) if distance < self.piece)
 
     @property
     def beyond(self) -> tuple[int, ...]:
-        """Lanes of the last part that are limbs', where it is not whole."""
+        """Lanes of the last register that hold limbs, if the register is not full."""
         return tuple(range(self.count % self.lanes))
 
 
 class NamedByCount:
-    """C names of what belongs to a number of limbs."""
+    """C names of types and macros that belong to a number of limbs, such as limbs4."""
 
     __slots__ = ()
     count: int
@@ -89,7 +91,7 @@ class NamedByCount:
 
 @dataclass(frozen=True, slots=True)
 class LimbVector(NamedByCount):
-    """The vectors for a number of limbs on every machine of a target.
+    """The vectors for one number of limbs on every machine of a target.
 
     widths  possible ones, widest first
     """
@@ -100,7 +102,7 @@ class LimbVector(NamedByCount):
 
     @property
     def in_fours(self) -> bool:
-        """Whether reals of all limbs fill vectors of four."""
+        """Whether the reals of all limbs fill vectors of four without remainder."""
         return self.count % FOUR == 0
 
     @property
@@ -114,7 +116,7 @@ def names_of(count: int) -> list[str]:
 
 
 def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVector, ...]:
-    """Those for groups of these numbers of limbs."""
+    """Return the vector types for groups with these numbers of limbs."""
     narrowest = NARROWEST // options.real_bytes
     integer = "long long" if options.real == "float64" else "int"
     widest = max((unit.bytes // options.real_bytes for unit in options.target.vectors), default=1)
@@ -127,7 +129,7 @@ def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVec
 
 
 def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[VectorUnit, ...]:
-    """Registers that these vectors may be in, beyond those that a target's own code takes."""
+    """Return the registers that vectors of limbs may use in addition to those of the target's other code."""
     wanted = {width.lanes * options.real_bytes for vector in vectors for width in vector.widths}
     halves: list[VectorUnit] = []
     for unit in options.target.vectors:
@@ -140,7 +142,7 @@ def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[Vec
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """An array with one vector of limbs a row: a name, and rows of C texts, limb by limb."""
+    """A C array with one vector of limbs per row: its name, and its rows as C text with one number per limb."""
 
     name: str
     rows: tuple[str, ...]
@@ -148,12 +150,12 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class GroupView(NamedByCount):
-    """One group of limbs in C.
+    """One group of equal limbs in C.
 
-    inputs    read before anything is computed
-    constants the same at every state; None where there are none
-    arrays    what its stages store: name and number of rows
-    sums      what the core reads of them: its vector, and its length
+    inputs    limb inputs, read before anything is computed
+    constants the same at every state; None if there are none
+    arrays    what the group's stages store: name and number of rows
+    sums      sums over the limbs that the core reads: vector and its length
     """
 
     count: int
@@ -165,9 +167,9 @@ class GroupView(NamedByCount):
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """One stage: its body, then what is done with what it has stored, line by line.
+    """One stage of a function with limbs: its body, then the statements that handle what it has stored.
 
-    count  limbs whose lanes compute it; 0: the core
+    count  number of limbs that it computes in lanes; 0: the core
     """
 
     count: int
@@ -186,7 +188,8 @@ class StageView:
 
 @dataclass(frozen=True, slots=True)
 class SharesView:
-    """A group's part of thin products: the vector of T, where its rows begin in an output, and their product with x."""
+    """One group's part of the matrix products of a function with limbs. It has the C vector of the factor T, where its
+    rows begin in an output, and C text of the product with x."""
 
     vector: str
     width: int
@@ -196,17 +199,17 @@ class SharesView:
 
 @dataclass(frozen=True, slots=True)
 class ThinView:
-    """Products behind limbs.
+    """The matrix products that follow the limb stages of a function.
 
-    arrays   names and lengths of what stages store for them
-    outputs  names of the matrices that are multiplied, and
-    rights   of their E, and
-    known    first columns that are stored already, output by output
-    n        columns
-    places   where the core's rows begin in an output, and
-    begins   in E
-    rows     of the core, as C
-    groups   rows of limbs, group by group
+    arrays   names and lengths of the vectors that the stages store for them
+    outputs  names of the matrices that are computed
+    rights   names of the right factors E of these matrices
+    known    for each output, how many of its first columns are stored already
+    n        number of columns
+    places   where the core's rows begin in an output
+    begins   where the core's rows begin in E
+    rows     the core's rows as C text
+    groups   the limbs' rows, group by group
     """
 
     arrays: tuple[tuple[str, int], ...]
@@ -248,13 +251,13 @@ def _thin_view(products: ThinProducts) -> ThinView:
 
 @dataclass(frozen=True, slots=True)
 class LimbsView:
-    """A kernel's body for one state with limbs in lanes.
+    """A kernel's body for one state, with limbs in SIMD lanes.
 
-    least   lanes from which on it is taken
-    unused  inputs that it never reads
-    core    reals of the core that other stages read
-    stores  what puts out what limbs have computed, and zeros
-    products  done behind that; None: none are
+    least     the smallest number of lanes for which this body is used
+    unused    inputs that it never reads
+    core      number of reals of the core that other stages read
+    stores    statements that store the outputs of limbs, and zeros
+    products  matrix products after that; None if there are none
     """
 
     file: str
@@ -273,14 +276,14 @@ class LimbsView:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Numbers of limbs of its groups, each once."""
+        """The numbers of limbs of the kernel's groups, without duplicates."""
         return tuple(sorted({group.count for group in self.groups}))
 
 
 def limbs_view(
     name: str, limbs: LimbProgram, inputs: Sequence[str], sizes: dict[str, int], options: EmitOptions
 ) -> LimbsView:
-    """The view of a kernel's limbs; `sizes` are those of its outputs."""
+    """Return a kernel's body with limbs in lanes, as templates print it; `sizes` are the lengths of its outputs."""
     suffix = "" if options.real == "float64" else "f"
     read = {slot.vector for stage in limbs.stages for slot in stage.program.inputs()}
     read |= {own[0].vector for group in limbs.groups for _, own in group.inputs}

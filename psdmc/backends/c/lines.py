@@ -1,4 +1,4 @@
-"""Statements of a body in C, and the body that they make."""
+"""Statements of a generated C function's body, and the body that they form."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def spread(text: str, uniform: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """An input that a section reads before its steps; a uniform one is the same for all states."""
+    """A statement that reads an input before the steps of a section; a uniform input is the same for all states."""
 
     name: str
     vector: str
@@ -36,7 +36,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A statement `const <V or real> name = text;`"""
+    """A C statement `const <V or real> name = text;`, which gives a name to a value."""
 
     name: str
     text: str
@@ -49,7 +49,8 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A statement `vector[index] = text`, where a uniform text must be spread over the lanes first; `macro` stores it."""
+    """A C statement `vector[index] = text`. A uniform text must be spread over the lanes first; `macro` performs the
+    store."""
 
     vector: str
     index: int
@@ -69,7 +70,7 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class Zeros:
-    """A statement that makes `count` outputs from the first on zero; whole groups, where a vector is stored in groups."""
+    """A statement that sets `count` consecutive outputs to zero, in whole groups if the vector is stored in groups."""
 
     vector: str
     first: int
@@ -82,7 +83,8 @@ class Zeros:
 
 @dataclass(frozen=True, slots=True)
 class Cleared:
-    """A statement that makes `count` outputs from the first on zero in code for one state; other code stores each."""
+    """A statement that sets `count` consecutive outputs to zero in code for one state; code for SIMD lanes stores each
+    alone."""
 
     vector: str
     first: int
@@ -99,8 +101,8 @@ class Cleared:
 
 @dataclass(frozen=True, slots=True)
 class GroupStore:
-    """A statement `vector[index ...] = texts`: a group of outputs that are also stored one by one, for the form that
-    writes rows."""
+    """A C statement `vector[index ...] = texts` that stores a group of outputs at once, for the variant that writes
+    rows. Other variants store these outputs one by one."""
 
     vector: str
     index: int
@@ -116,7 +118,7 @@ Line = Step | Store | Zeros | Cleared | GroupStore | Entry | Multiplication
 
 @dataclass(frozen=True, slots=True)
 class Angle:
-    """One angle of a group, and the names of its sine and cosine (None: not needed)."""
+    """One angle of a group, and the C names of its sine and cosine. None: not needed."""
 
     text: str
     sine: str | None
@@ -125,7 +127,7 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of a body: loads, steps, then the sines and cosines of the angles that these steps compute.
+    """A part of a generated body: loads, steps, then the sines and cosines of the angles that these steps compute.
 
     Inputs that no angle needs are loaded in the last section, after all sines, so that they need not be kept while libm
     is called. Stores come with the last steps, after all loads: an output may overwrite an input.
@@ -139,13 +141,13 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A PROGRAM ready to print.
+    """The body of a generated C function, ready to print.
 
     unused    vectors of the signature that the PROGRAM never reads
-    products  done behind everything else
+    products  matrix products after all other statements
     calls     operations that are macros
-    parts     functions that compute it, one after the other, where it is long; it has no sections of its own then
-    kept      declarations of the vectors between them
+    parts     if the body is long, the functions that compute it, one after the other; it then has no sections
+    kept      declarations of the vectors that pass values from part to part
     """
 
     sections: tuple[Section, ...]
@@ -163,11 +165,11 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A static function that computes a part of a body.
+    """A static C function that computes one part of a long body.
 
-    parameters  their declarations
-    arguments   what it is called with
-    direct      outputs that are rows in the form that writes rows
+    parameters  C declarations of its parameters
+    arguments   C text of the arguments in its call
+    direct      outputs that are rows in the variant that writes rows
     """
 
     parameters: tuple[str, ...]

@@ -1,4 +1,5 @@
-"""The KernelView of a kernel: which outputs are written directly, in which files its bodies stand, which forms it has."""
+"""Decisions for the C code of one kernel: which outputs are written directly, which body files and which variants it
+has."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ from psdmc.program.signature import Quantity, Signature, Sizes
 
 
 def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
-    """The kernel as templates print it. InternalError where C takes a quantity's name for something else.
+    """Return the kernel as templates print it. Raises InternalError if C uses the name of one of its inputs or outputs.
 
     robot   identifier that the C functions' names start with
     """
@@ -73,7 +74,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
 
 
 def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
-    """The robot's sizes, with the number of entries that this kernel puts out where it packs a matrix."""
+    """Return the robot's sizes; if the kernel packs a matrix, with the number of entries that it stores."""
     return replace(sizes, nonzeros=len(kernel.places))
 
 

@@ -1,7 +1,7 @@
-"""C of the operations that C has no operator for, for one state and for vectors with one state or limb per lane.
+"""C code of the operations for which C has no operator, for one state and for vectors with one state or limb per lane.
 
-Each is a macro of its name in a body. What it means stands in roots.h (square roots, which every compiler has for vectors)
-and in operations.h.
+In a generated function body, such an operation is a macro of the same name. The macros are defined in roots.h (square
+roots, which every compiler has for vectors) and in operations.h.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from psdmc.program.operations import Op, Unit
 
 @dataclass(frozen=True, slots=True)
 class CallView:
-    """One operation.
+    """One operation for which C has no operator.
 
     parameters  of its macro and its functions
-    one         C expression of them for reals; FUNCTION(name) is the C library's for the package's real
+    one         C expression of them for reals; FUNCTION(name) is the C library's function for the package's real
     many        the same for vectors, where BLEND(mask, x, y) is x in the lanes whose mask is set; '': lane by lane
     """
 
@@ -48,7 +48,7 @@ class CallView:
 
     @property
     def lanes(self) -> str:
-        """What the macro is for one state per lane."""
+        """Definition of the operation's macro in code for one state per lane."""
         return f"{self.function('lanes') if self.has_header else 'root_lanes'}({self.arguments})"
 
     @property
@@ -62,7 +62,7 @@ class CallView:
         return self.op.unit is Unit.CALL
 
     def function(self, kind: str) -> str:
-        """Name of its function for reals, lanes or limbs."""
+        """Name of the C function that computes the operation for reals, lanes or limbs."""
         return f"{self.op}_{kind}"
 
     def declared(self, kind: str) -> str:
@@ -91,5 +91,5 @@ CALLS = {call.op: call for call in _ALL}
 
 
 def call_views(calls: frozenset[Op]) -> tuple[CallView, ...]:
-    """Those of some operations, in the table's order."""
+    """Return the C code of the given operations, in the order of the table."""
     return tuple(call for op, call in CALLS.items() if op in calls)

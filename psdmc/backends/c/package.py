@@ -1,4 +1,4 @@
-"""The emitted package in the form that templates print, from metadata and kernels."""
+"""The complete C package in the form that templates print, made from the robot's metadata and the kernels."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_w
 
 @dataclass(frozen=True, slots=True)
 class PackageView:
-    """One package, in the form that templates print.
+    """One C package, in the form that templates print.
 
-    robot     identifier that every symbol starts with
+    robot     identifier with which every symbol starts
     adapters  names of psdmc.backends.c.adapters
-    private   functions for one state that adapters alone call: no header declares them
+    private   functions for one state that only adapters call; no header declares them
     """
 
     robot: str
@@ -58,14 +58,14 @@ class PackageView:
 
     @property
     def alone(self) -> PackageView:
-        """The same without functions for many states."""
+        """Return the same package without functions for many states."""
         target = replace(self.target, forms=self.target.forms[:1])
         return replace(self, options=replace(self.options, target=target))
 
     @property
     def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
-        """Adapters whose C file becomes a shared library of its own, lib<robot>_<name>, and the sources compiled into it
-        besides: files for CasADi include them, under other names."""
+        """The adapters whose C file becomes a separate shared library, lib<robot>_<name>, and the sources that are
+        compiled into each library. Files for CasADi include these sources under other names, and need none."""
         sources = {"casadi": (), "casadi_theta": (), "casadi_hessian": (), "fmu": self.sources}
         return {name: sources[name] for name in self.adapters if name in sources}
 
@@ -80,8 +80,8 @@ class PackageView:
 
     @property
     def size_macros(self) -> dict[str, int]:
-        """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of bodies;
-        of contacts; of sparse matrices' patterns."""
+        """Further sizes for the header, by name: numbers of joints, of entries of q and of rates if they differ; of
+        bodies; of contacts; and of entries in sparse matrices' patterns."""
         wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
         wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
         if uses_contacts(function.signature for function in self.functions):
@@ -90,7 +90,8 @@ class PackageView:
 
     @property
     def patterns(self) -> tuple[Pattern, ...]:
-        """Of packed matrices, and of trees' sparse ones: a serial chain's zeros are few."""
+        """The sparsity patterns of packed matrices and, for a tree robot, of all sparse matrices. A serial chain has
+        few zeros."""
         found = patterns(self.functions)
         return tuple(each for each in found if each.is_packed or (self.info.is_tree and each.is_sparse))
 
@@ -112,7 +113,7 @@ class PackageView:
 
     @property
     def arithmetic_flags(self) -> str:
-        """Compiler flags that suit the C on every machine."""
+        """The compiler flags for the arithmetic of the C code, the same on every machine."""
         return " ".join(ARITHMETIC)
 
     @property
@@ -165,28 +166,28 @@ class PackageView:
 
     @property
     def friction(self) -> FrictionView | None:
-        """The calibrated friction, where the package has its function."""
+        """The data of the calibrated friction; None if the package has no function for it."""
         return FrictionView(self.info.friction, self.robot, self.real) if self.info.friction else None
 
     @property
     def payload(self) -> PayloadView | None:
-        """The functions that add a load to theta_b, where the package has them."""
+        """The data of the functions that add a load to theta_b; None if the package has no such functions."""
         return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
 
     @property
     def bodies(self) -> BodiesView | None:
-        """The function that computes theta_b from all bodies, where the package has it."""
+        """The data of the function that computes theta_b from all bodies; None if the package has no such function."""
         return BodiesView(self.robot, self.real, self.info.bodies) if self.info.bodies else None
 
     @property
     def version(self) -> str:
-        """psdmc's version as the three numbers that CMake and pkg-config compare."""
+        """psdmc's version as three numbers. CMake and pkg-config compare versions in this form."""
         found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
         return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
 
     @property
     def pivot_size(self) -> int:
-        """Number of entries that must be positive, where the outputs that become NaN are one vector of that length."""
+        """The number of pivots that must be positive, if the outputs that become NaN are one vector of that length."""
         found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
         return next(found, self.n)
 
@@ -204,22 +205,23 @@ class PackageView:
 
     @property
     def _all_kernels(self) -> tuple[KernelView, ...]:
-        """Those of adapters, too."""
+        """The kernels of all functions, with those that only adapters call."""
         return (*self.kernels, *(kernel for function in self.private for kernel in function.kernels))
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some kernel writes one output's rows from registers and another's from a block."""
+        """Whether some kernel writes the rows of one output from registers, and those of another output from a block on
+        the stack."""
         return any(kernel.is_mixed for kernel in self._all_kernels)
 
     @property
     def fails_in_several(self) -> bool:
-        """Whether some kernel that fails sets more than one vector of all joints to NaN."""
+        """Whether some kernel sets more than one vector, or other outputs than a vector per joint, to NaN if it fails."""
         return any(k.positive and not (k.fails_alone and k.regions is None) for k in self._all_kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
-        """Of those that some kernel does behind its PROGRAM, each once."""
+        """The shapes of all matrix products that follow the straight-line code of kernels, without duplicates."""
         return tuple(sorted({p.shape for function in self.functions for p in function.products}))
 
     @property
@@ -248,7 +250,7 @@ class PackageView:
         return call_views(frozenset(found))
 
     def limb_calls(self, count: int) -> tuple[CallView, ...]:
-        """Those of some stage of so many limbs."""
+        """The operations that are C macros in code for `count` equal limbs, such as four legs."""
         views = [kernel.limbs for kernel in self.kernels if kernel.limbs]
         stages = [stage for view in views for stage in view.stages if stage.count == count]
         return call_views(frozenset(op for stage in stages for op in stage.body.calls))
@@ -260,13 +262,13 @@ class PackageView:
 
     @property
     def multiplies_lanes(self) -> bool:
-        """Whether such products are made of lanes, too."""
+        """Whether batch kernels need matrix products for one state per SIMD lane, too."""
         own = (kernel for kernel in self.kernels if kernel.single_body.products)
         return self.target.has_batches and any(not kernel.by_state for kernel in own)
 
     @property
     def leads_on(self) -> bool:
-        """Whether q is longer than the rates, and the package has what leads from one q to another."""
+        """Whether q is longer than the rates, and the package has the functions that compute one q from another."""
         names = {function.name for function in self.functions}
         return self.info.is_wide and all(recipe in names for recipe in ON_MANIFOLD)
 
@@ -277,7 +279,7 @@ class PackageView:
 
     @property
     def uses_frames(self) -> bool:
-        """Whether some function is about the named frames."""
+        """Whether some function of the package has to do with the named frames."""
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
@@ -289,7 +291,10 @@ def package_view(
     references: ReferenceStates | None = None,
     adapters: Sequence[str] = (),
 ) -> PackageView:
-    """The package with all decisions made. InputError where there is nothing to emit, or an adapter is not possible."""
+    """Return the C package with all decisions made, ready for the templates.
+
+    Raises InputError if there are no functions, or if an adapter is not possible for this package.
+    """
     if not kernels:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:

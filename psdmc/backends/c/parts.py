@@ -1,4 +1,4 @@
-"""A long PROGRAM as several C functions, so that compile time grows nearly linearly with its length."""
+"""Division of a long PROGRAM into several C functions, so that compile time grows nearly linearly with its length."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ _UNIFORM = frozenset({"theta_b", KEPT_REALS})
 
 
 def is_long(program: Program, sizes: Mapping[str, int]) -> bool:
-    """Whether a PROGRAM is cut into parts: by its operations and the entries that it stores (`sizes` by vector)."""
+    """Whether a PROGRAM is divided into several C functions. This depends on its number of operations and stored
+    entries (`sizes` by vector)."""
     operations = sum(bool(instr.args) for instr in program)
     return operations + sum(sizes.values()) > LONG
 
@@ -38,7 +39,8 @@ def body_in_parts(
     in_groups: Collection[str] = (),
     products: Sequence[Product] = (),
 ) -> Body:
-    """The same as `make_body`, as functions; outputs that are zero at every state are stored in loops."""
+    """Return the same body as `make_body`, divided into several functions. Loops store the outputs that are zero at
+    every state."""
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
     stored = without_products(sizes, multiplied)
     whole, zeros = _without_zeros(program, stored)

@@ -1,4 +1,5 @@
-"""Where matrices have entries that are not zero at every state: branches of a tree do not see each other."""
+"""The sparsity patterns of matrices, that is, which entries can differ from zero. In a tree robot, the entries of two
+joints on different branches are zero."""
 
 from __future__ import annotations
 
@@ -13,10 +14,10 @@ from psdmc.backends.c.tables import Table
 class Pattern:
     """The entries of a function's matrix that may differ from zero, row by row.
 
-    function   name of the function, whose one output is the matrix
-    places     (row, column) of each
-    is_packed  whether these entries are all that it puts out
-    is_sparse  whether the matrix has others
+    function   name of the function whose only output is the matrix
+    places     (row, column) of each entry
+    is_packed  whether the function stores these entries only
+    is_sparse  whether the matrix has further entries, which are zero
     """
 
     function: str
@@ -26,11 +27,11 @@ class Pattern:
 
     @property
     def macro(self) -> str:
-        """Name of its length, without the robot's prefix."""
+        """Name of the C macro for the number of nonzero entries, without the robot's prefix."""
         return f"{self.function.upper()}_NONZEROS"
 
     def table(self, robot: str) -> Table:
-        """The places as a constant array of pairs."""
+        """Return the (row, column) pairs of the nonzero entries as a constant array."""
         name = f"{self.function}_pattern"
         return Table(
             name,
@@ -42,10 +43,10 @@ class Pattern:
 
 
 def patterns(functions: Sequence[FunctionView]) -> Iterator[Pattern]:
-    """Of every function that puts out one matrix, packed or not.
+    """Yield the sparsity pattern of every function whose only output is a matrix, packed or not.
 
-    An entry of one that is not is left out where every kernel of the function, with parameters compiled in and given at
-    run time, has the constant zero in its place.
+    In a matrix that is not packed, an entry counts as zero if it is the constant zero in every kernel of the function,
+    both with parameters compiled in and with parameters at run time.
     """
     for function in functions:
         if function.kernels[0].places:

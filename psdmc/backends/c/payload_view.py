@@ -1,4 +1,4 @@
-"""The functions that add a load to theta_b, as templates print them."""
+"""The functions that add a load to theta_b, in the form that templates print."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from psdmc.backends.c.tables import number
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PayloadView:
-    """Of one robot, printed for one real type.
+    """The functions of one robot that add a load to theta_b, for one real type.
 
-    matrices  (l, 10) each: from a load's ten inertial parameters to what it adds to theta_b, at the tip and each frame
+    matrices  (l, 10) each: from a load's ten inertial parameters to what the load adds to theta_b, at the tip and each frame
     """
 
     robot: str

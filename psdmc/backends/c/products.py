@@ -1,7 +1,7 @@
-"""Products of matrices behind a body: loops over small vectors for one state, line by line for one state per lane.
+"""Matrix products that follow a function's straight-line code: loops for one state, single statements for SIMD lanes.
 
-Straight-line code for one state slows down beyond some 27 KB; lanes run out of registers either way and are as fast with
-each entry in a line, which needs no memory for the factors.
+For one state, straight-line code slows down if it is longer than some 27 KB. For lanes, either form runs out of
+registers, and both are equally fast. Single statements then need no memory for the factors.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from psdmc.program.program import Program, Slot
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry of a factor: KEEP takes one of a right factor, NAME one of a left factor, an output that is stored beside."""
+    """C statement for one entry of a factor of a matrix product. KEEP saves an entry of the right factor. NAME names an
+    entry of the left factor, which is also an output."""
 
     macro: Literal["KEEP", "NAME"]
     matrix: str
@@ -33,14 +34,15 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Shape:
-    """n x n, where the right factor's first `zero` columns are always zero and not kept."""
+    """The shape of a matrix product: n x n. The first `zero` columns of the right factor are always zero and are not
+    saved."""
 
     n: int
     zero: int
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """C: entry by entry, in groups for the form that writes rows."""
+        """C statements of the product, one per entry, with stores in groups for the variant that writes rows."""
         groups, n = StoreGroups({"product": self.n**2}), self.n
         found = []
         for index in range(n * n):
@@ -70,6 +72,6 @@ class Multiplication:
 
 
 def multiplication(program: Program, product: Product, sizes: Mapping[str, int]) -> Multiplication:
-    """A product as C does it behind a PROGRAM; `sizes` are the outputs'."""
+    """Return the C code of a matrix product after a PROGRAM; `sizes` are the lengths of the outputs."""
     shape = Shape(math.isqrt(sizes[product.output]), zero_columns(program, product))
     return Multiplication(product.output, product.left, product.right, shape)

@@ -1,4 +1,4 @@
-"""Reference states as C text, for the package's own test."""
+"""States and expected results as C text, for the package's self-test."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from psdmc.robot.inertia import six_of
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTable:
-    """One constant array: its name, entries per row, and its rows as C text."""
+    """One constant C array of the self-test: its name, number of entries per row, and rows as C text."""
 
     name: str
     columns: int
@@ -26,7 +26,8 @@ class ReferenceTable:
 
 @dataclass(frozen=True, slots=True)
 class LoadView:
-    """The same as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and the rows of `added`."""
+    """The self-test's load as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and rows `added`. The rows are what
+    the load adds to theta_b."""
 
     mass: str
     com: str
@@ -36,12 +37,12 @@ class LoadView:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceView:
-    """References as C text.
+    """The data of the self-test as C text.
 
-    tables    the states' vectors, then each output's expected values
-    expected  labels of the outputs that have such a table
-    theta_b   the run-time parameters, one constant each; empty where no kernel takes any
-    load      a load and what it adds to theta_b, where the package has functions that add loads
+    tables    the states' vectors, then the expected values of each output
+    expected  labels of the outputs that have a table of expected values
+    theta_b   the run-time parameters, one constant each; empty if no kernel takes theta_b
+    load      a load and what it adds to theta_b; None if the package has no functions that add loads
     """
 
     count: int
@@ -58,9 +59,9 @@ def reference_view(
     labels: Collection[str],
     takes_theta: bool,
 ) -> ReferenceView:
-    """The states as C constants: the vectors that the package's kernels take, and the expected outputs (by label).
+    """Return the states as C constants: the inputs of the package's kernels, and the expected outputs by label.
 
-    ValueError where the states are of another robot.
+    Raises ValueError if the states belong to another robot.
     """
     sizes = {vector.name: vector.size for vector in vectors}
     given = []

@@ -1,4 +1,5 @@
-"""The C of a function's regions, in the form that the template prints: loops and calls as text, straight lines as bodies."""
+"""C code of a function that is a list of regions (straight-line code, loops and calls), in the form that its template
+prints. Loops and calls are text; straight-line code is a body."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from psdmc.program.theta_rows import THETAS
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Lines of C, or a straight line, behind so many spaces."""
+    """Some lines of C, or the body of straight-line code, indented by a number of spaces."""
 
     spaces: int
     lines: tuple[str, ...]
@@ -24,7 +25,8 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class RegionsView:
-    """A function's body: declarations of its own arrays, then pieces in their order."""
+    """A function's body: declarations of the function's internal arrays and constants, then pieces of code in their
+    order."""
 
     declarations: tuple[str, ...]
     pieces: tuple[Piece, ...]
@@ -36,9 +38,9 @@ class RegionsView:
 
 
 def regions_view(body: Regions, inputs: Sequence[str], robot: str, suffix: str) -> RegionsView:
-    """The view of regions that read these inputs.
+    """Return the C code of these regions; `inputs` are the names of the function's inputs.
 
-    robot   what the called functions' names start with
+    robot   prefix of the called functions' names
     suffix  of constants
     """
     constants = tuple(

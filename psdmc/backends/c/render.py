@@ -1,4 +1,4 @@
-"""Templates of C: filters `comment` and `string` make untrusted text safe in it."""
+"""The Jinja templates for C. Their filters `comment` and `string` make untrusted text safe."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def environment() -> Environment:
 
 
 def render(template: str, **view: object) -> str:
-    """A template's text, filled from its view objects."""
+    """Fill a template with its view objects and return the text."""
     return environment().get_template(template).render(**view)

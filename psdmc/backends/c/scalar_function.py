@@ -1,4 +1,5 @@
-"""A PROGRAM of one value as a static C function of numbers, beside a vector p of parameters: friction of one joint."""
+"""A PROGRAM with one output, written as a static C function of numbers and a vector p of parameters. The friction of
+one joint is such a function."""
 
 from __future__ import annotations
 
@@ -17,9 +18,9 @@ TYPE = "number"
 
 @dataclass(frozen=True, slots=True)
 class ScalarFunction:
-    """A function `name(const number *p, number x, ...)`, which has those of `arguments` that the PROGRAM reads.
+    """A C function `name(const number *p, number x, ...)`, with those of `arguments` that the PROGRAM reads.
 
-    suffix  of C's functions and literals: f for float
+    suffix  of C library functions and literals: f for float
     """
 
     name: str
@@ -39,7 +40,7 @@ class ScalarFunction:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Its statements, the last one of which returns the value."""
+        """The statements of the function; the last one returns the value."""
         named = Names.of(self.program).named
         values: list[Expr] = []
         found: list[str] = []

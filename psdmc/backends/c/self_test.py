@@ -1,4 +1,4 @@
-"""The calls of the package's own test: every function in every layout, compared with the reference states."""
+"""The function calls of the package's self-test: every function in every layout, compared with reference states."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from psdmc.backends.self_test import compared_by_row, given_name, tolerance
 
 @dataclass(frozen=True, slots=True)
 class GivenVector:
-    """An input by the reference states' name, `size` reals per state; `of_joints`: one entry per joint."""
+    """One input of the self-test: its name in the reference states, and `size` reals per state. `of_joints`: the input
+    has one entry per joint."""
 
     name: str
     size: int
@@ -35,13 +36,14 @@ class GivenVector:
 
 @dataclass(frozen=True, slots=True)
 class SelfCheck:
-    """One output of a kernel that is called state by state, row by row and, where it has that form, lane by lane.
+    """The comparison of one output of a kernel, which is called state by state, row by row and, if possible, lane by
+    lane.
 
-    rows, columns  of the output per state
-    single         C call for one state, `row` being its number
-    batch, lanes   C calls for `count` states, row by row and lane by lane; '' where there is no such form
-    status         whether the calls return one
-    expected       array of the expected values; '' where no reference state has any
+    rows, columns  shape of the output per state
+    single         C call for one state with the number `row`
+    batch, lanes   C calls for `count` states, row by row and lane by lane; '' if the kernel has no such variant
+    status         whether the calls return a status
+    expected       array of the expected values; '' if no reference state has any
     """
 
     kernel: str
@@ -63,14 +65,14 @@ class SelfCheck:
 def self_checks(
     kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
 ) -> tuple[SelfCheck, ...]:
-    """One check per output of each kernel. `known` are the labels of outputs whose values the reference states hold."""
+    """Return one comparison per output of each kernel. `known` are the labels of outputs with reference values."""
     return tuple(
         _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
     )
 
 
 def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
-    """Inputs of all these kernels, by the reference states' names, each once."""
+    """Return the inputs of all these kernels without duplicates, by their names in the reference states."""
     return tuple(
         dict.fromkeys(
             GivenVector(given_name(v.name, kernel.variant), v.size, v.size == n)

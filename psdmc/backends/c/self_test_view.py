@@ -1,4 +1,4 @@
-"""The package's own test in the form that its templates print: calls, inputs, and the sizes of its buffers."""
+"""The package's self-test in the form that its templates print: calls, inputs, and the sizes of its buffers."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from psdmc.backends.self_test import TOLERANCES
 class SelfTestView:
     """The self-test of one package.
 
-    kernels  of all its functions
+    kernels  of all functions of the package
     dof      length of rates and torques
-    known    labels of the outputs whose values the reference states hold
-    beside   number of further C functions that it compares: of loads, bodies and friction
+    known    labels of the outputs that have reference values
+    beside   number of further C functions that it compares: for loads, bodies and friction
     """
 
     kernels: tuple[KernelView, ...]
@@ -28,12 +28,12 @@ class SelfTestView:
 
     @property
     def checks(self) -> tuple[SelfCheck, ...]:
-        """Every kernel's calls; those without a reference value are marked."""
+        """The calls of every kernel. Calls without a reference value are marked."""
         return self_checks(self.kernels, self.dof, self.options, self.known)
 
     @property
     def functions(self) -> int:
-        """Number of C functions whose values are compared: kernels, loads, bodies and friction."""
+        """The number of C functions whose values are compared: kernels, and functions for loads, bodies and friction."""
         return len({check.kernel for check in self.checks if check.expected}) + self.beside
 
     @property
@@ -43,12 +43,12 @@ class SelfTestView:
 
     @property
     def given(self) -> tuple[GivenVector, ...]:
-        """Inputs of all kernels, by the reference states' names."""
+        """The inputs of all kernels, by their names in the reference states."""
         return given_vectors(self.kernels, self.dof)
 
     @property
     def given_otherwise(self) -> bool:
-        """Whether some input is not a vector with one entry per joint."""
+        """Whether some input of the tested functions is not a vector with one entry per joint."""
         return not all(vector.of_joints for vector in self.given)
 
     @property

@@ -1,4 +1,4 @@
-"""Constant tables of the package: joint names and limits, gravity, base parameters."""
+"""Constant tables of the C package: joint names and limits, gravity, base parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from psdmc.backends.info import PackageInfo
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One constant array in C and, as a constexpr member, in C++.
+    """One constant array in C that is also a constexpr member of the C++ class.
 
     name          without the robot's prefix
     declaration   in C, without `extern`
@@ -33,7 +33,7 @@ class Table:
 def tables(
     info: PackageInfo, robot: str, real: str, with_frames: bool = False, with_texts: bool = True
 ) -> tuple[Table, ...]:
-    """All tables of a package, in the header's order; texts only where the target has them."""
+    """Return all tables of a package in the header's order. Tables of texts exist only if the target has texts."""
     lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
     lengths |= {"frames": f"{robot}_FRAMES", "joints": f"{robot}_JOINTS"}
 
@@ -80,8 +80,9 @@ def _cpp_number(value: float | None, real: str) -> str:
 
 
 def number(value: float | None, real: str) -> str:
-    """A real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the infinity or zero it
-    rounds to. tcc takes no minus before INFINITY in a constant, so that minus infinity is a product."""
+    """Return C text of a real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the
+    infinity or zero to which it rounds. Minus infinity is written as a product, because tcc does not accept a minus
+    before INFINITY."""
     if value is None or math.isnan(value):
         return f"({real})NAN"
     value = rounded_out(value, real)

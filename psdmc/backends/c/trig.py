@@ -3,10 +3,10 @@
     q = k pi/2 + r,  k = round(2 q / pi),  |r| <= pi/4        pi/2 in parts whose products with k are exact
     sin r = r - r^3 P(r^2)        cos r = 1 - r^2/2 + r^4 Q(r^2)
 
-and k mod 4 says which of the two is sine, which cosine, and their signs. docs/trigonometry.md derives the
-error bounds; tests/trig/minimax.py is where the numbers come from, and a test holds them to it.
+k mod 4 decides which of the two polynomials gives the sine and which the cosine, and their signs. docs/trigonometry.md
+derives the error bounds. tests/trig/minimax.py computes the coefficients, and a test compares them with these.
 
-How a generated C file gets it, `templates/trig/` being rendered with `trig=` one of these views:
+A generated C file includes the following templates of `templates/trig/`, each with `trig=` one of these views:
 
     preamble.jinja         trig_preamble(prefix, real, far)       once per C file
     #if HAS_VECTORS                                               (psdmc/target/vectors.py)
@@ -32,7 +32,7 @@ Far = Literal["libm", "nan"]
 
 
 def far_of(trig: Trig) -> Far:
-    """What becomes of angles beyond the inline sincos's range."""
+    """Return what the generated code does with angles outside the range of the inline sincos."""
     return "nan" if trig == "freestanding" else "libm"
 
 
@@ -42,7 +42,8 @@ SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
 
 @dataclass(frozen=True, slots=True)
 class AnySign:
-    """C test whether any lane of `*bits` is negative: `c` where `guard` is defined, else `plain` < 0; no guard: always."""
+    """C test of whether a lane of `*bits` is negative: `c` if the macro `guard` is defined, else `plain` < 0. Without a
+    guard, the test is always `c`."""
 
     guard: str
     c: str
@@ -60,9 +61,10 @@ class TrigPreamble:
 
 @dataclass(frozen=True, slots=True)
 class ScalarTrig:
-    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size (vectors: signed).
+    """View for sincos_scalar.jinja. The type vec is the real type itself; ivec is an unsigned integer of the same size
+    (in vectors: signed).
 
-    rounded  integer that k is converted to
+    rounded  integer type to which k is converted
     """
 
     macro: str
@@ -85,7 +87,7 @@ class ScalarTrig:
 
 @dataclass(frozen=True, slots=True)
 class VectorTrig(ScalarTrig):
-    """View of sincos_vector.jinja and types.jinja: vec is lanes x real, ivec lanes x integer (signed)."""
+    """View for sincos_vector.jinja and types.jinja: vec has `lanes` reals, ivec has `lanes` signed integers."""
 
     near_symbol: str
     far_symbol: str
@@ -97,14 +99,15 @@ class VectorTrig(ScalarTrig):
 
 
 def trig_preamble(prefix: str, real: Real, far: Far = "libm") -> TrigPreamble:
-    """View of preamble.jinja; prefix is the robot's identifier, as in every view here."""
+    """Return the view for preamble.jinja. In all views here, prefix is the robot's identifier."""
     return TrigPreamble(_macro(prefix), real, far == "libm")
 
 
 def scalar_trig(prefix: str, real: Real, far: Far = "libm", short: bool = False) -> ScalarTrig:
-    """View of sincos_scalar.jinja: <prefix>_sincos_f64 or _f32, angle and results behind pointers.
+    """Return the view for sincos_scalar.jinja: the C function <prefix>_sincos_f64 or _f32, which takes pointers to the
+    angle and the results.
 
-    short  convert k to int, which it fits, for machines on which wider ones take a call
+    short  convert k to int, which is large enough, for machines on which wider integers need a function call
     """
     suffix = _suffix(real)
     return ScalarTrig(
@@ -135,9 +138,9 @@ def vector_trig(
     vec: str | None = None,
     ivec: str | None = None,
 ) -> VectorTrig:
-    """View of sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of one of a target's units.
+    """Return the view for sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of one of a target's units.
 
-    vec and ivec name types that the C file has; by default types.jinja's <prefix>_f64x8, <prefix>_i64x8.
+    vec and ivec are names of types in the C file; by default <prefix>_f64x8 and <prefix>_i64x8 of types.jinja.
     """
     bits = NUMBERS[real].bits
     lanes = unit.bytes * 8 // bits

@@ -1,4 +1,4 @@
-"""A package's vectors and the sines taken on them, in the form that templates print."""
+"""The SIMD vectors of a package, and the sines that are computed on them, in the form that templates print."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 @dataclass(frozen=True, slots=True)
 class VectorsView:
-    """The vectors that the C computes with, and its inline sine and cosine.
+    """The vectors with which the C code computes, and its inline sine and cosine.
 
-    robot   identifier that every symbol starts with
+    robot   identifier with which every symbol starts
     counts  numbers of limbs that share a vector, over all kernels
     """
 
@@ -34,7 +34,7 @@ class VectorsView:
 
     @property
     def condition(self) -> str:
-        """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
+        """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the inline sincos needs."""
         is_double = c_real(self.options) == "double"
         return HAS_VECTORS if is_double else f"{HAS_VECTORS} && {FLOATS_STAY}"
 
@@ -45,7 +45,7 @@ class VectorsView:
 
     @property
     def block_bytes(self) -> int:
-        """Bytes of one variable in a block of lanes."""
+        """The number of bytes that one variable takes in a block with one state per lane."""
         return LANE_BLOCK_BYTES
 
     @property
@@ -55,12 +55,12 @@ class VectorsView:
 
     @property
     def preamble(self) -> TrigPreamble:
-        """What the inline sines of all widths share."""
+        """The C code that the inline sines of all vector widths share."""
         return trig_preamble(self.robot, c_real(self.options), far_of(self.options.trig))
 
     @property
     def sines(self) -> tuple[VectorTrig, ...]:
-        """The inline sincos for each vector width that vectors.h may choose, for lanes or for one state's angles."""
+        """The inline sincos for each vector width that vectors.h may choose, for SIMD lanes or for one state's angles."""
         units = dict.fromkeys(width.unit for width in self.widths)
         units |= dict.fromkeys(width.angles.unit for width in self.widths)
         units |= dict.fromkeys(limb_units(self.of_limbs, self.options))
@@ -75,6 +75,6 @@ class VectorsView:
 
     @property
     def sincos_types(self) -> tuple[tuple[str, str], ...]:
-        """Vectors whose sines are taken: the macro of their width, and the type."""
+        """The vectors whose sines are computed: the macro of their width, and the type."""
         limbs = ((f"{vector.macro}_WIDTH", vector.name) for vector in self.of_limbs)
         return (("WIDTH", "lanes"), ("ANGLE_WIDTH", "angles"), *limbs)

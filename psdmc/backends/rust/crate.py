@@ -1,4 +1,4 @@
-"""A crate in the form that templates print, from the emission."""
+"""A Rust crate in the form that templates print."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class Constant(NamedTuple):
 
 
 class Check(NamedTuple):
-    """One output's comparison in the self-test: its label, the rows that are compared by themselves, and the call for state
-    k; `values` are None where no reference state has any."""
+    """One output's comparison in the self-test: its label, the rows that are compared separately, and the call for
+    state k. `values` are None if no reference state has any."""
 
     name: str
     rows: int
@@ -52,7 +52,7 @@ class Check(NamedTuple):
 
 
 class KernelText(NamedTuple):
-    """One Rust function; `pivots` are the numbers and values to look at, in their order."""
+    """One Rust function; `pivots` are the numbers and values that the function tests, in their order."""
 
     name: str
     parameters: str
@@ -90,7 +90,8 @@ class CrateView:
 
 
 def crate_view(given: Emission) -> CrateView:
-    """The crate with all decisions made; InputError where there is nothing to emit, or Rust has no form for it."""
+    """Return the crate with all decisions made. Raises InputError if there are no functions, or if Rust code for them
+    is not supported."""
     info, robot, functions = given.info, identifier(given.info.name), given.functions
     if not functions or info.l == 0:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one, of links with inertia")
@@ -233,7 +234,8 @@ def _literal(value: Any) -> str:
 
 
 def polynomial(terms: Sequence[float]) -> str:
-    """In z and z2 = z^2, constant term first: pairs (Estrin), half as deep as Horner's form."""
+    """Return a Rust expression of a polynomial in z, with z2 = z^2 and the constant term first. Terms are evaluated in
+    pairs (Estrin's scheme), which is half as deep as Horner's form."""
     *pairs, found = (f"fma(z, {b!r}, {a!r})" for a, b in zip(terms[::2], terms[1::2], strict=True))
     for pair in reversed(pairs):
         found = f"fma(z2, {found}, {pair})"

@@ -1,4 +1,4 @@
-"""All contestants, in the order of the tables."""
+"""The libraries that the benchmark compares, psdmc's own code included, in the order of its tables."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from psdmc.errors import PsdmcError
 
 
 class Builder(Protocol):
-    """Builds one rival's contestants for a case under given compiler flags."""
+    """A function that compiles one library's code for a robot with the given compiler flags, and returns its compared
+    functions."""
 
     def __call__(self, case: Case, flags: tuple[str, ...]) -> Sequence[Contestant | Unavailable]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A rival. counted: whether its instructions are worth counting."""
+    """A library that takes part in the benchmark. counted: whether its instructions are counted."""
 
     name: str
     build: Builder
@@ -30,7 +31,8 @@ class Entrant:
     def contestants(
         self, case: Case, flags: tuple[str, ...] | None = None
     ) -> Sequence[Contestant | Unavailable]:
-        """Its contestants for this machine, or under other flags; or why there are none."""
+        """Return the library's functions for this robot, compiled for this machine or with other flags; or why there are
+        none."""
         try:
             return self.build(case, flags or native_flags())
         except (PsdmcError, OSError) as error:

@@ -1,4 +1,4 @@
-"""psdmc's own libraries: the compiled package, called by the same loops as every rival."""
+"""psdmc's own C packages, called by the same loops as the other libraries."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailabl
 def contestants(
     case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...]
 ) -> list[Contestant]:
-    """psdmc's functions for one robot: one state a call, rows, and lane by lane."""
+    """Return psdmc's functions for one robot in three layouts: one state per call, rows, and SIMD lanes."""
     kernels = kernels_of(case.model, lowering, tuple(functions))
     package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
     library = compiled(package, flags)
@@ -76,7 +76,8 @@ def contestants(
 
 @lru_cache(maxsize=2)
 def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
-    """Kernels, lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
+    """Return the kernels of a robot's functions. They are computed once for all compiler flags, as this takes longer
+    than compiling."""
     return lower(model, lowering, functions, theta_variants=False)
 
 
@@ -112,7 +113,7 @@ def _ways(
 
 
 def compiled(package: PackageView, flags: tuple[str, ...]) -> Path:
-    """The package as a shared library behind the loops; ToolchainError where it does not compile."""
+    """Compile the C package and the loops into a shared library. Raise ToolchainError if that fails."""
     files = library_files(package)
     robot = package.robot
     home = _library(files, package.sources, robot, flags)
@@ -145,7 +146,7 @@ def _library(files: dict[str, str], sources: tuple[str, ...], robot: str, flags:
 
 
 def glue(package: PackageView) -> str:
-    """C++ that connects the package's functions with the loops."""
+    """Return C++ code through which the benchmark's loops call the package's functions."""
     lines = ['#include "loops.hpp"', '#include "library.h"']
     for view in package.functions:
         symbol, given = f"{package.robot}_{view.name}", _given(view.signature)

@@ -1,4 +1,5 @@
-"""The extra columns of a fit, from the tables of a description: [[springs]] and [friction]."""
+"""Springs and further friction in a fit, as read from the tables [[springs]] and [friction] of a log description. Each
+unknown value adds a column to the linear problem."""
 
 from __future__ import annotations
 
@@ -29,10 +30,11 @@ HINT = "docs/how-to/springs-and-friction.md describes these tables"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """The effects of a fit beside rigid bodies and plain friction.
+    """The effects that a fit has in addition to rigid bodies and plain friction.
 
-    content        the tables that they were read from, plain values
-    plain_offsets  whether plain friction has offsets where it would; False: some joints' are among the effects, or none's
+    content        the tables from which they were read, as plain values
+    plain_offsets  False: the plain friction of joints has no offsets, because some joints have an offset among these
+                   effects, or no joint has one
     """
 
     effects: tuple[Effect, ...] = ()
@@ -48,12 +50,12 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """For messages."""
+        """Names of the values, for messages."""
         return tuple(f"{unknown.name} of {unknown.owner}" for unknown in self.unknowns)
 
     @property
     def of_springs(self) -> NDArray[np.bool_]:
-        """(m,) whether a value is a spring's; the others are joints'."""
+        """(m,) whether a value belongs to a spring; other values belong to joints."""
         own = [[isinstance(effect, Spring)] * len(effect.unknowns) for effect in self.effects]
         return np.array([is_own for each in own for is_own in each], dtype=bool)
 
@@ -67,17 +69,17 @@ class Columns:
 
     @property
     def start(self) -> Array:
-        """(m,) values that are kept where the data do not show them."""
+        """(m,) values that remain if the data do not determine them."""
         return np.array([unknown.start for unknown in self.unknowns])
 
     def values(self, motion: Motion) -> Array:
-        """(N, n, m) motor torque per unit of each unknown, before any filter."""
+        """Return the motor torque (N, n, m) per unit of each unknown value, before any filter."""
         if not self.effects:
             return np.zeros((*motion.q.shape, 0))
         return np.concatenate([effect.columns(motion) for effect in self.effects], axis=2)
 
     def without_load(self) -> Columns:
-        """Those that do not depend on the rigid bodies' torque."""
+        """The effects that do not depend on the torque of the rigid bodies."""
         kept = tuple(effect for effect in self.effects if not effect.by_load)
         return replace(self, effects=kept)
 
@@ -89,13 +91,13 @@ def read_columns(
     offsets: bool = True,
     folder: Path | None = None,
 ) -> Columns:
-    """The columns of a description's tables `springs` and `friction`; other keys are not looked at.
+    """Return the effects in the tables `springs` and `friction` of a log description; other tables are ignored.
 
-    where    the file, for messages
-    offsets  whether plain friction has offsets unless the tables say otherwise
-    folder   of the Python files of users' own friction laws; None: no file is run, as for a model file's content
+    where    name of the file, for messages
+    offsets  whether plain friction has offsets, unless the tables say otherwise
+    folder   folder of the Python files with users' own friction laws; None: no file is run, as for a model file's content
 
-    InputError with the first faults.
+    Raises InputError with the first faults.
     """
     faults: list[str] = []
     springs = _springs(content.get("springs", []), chain, faults)

@@ -1,4 +1,5 @@
-"""An effect beside rigid bodies and plain friction: unknown values, and the torque that a unit of each takes."""
+"""An effect in a fit in addition to rigid bodies and plain friction, such as a spring: unknown values, and the torque
+per unit of each value."""
 
 from __future__ import annotations
 
@@ -13,11 +14,11 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One value to be found, of a joint or of a spring, its owner.
+    """One unknown value of a joint or of a spring, which is its owner.
 
-    never_negative  whether only values from zero on are possible: friction takes energy, a gas spring pushes
-    within          name of another value of the same owner that its size may not exceed; "": none
-    start           where the data do not show it
+    never_negative  whether the value may not be negative, as for friction and for the force of a gas spring
+    within          name of another value of the same owner, which the magnitude of this one may not exceed; "": none
+    start           the result if the data do not determine the value
     """
 
     owner: str
@@ -30,13 +31,13 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Rows of a motion. N rows, n joints.
+    """N samples of a motion of n joints, from which the columns of effects are computed.
 
     q, qd         (N, n)  rad, rad/s (m, m/s)
-    place, speed  (N, n)  of what rubs: the joints', or where motors drive several joints, the motors'
+    place, speed  (N, n)  position and speed of what has friction: the joints, or the motors if these are coupled
     sign_speed    rad/s over which friction changes sign: tanh(speed / sign_speed)
-    load          (N, n)  torque of the rigid bodies on what rubs, N m (N); None where no effect asks for it
-    onto          (n, n)  torques of what rubs @ onto are the joints'; None: they are these themselves
+    load          (N, n)  torque of the rigid bodies on what has friction, N m (N); None if no effect needs it
+    onto          (n, n)  friction torques @ onto are joint torques; None: they are joint torques already
     """
 
     q: Array
@@ -49,28 +50,28 @@ class Motion:
 
 
 class Effect(Protocol):
-    """What one entry of a description adds to the torque of the motors: the sum over unknowns of value times column."""
+    """What one entry of a log description adds to the motor torques: the sum of unknown values times columns."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]: ...
 
     @property
     def by_load(self) -> bool:
-        """Whether its columns depend on the torque of the rigid bodies."""
+        """Whether the columns depend on the torque of the rigid bodies."""
         ...
 
     def columns(self, motion: Motion) -> Array:
-        """(N, n, unknowns) motor torque per unit of each, before any filter."""
+        """Return the motor torque (N, n, unknowns) per unit of each unknown value, before any filter."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of spring: the file that it has in `kinds`.
+    """One kind of spring, which has a file in the folder `kinds`.
 
-    name  the `kind` of a [[springs]] entry
-    keys  of the entry, beside `kind` and `name`
-    read  the effects of an entry: from its table and the robot. Faults go to the table's
+    name  the `kind` in an entry [[springs]]
+    keys  keys of the entry in addition to `kind` and `name`
+    read  function that returns the effects of an entry from its table and the robot; faults go to the table's list
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Friction of single joints by terms of friction laws."""
+"""Friction of single joints as effects of a fit, built from terms of friction laws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbing:
-    """Terms, each of one joint, and all their values one after the other."""
+    """The effect of friction terms, one joint per term; the values of all terms follow one another."""
 
     terms: tuple[tuple[int, Term], ...]
     unknowns: tuple[Unknown, ...]
@@ -38,7 +38,7 @@ class Rubbing:
 
 
 def rubbing(terms: Sequence[tuple[int, Term]], chain: Mechanism) -> Rubbing:
-    """The effect of terms, each of one joint."""
+    """Return the effect of friction terms, each of which belongs to one joint."""
     unknowns = [
         Unknown(chain.joint_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
         for joint, term in terms

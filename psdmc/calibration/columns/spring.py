@@ -1,4 +1,4 @@
-"""A spring along a way: a force at a reference length, a rate, and friction of its rod."""
+"""The effect of a spring in a fit: its tension at a reference length, its stiffness, and the friction of its rod."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ SLIDING = 0.01
 
 
 def pull(length: Array, rate: Array, reference: float) -> Array:
-    """A force that shortens the spring."""
+    """Return the tension per unit of a constant force that shortens the spring."""
     return np.ones_like(length)
 
 
 def push(length: Array, rate: Array, reference: float) -> Array:
-    """A force that lengthens it."""
+    """Return the tension per unit of a constant force that lengthens the spring."""
     return -np.ones_like(length)
 
 
 def stretch(length: Array, rate: Array, reference: float) -> Array:
-    """A force that grows with the length, shortening it; equally one that pushes and grows as it is shortened."""
+    """Return the tension per unit of stiffness: it grows with the length, and is zero at the reference length."""
     return length - reference
 
 
 def rub(length: Array, rate: Array, reference: float) -> Array:
-    """Friction of the rod against its motion."""
+    """Return the tension per unit of rod friction, which acts against the motion of the rod."""
     return np.asarray(np.tanh(rate / SLIDING))
 
 
@@ -41,10 +41,11 @@ Law = Callable[[Array, Array, float], Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spring:
-    """The tension is the sum over laws of value times law, and the motors hold against it: tau = tension * d length / dq.
+    """A spring in a fit. Its tension is the sum of unknown values times laws; motors balance it with tau = tension * d
+    length / dq.
 
-    laws       one for each unknown
-    reference  m (rad), where `force` is the whole tension
+    laws       one function for each unknown value
+    reference  m (rad), the length at which `force` is the whole tension
     """
 
     unknowns: tuple[Unknown, ...]

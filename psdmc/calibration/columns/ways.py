@@ -1,5 +1,5 @@
-"""What a spring's length is, as a function of the joints: a line between two points of two bodies, or a sum of joint
-coordinates."""
+"""Computes the length of a spring from the joint positions. The length is the distance between points of two links, or
+a sum of joint coordinates."""
 
 from __future__ import annotations
 
@@ -28,22 +28,23 @@ LEAST_CHANGE = 1e-6
 
 
 class Way(Protocol):
-    """A length s of the joints' positions, and its slopes.
+    """A length that depends on the joint positions, and its derivatives.
 
-    unit  of the length: m or rad
+    unit  unit of the length: m or rad
     """
 
     @property
     def unit(self) -> str: ...
 
     def length(self, q: Array) -> tuple[Array, Array]:
-        """(N,) length and (N, n) its slopes, of positions (N, n)."""
+        """Return the lengths (N,) and their derivatives (N, n) at positions (N, n)."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BetweenAnchors:
-    """The distance of two points, each fixed to a body; points (3,) in the body's joint frame, or the base frame."""
+    """The distance between two points that are fixed to bodies; points (3,) are in the body's joint frame, or in the
+    base frame."""
 
     chain: Mechanism
     bodies: tuple[int, int]
@@ -74,7 +75,7 @@ class BetweenAnchors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlongJoints:
-    """The sum of joint positions times ratios (n,): a cable over pulleys, or one joint itself."""
+    """The sum of joint positions times ratios (n,), as for a cable over pulleys or a spring on one joint."""
 
     ratios: Array
     unit: str
@@ -84,8 +85,8 @@ class AlongJoints:
 
 
 def anchored_way(table: TomlTable, chain: Mechanism) -> Way:
-    """The way between `from` and `to`, each { link, point } with the point (m) in the link's frame as the robot's file has
-    it; faults where there is none."""
+    """Return the distance between `from` and `to` of a table. Both are { link, point }, with the point (m) in the
+    link's frame of the robot file. Faults are added to the table's list."""
     ends = [_anchor(table, key, chain) for key in ("from", "to")]
     way = BetweenAnchors(chain, (ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]))
     if not table.faults:
@@ -128,7 +129,8 @@ def _require_line(way: BetweenAnchors, table: TomlTable, chain: Mechanism) -> No
 
 
 def jointed_way(table: TomlTable, chain: Mechanism) -> Way:
-    """The way along `joints`, a table of joint names with the length that each gives per unit of its position."""
+    """Return the length along `joints`, a table of joint names with the change of length per unit of each joint's
+    position."""
     value = table.content.get("joints")
     given = value if isinstance(value, dict) else {}
     if not given:
@@ -147,7 +149,8 @@ def jointed_way(table: TomlTable, chain: Mechanism) -> Way:
 
 
 def poses(chain: Mechanism) -> Array:
-    """(STATES, n) random positions within the limits, half a turn or half a metre where there are none."""
+    """Return random positions (STATES, n) within the limits, or within half a turn (half a metre) for joints without
+    limits."""
     rng = np.random.default_rng(SEED)
     wide = np.array([np.pi if joint.type.position_unit == "rad" else 0.5 for joint in chain.joints])
     lower = np.maximum([joint.limits.lower for joint in chain.joints], -wide)

@@ -1,4 +1,4 @@
-"""The logs that a description describes, in SI units and by the model's joints."""
+"""Reads the logs of a log description, in SI units and in the order of the model's joints."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ def described_logs(
     progress: Progress = lambda step: None,
     held: int = HELD_BYTES,
 ) -> tuple[AnyLog, ...]:
-    """All logs of a description, their joints in the order of these names.
+    """Return all logs of a log description, with their joints in the order of these names.
 
-    held   bytes of a log's rows in memory; more go to a temporary file
+    held   most bytes of a log's rows in memory; larger logs go to a temporary file
 
-    Raises InputError, with the description's name first, where a file is missing or is not what the description says.
+    Raises InputError, which begins with the description's name, if a file is missing or does not match the
+    description.
     """
     found = []
     for entry in description.part(LOGS):
@@ -187,10 +188,10 @@ def _side_by_side(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """Columns of a store: position, velocity where all have one, effort; n each.
+    """The columns of stored rows: position, velocity if all joints have one, and effort, n columns each.
 
     factors, zeros  (columns,)  SI value = factor * (number - zero)
-    sliding         names of joints in m; None where a unit was not said
+    sliding         names of joints in m; None if a unit is not known
     """
 
     columns: tuple[Found, ...]
@@ -205,9 +206,9 @@ class Layout:
 def in_si(
     time: Array, store: RowStore, layout: Layout, coupling: CouplingEntry, entry: LogEntry
 ) -> tuple[Array, RowStore]:
-    """The rows in SI units, delays taken out, of joints, between the entry's start and end.
+    """Return the rows of the joints in SI units and without delays, between the start and end that the entry gives.
 
-    Numbers that are not finite stay what they are: the checks of a log name them.
+    Numbers that are not finite stay as they are; the checks of a log report them later.
     """
     delays = np.array([found.delay for found in layout.columns])
     begin = time[0]
@@ -252,8 +253,10 @@ NEIGHBOURS = 4
 
 
 def without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tuple[Array, RowStore]:
-    """The rows whose columns are all there, column k being its value `delays[k]` (s) later; InputError where time does
-    not grow.
+    """Return the rows of a log without the delays of its columns: column k of a row is interpolated `delays[k]` (s)
+    later.
+
+    Only rows at which all columns have a value are returned. Raises InputError if time does not increase.
 
     time   (N,);  store  N rows of len(delays) columns
     """

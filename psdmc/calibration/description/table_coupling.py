@@ -1,4 +1,5 @@
-"""`[[coupling]]`: joints that several motors drive together, such as a wrist's, and which quantities are the motors'."""
+"""The table `[[coupling]]`: joints that several motors drive together, as in a wrist, and the quantities that are
+logged for motors."""
 
 from __future__ import annotations
 
@@ -24,7 +25,10 @@ LARGEST_CONDITION = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Joints that as many motors drive: q_joint = matrix q_motor; quantities: those whose columns are the motors'."""
+    """Joints that several motors drive together, with as many motors as joints: q_joint = matrix q_motor.
+
+    quantities  quantities whose columns in the log are values of the motors
+    """
 
     joints: tuple[str, ...]
     matrix: Matrix
@@ -33,7 +37,8 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class CouplingEntry:
-    """All groups, and by quantity the matrix of all the model's joints; empty where it has none."""
+    """All groups of coupled joints, and for each quantity the matrix of all joints; it is empty if the quantity has
+    none."""
 
     groups: tuple[Group, ...] = ()
     whole: Matrix = ()
@@ -102,7 +107,7 @@ def _matrix(table: TomlTable, n: int) -> Matrix:
 
 
 def whole_matrix(groups: list[Group] | tuple[Group, ...], joint_names: tuple[str, ...]) -> Matrix:
-    """C of all joints: one outside the groups; empty where there are no groups."""
+    """Return the coupling matrix of all joints, with ones for joints outside the groups; empty if there are no groups."""
     if not groups:
         return ()
     whole = np.eye(len(joint_names))

@@ -1,4 +1,5 @@
-"""`[fit]`: options of the linear fit that belong to the logs: cut-off, split, and each joint's friction."""
+"""The table `[fit]`: options of the linear fit, such as the filter's cut-off, the validation share and the friction
+terms."""
 
 from __future__ import annotations
 
@@ -22,12 +23,12 @@ SLOWEST, FASTEST = 1e-6, 10.0
 
 @dataclass(frozen=True, slots=True)
 class FitChoice:
-    """Choices of a description or of the command line; None: the default of LinearOptions.
+    """Options of the linear fit from a log description or the command line. None means the default of LinearOptions.
 
-    cutoff      Hz
-    split       share that is held out of each log for fitting, and blocks
-    exponents   of the terms that grow with speed;  offset  whether each joint's torque has a constant
-    sign_speed  rad/s (m/s)
+    cutoff      cut-off of the filter, Hz
+    split       share of each log that is held out for validation, and number of blocks
+    exponents   exponents of the viscous friction terms;  offset  whether each joint has a constant torque
+    sign_speed  speed over which Coulomb friction changes sign, rad/s (m/s)
     """
 
     cutoff: float | None = None
@@ -37,7 +38,7 @@ class FitChoice:
     sign_speed: float | None = None
 
     def by_flag(self) -> dict[str, object]:
-        """The choices by the option of the command line that makes them."""
+        """Return the chosen values by the command-line option that sets them."""
         return {"--cutoff": self.cutoff, "--split": self.split, "--friction": self.exponents}
 
 
@@ -60,7 +61,8 @@ def _given(table: TomlTable, key: str, low: float, high: float) -> float | None:
 
 
 def split_of(shares: Sequence[float]) -> SplitOptions | str:
-    """The split of a share, and of a number of blocks where there are two numbers; else what is wrong."""
+    """Return the split for one number (the share) or two (share and number of blocks). Return a text if the numbers
+    are wrong."""
     share, blocks = shares[0], shares[1] if len(shares) > 1 else 0.0
     if len(shares) > 2 or not 0.0 <= share <= LARGEST_HELD_OUT:
         return f"{', '.join(f'{x:g}' for x in shares)}: expected a share from 0 to {LARGEST_HELD_OUT:g}"
@@ -89,7 +91,7 @@ def _friction(table: TomlTable, faults: list[str]) -> tuple[tuple[float, ...], b
 
 
 def with_choice(options: LinearOptions, choice: FitChoice) -> LinearOptions:
-    """The options with everything that is chosen."""
+    """Return the options of the fit with every chosen value."""
     if choice.cutoff is not None:
         options = replace(options, filter=replace(options.filter, cutoff=choice.cutoff))
     plain = {

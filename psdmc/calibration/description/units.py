@@ -1,4 +1,4 @@
-"""Units of logged columns: what one of each is in SI units, and what it says of its joint."""
+"""Units of logged columns: their size in SI units, and what they imply about the joint."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TICKS = ("ticks", "ticks/s")
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit: `size` in SI units (s, rad, m, rad/s, m/s, N m, N, A)."""
+    """A unit; `size` is its size in SI units (s, rad, m, rad/s, m/s, N m, N, A)."""
 
     size: float
     says: Says

@@ -1,8 +1,9 @@
-"""Essential parameters: those that the data do not tell from the prior are left there, one after the other, as long as an
-F-test over all that were left does not object.
+"""Finds the essential parameters of a fit: parameters that the data do not distinguish from the prior are set to the
+prior.
 
-The statistic is Wald's, with the covariance that is reported: residuals that are correlated count by what they are worth.
-Backward elimination of the largest relative standard deviation is that of Khalil and Dombre (2002, section 12.4).
+They are dropped one after the other, the largest relative standard deviation first, while an F-test over all dropped
+parameters does not object (Khalil and Dombre 2002, section 12.4). The statistic is Wald's, with the reported
+covariance, which takes correlated residuals into account.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from psdmc.calibration.logs.log import Array
 class EssentialOptions:
     """How parameters are dropped.
 
-    relative      standard deviation, as a share of the value, above which a parameter is tried
-    significance  of the F-test: the chance of keeping parameters that all are the prior's
+    relative      relative standard deviation above which psdmc tries to drop a parameter
+    significance  of the F-test: the probability to keep parameters although all of them equal the prior
     """
 
     relative: float = 0.5
@@ -33,10 +34,10 @@ class EssentialOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Essential:
-    """An estimate with some entries at the prior, the others refitted.
+    """An estimate in which some parameters are set to the prior and the others are refitted.
 
-    dropped  (m,)  those entries
-    f        the statistic over all of them;  limit  that it may not exceed, NaN where none was dropped
+    dropped  (m,)  which parameters are set to the prior
+    f        F statistic over all of them;  limit  largest value that it may have, NaN if none was dropped
     """
 
     estimate: Estimate
@@ -48,11 +49,11 @@ class Essential:
 def essential(
     solved: Estimate, start: Array, samples: int, options: EssentialOptions, fit: FitOptions | None = None
 ) -> Essential:
-    """The estimate without what it does not need.
+    """Return the estimate without the parameters that the data do not need.
 
-    start    (m,)  the prior's values, which dropped entries take
-    samples  independent ones that were fitted, all joints together
-    fit      the options of the fit that found `solved`; None: the default ones
+    start    (m,)  the prior's values, which dropped parameters get
+    samples  number of independent samples that were fitted, all joints together
+    fit      options of the fit that found `solved`; None: the default ones
     """
     problem = _Problem(solved, start, max(samples - solved.rank, 1))
     dropped, needed = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
@@ -83,7 +84,7 @@ class _Problem:
         self.information = whitening.T @ whitening
 
     def restricted(self, dropped: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """The least values with the dropped ones at the prior, and standard deviations of the others."""
+        """Return the best values with the dropped parameters at the prior, and the standard deviations of the others."""
         covariance = self.covariance(dropped)
         free = ~dropped
         moved = np.where(dropped, self.start - self.values, 0.0)
@@ -92,7 +93,8 @@ class _Problem:
         return values, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def covariance(self, dropped: NDArray[np.bool_]) -> Array:
-        """(m, m) of the others where the dropped ones are known; zero for these."""
+        """Return the covariance (m, m) of the other parameters if the dropped ones are known; its entries for these
+        are zero."""
         free = np.flatnonzero(~dropped)
         covariance = np.zeros_like(self.information)
         own = self.information[np.ix_(free, free)]
@@ -101,7 +103,7 @@ class _Problem:
         return covariance
 
     def f(self, dropped: NDArray[np.bool_]) -> float:
-        """Growth of the cost per dropped entry."""
+        """Return the increase of the cost per dropped parameter, which is the F statistic."""
         if not dropped.any():
             return 0.0
         away = self.restricted(dropped)[0] - self.values

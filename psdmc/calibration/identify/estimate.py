@@ -1,4 +1,7 @@
-"""What a linear fit is given and gives: its options, what is known before, and the estimate with its covariance."""
+"""Inputs and results of a linear fit: its options, its prior, and the estimate with its covariance.
+
+A direction is a linear combination of unknowns; the data show it (it is seen) or not.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +20,18 @@ Method = Literal["ols", "wls", "irls"]
 class FitOptions:
     """How a linear problem is solved.
 
-    method          ols: all rows alike; wls: each joint by its own residual; irls: wls, and outliers count less (Huber)
-    rounds          of reweighting
-    huber           residual in standard deviations beyond which irls turns from squares to magnitudes: 1.345 keeps
-                    95 % of least squares' efficiency where errors are normal
-    rank_tolerance  share of its own size by which a column may be wrong, besides its noise: differentiation and filters
-                    leave about 1e-4
-    noise_ratio     how many times stronger than noise alone a direction must be: at ten, noise in the columns shrinks
+    method          ols: equal weights; wls: each joint is weighted by its residual; irls: like wls, with less weight for
+                    outliers (Huber)
+    rounds          number of reweightings
+    huber           residual in standard deviations beyond which irls uses magnitudes instead of squares: 1.345 keeps
+                    95 % of least squares' efficiency for normal errors
+    rank_tolerance  relative error of a column in addition to its noise: differentiation and filters cause about 1e-4
+    noise_ratio     how many times stronger than noise a direction must be: with ten, noise in the columns reduces
                     the result by a tenth at most
-    seen            standard deviation, in units of the prior's scale, from which the data no longer show a direction
-    unseen_share    share (squared, in the prior's units) of a parameter in unseen directions from which it is
+    seen            standard deviation, in units of the prior's scale, above which a direction is not seen
+    unseen_share    share (squared, in the prior's units) of a parameter in unseen directions above which it is
                     unidentifiable
-    clusters        contiguous stretches whose errors may be dependent, for the robust standard deviations
+    clusters        number of periods of time with dependent errors, for the robust standard deviations
     """
 
     method: Method = "wls"
@@ -43,10 +46,11 @@ class FitOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consider:
-    """Quantities that an earlier step left uncertain and this one uses: their effect is counted, not estimated.
+    """Uncertain results of an earlier step that this step uses. They add to its uncertainty but are not estimated
+    again.
 
     columns     (N, n, k)  change of (prediction - target) per unit of each quantity
-    covariance  (k, k)
+    covariance  (k, k)     of these quantities
     """
 
     columns: Array
@@ -55,11 +59,12 @@ class Consider:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """The values before the data are seen: kept in unseen directions, with the units that measure distances from them.
+    """Values before the fit. They remain in directions that the data do not show. `scale` gives the unit of distances
+    from them.
 
     values  (l,)       the file's parameters, or zero
-    scale   (l,)       positive: how far from them a parameter may believably lie
-    noise   (N, n, l)  columns that the sensors' noise alone would give; None where states are exact
+    scale   (l,)       positive: a plausible distance between a parameter and its value here
+    noise   (N, n, l)  columns that the sensors' noise alone would give; None if states are exact
     """
 
     values: Array
@@ -69,24 +74,24 @@ class Prior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """The solution of target = columns @ values. l unknowns, n joints, r directions seen.
+    """The solution of target = columns @ values, with l unknowns, n joints and r directions that the data show.
 
-    values            (l,)      by the data in seen directions; the prior's in unseen ones
-    covariance        (l, l)    of the fit alone, widened where residuals are correlated; none in unseen directions
-    considered        (l, k)    change of `values` per unit of what was considered; k may be 0
-    total_covariance  (l, l)    with what was considered
+    values            (l,)      from the data in seen directions, from the prior in the others
+    covariance        (l, l)    of the fit alone, larger if residuals are correlated; zero in unseen directions
+    considered        (l, k)    change of `values` per unit of the quantities in Consider; k may be 0
+    total_covariance  (l, l)    includes the uncertainty of these quantities
     unseen            (l, l - r)  orthonormal directions that the data do not show, in units of `scale`
-    scale             (l,)      the prior's, or the columns' where there is none
-    prior_std         of unseen directions, in units of `scale`; zero without a prior
-    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's in seen directions
-                                (its sum of squares over noise_factor^2), the prior's in others
-    identifiable      (l,)      whether the data see the parameter by itself
-    singular_values   (l,)      of the weighted, column-scaled problem, descending
-    rank              how many directions are seen
-    sigma             (n,)      residual RMS per joint, target's unit
-    weights           (N, n)    of the last round, one over unit; zero where a row did not count
+    scale             (l,)      the prior's, or the columns' if there is no prior
+    prior_std         standard deviation of unseen directions, in units of `scale`; zero without a prior
+    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances. In seen directions it comes from
+                                the data (their sum of squares over noise_factor^2), in the others from the prior
+    identifiable      (l,)      whether the data determine the parameter by itself
+    singular_values   (l,)      of the weighted problem with scaled columns, descending
+    rank              number of seen directions
+    sigma             (n,)      residual RMS per joint, in the unit of the target
+    weights           (N, n)    of the last round, one over unit; zero for rows that were not used
     correlation       (n,)      of the residual from sample to sample: near zero for noise
-    noise_factor      largest factor by which correlated residuals widened a standard deviation; near one for noise
+    noise_factor      largest factor by which correlated residuals increased a standard deviation; near one for noise
     """
 
     values: Array
@@ -107,20 +112,20 @@ class Estimate:
 
     @property
     def prior_covariance(self) -> Array:
-        """(l, l) covariance of the prior in directions that the data do not show."""
+        """Covariance (l, l) of the prior in directions that the data do not show."""
         directions = self.scale[:, None] * self.unseen
         return np.asarray(self.prior_std**2 * directions @ directions.T)
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations with what was considered and the prior's in unseen directions; infinite where
-        unidentifiable."""
+        """Standard deviations (l,), with the uncertainty of earlier steps, and of the prior in unseen directions. They
+        are infinite for unidentifiable parameters."""
         variance = np.diag(self.total_covariance) + np.diag(self.prior_covariance)
         return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
 
     @property
     def condition(self) -> float:
-        """Condition number of the seen part, columns scaled."""
+        """Condition number of the fit in the directions that the data show, with scaled columns."""
         return (
             float(self.singular_values[0] / self.singular_values[self.rank - 1])
             if self.rank

@@ -1,4 +1,4 @@
-"""What the linear fit must know of extra columns beside their rows: believable sizes, and limits between values."""
+"""Plausible sizes of spring and further friction values in a linear fit, and limits between such values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from psdmc.robot.mechanism import Mechanism
 def motion_of(
     q: Array, qd: Array, sign_speed: float, load: Array | None = None, coupling: Coupling | None = None
 ) -> Motion:
-    """The motion for columns, of joints' positions, speeds and rigid torques (N, n): with a coupling, motors rub."""
+    """Return the Motion for these columns from positions, speeds and rigid-body torques (N, n) of the joints. If
+    motors are coupled, friction acts on the motors."""
     if coupling is None:
         return Motion(q, qd, q, qd, sign_speed, load)
     of_motors = None if load is None else coupling.torque_of_motors(load)
@@ -27,9 +28,10 @@ def motion_of(
 
 
 def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Array) -> Array:
-    """(m,) believable size of each value: the one that explains a joint's whole torque where its column is largest.
+    """Return a plausible size (m,) of each value: that with which its largest column explains the whole torque of a
+    joint.
 
-    sizes  (n,) N m, of the joints' torques
+    sizes  (n,) N m, typical torques of the joints
     """
     if not len(columns):
         return np.zeros(0)
@@ -44,9 +46,10 @@ def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Ar
 
 
 def limits_of(columns: Columns, plain: Sequence[tuple[str, str]], l: int) -> Array:
-    """(k, l + n f + m) rows whose products with the vector may not be negative: values within that of their owner.
+    """Return rows (k, l + n f + m) whose products with the vector of unknowns may not be negative. They keep the
+    magnitude of a value below another value of the same joint.
 
-    plain  n f joints and names of plain friction
+    plain  names of the n f values of plain friction, with their joints
     """
     rows: list[Array] = []
     width = l + len(plain) + len(columns)

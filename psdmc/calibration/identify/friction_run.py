@@ -1,4 +1,4 @@
-"""One joint's friction run, ready to be compared with predictions."""
+"""Prepares the friction run of one joint and predicts its motor torque."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ MOST_KEPT = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRun:
-    """One joint's run, ready to be compared with predictions.
+    """The friction run of one joint, filtered and with its gravity torque.
 
-    kept  friction torques simulated last, by the bytes of their seven unknowns
+    kept  the latest simulated friction torques, by the bytes of their seven unknowns
     """
 
     time: Array
@@ -46,11 +46,12 @@ class JointRun:
         return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
 
     def torque(self, p: Array) -> Array:
-        """Motor torque for the unknowns (friction_fit.UNKNOWNS), before the low-pass."""
+        """Return the predicted motor torque for the unknowns (friction_fit.UNKNOWNS), before the low-pass filter."""
         return self.delayed(self.friction(p) + self.gravity + p[7] * self.qdd + p[8], p[9])
 
     def friction(self, p: Array) -> Array:
-        """Friction torque alone, simulated once for equal parameters: the other unknowns leave it as it is."""
+        """Return the predicted friction torque. It depends on the first seven unknowns only, and is simulated once for
+        equal values."""
         key = p[:7].tobytes()
         if key not in self.kept:
             if len(self.kept) >= MOST_KEPT:
@@ -59,7 +60,7 @@ class JointRun:
         return self.kept[key]
 
     def delayed(self, torque: Array, delay: float) -> Array:
-        """What is written at t is what happened at t + delay."""
+        """Shift a torque in time: the value at time t becomes that at t + delay."""
         return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
 
     def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
@@ -75,7 +76,8 @@ def prepared(
     k: int,
     options: StepOptions,
 ) -> JointRun:
-    """One joint's run against what gravity and tool take of its torque; InputError where other joints move too."""
+    """Return the friction run of joint k with the torques of gravity and of the known load. Raises InputError if other
+    joints move, too."""
     states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
     _require_alone(run, chain, k, states)
     gravity = (gravity_regressor(model, states.q) @ theta_gravity)[:, k]

@@ -1,4 +1,4 @@
-"""Step two: the gravity parameters from slow motion forwards and backwards, (18)."""
+"""Step two: determines the gravity parameters from slow motion forwards and backwards. Source: Denso-2022, (18)."""
 
 from __future__ import annotations
 
@@ -34,11 +34,12 @@ DEPENDENT = 1e-8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravitySplit:
-    """Which combinations of theta_b gravity can see, in the model's own order.
+    """Splits theta_b into combinations phi that affect gravity torques and other entries psi, in the order of the
+    model.
 
-    l base parameters, r gravity parameters phi.
+    There are l base parameters and r gravity parameters phi.
 
-    pivots      (r,)    theta_b entries that phi stands for, beside others
+    pivots      (r,)    entries of theta_b that phi consists of, together with multiples of psi
     rest        (l-r,)  the other entries, psi
     dependence  (r, l-r) phi = theta_b[pivots] + dependence @ theta_b[rest]
     """
@@ -48,13 +49,13 @@ class GravitySplit:
     dependence: Array
 
     def from_phi(self) -> Array:
-        """(l, r) d theta_b / d phi with psi held."""
+        """Derivatives (l, r) of theta_b by phi at constant psi."""
         matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.pivots)))
         matrix[self.pivots] = np.eye(len(self.pivots))
         return matrix
 
     def from_psi(self) -> Array:
-        """(l, l-r) d theta_b / d psi with phi held."""
+        """Derivatives (l, l-r) of theta_b by psi at constant phi."""
         matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.rest)))
         matrix[self.rest] = np.eye(len(self.rest))
         matrix[self.pivots] = -self.dependence
@@ -66,7 +67,8 @@ class GravitySplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityResult:
-    """phi with its uncertainty; `considered` is d phi per relative change of each torque constant, (r, n)."""
+    """The gravity parameters phi with their uncertainty. `considered` is d phi per relative change of each torque
+    constant, (r, n)."""
 
     split: GravitySplit
     estimate: Estimate
@@ -74,7 +76,8 @@ class GravityResult:
 
 
 def gravity_split(chain: Mechanism, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
-    """The observable subset: gravity columns in order, each a pivot where it is new."""
+    """Return the split of theta_b. A column of the gravity regressor becomes a pivot if it is independent of the
+    earlier ones."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (max(4 * l, 40), len(chain)))
     columns = gravity_regressor(model, q).reshape(-1, l)
@@ -106,10 +109,10 @@ def calibrate_gravity(
     theta_b: Array | None = None,
     file_theta: Array | None = None,
 ) -> GravityResult:
-    """phi by linear least squares over samples averaged over both directions.
+    """Return phi by linear least squares over samples that are averaged over both directions, which cancels friction.
 
     theta_b     from an earlier pass: its velocity and acceleration torques are subtracted
-    file_theta  the file's values, kept where the runs show nothing; None: zero
+    file_theta  the file's values, which remain in directions that no run shows; None: zero
     """
     q, target, use, currents = _even_parts(chain, model, motors, runs, options, theta_b)
     columns = gravity_regressor(model, q)[:, :, split.pivots]
@@ -130,7 +133,7 @@ def judge_gravity(
     options: StepOptions,
     theta_b: Array,
 ) -> StepQuality:
-    """Torque averaged over both directions against the gravity of these base parameters."""
+    """Return the quality of the gravity torques of theta_b, compared with torques averaged over both directions."""
     q, target, use, _ = _even_parts(chain, model, motors, runs, options, theta_b)
     out = held_out(len(q), options.split)
     predicted = gravity_regressor(model, q) @ theta_b

@@ -1,7 +1,7 @@
-"""Step four: the inertial parameters from fast motion, after the earlier steps' results are subtracted, (21).
+"""Step four: determines the inertial parameters from fast motion, after the results of the earlier steps are
+subtracted. Source: Denso-2022, (21).
 
-Every prediction passes through the same filter as the measurement, with the same delay: a current that is read late is
-compared with a prediction read late.
+Every prediction gets the same filter and the same delay as the measurement.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ FRICTION_STEP = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InertialResult:
-    """The complete theta_b.
+    """The complete theta_b after step four.
 
     theta_b       (l,)    gravity and inertial parameters together
     covariance    (l, l)  with the uncertainty of torque constants, gravity and friction
-    identifiable  (l,)
-    estimate      of psi, the parameters that gravity does not show
-    unseen        (l, k)  directions of theta_b that no run shows, SI, each as long as is believable
-    scale         (l,)    believable size of each base parameter
+    identifiable  (l,)    whether the data determine the parameter by itself
+    estimate      of psi, the parameters that do not affect gravity torques
+    unseen        (l, k)  directions of theta_b that no run shows, SI, each with a plausible length
+    scale         (l,)    plausible size of each base parameter
     """
 
     theta_b: Array
@@ -55,7 +55,7 @@ class InertialResult:
 
     @property
     def prior_covariance(self) -> Array:
-        """(l, l) covariance of the prior in the directions that no run shows."""
+        """Covariance (l, l) of the prior in the directions that no run shows."""
         return np.asarray(self.estimate.prior_std**2 * self.unseen @ self.unseen.T)
 
     @property
@@ -87,9 +87,9 @@ def calibrate_inertial(
     options: StepOptions,
     file_theta: Array | None = None,
 ) -> InertialResult:
-    """psi by linear least squares, combined with the gravity parameters to theta_b.
+    """Return psi by linear least squares, combined with the gravity parameters to theta_b.
 
-    file_theta  the file's values, kept where the runs show nothing; None: zero
+    file_theta  the file's values, which remain in directions that no run shows; None: zero
     """
     split = gravity.split
     rows = _stacked([_rows(chain, model, motors, friction, run, options) for run in runs])
@@ -129,8 +129,8 @@ def judge_inertial(
     runs: Sequence[InertialRun],
     options: StepOptions,
 ) -> tuple[StepQuality, StepQuality]:
-    """Two qualities on the fast motion: of inertia alone, after gravity and friction are subtracted; and of the whole
-    torque."""
+    """Return two qualities on the fast motion: of the inertial torque after gravity and friction are subtracted, and
+    of the whole torque."""
     split = gravity_split(chain, model, len(theta_b))
     rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
     still = split.from_phi() @ split.phi(theta_b)
@@ -196,7 +196,7 @@ def _late_columns(model: Regressor, late: Late, motion: tuple[Array, Array, Arra
 
 
 class Late:
-    """Turns a prediction into what a log would hold: delayed, filtered, one row per independent sample."""
+    """Converts a prediction to what a log would contain: delayed, filtered, one row per independent sample."""
 
     def __init__(self, states: States, delay: float, at: NDArray[np.intp]) -> None:
         self.states, self.delay, self.at = states, delay, at

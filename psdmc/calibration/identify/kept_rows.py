@@ -1,4 +1,4 @@
-"""Blocks of a linear problem kept for several rounds: in memory while they are few, then in a temporary file."""
+"""Stores blocks of a linear problem for several rounds: in memory while they are small, then in a temporary file."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ BLOCK_SAMPLES = 2048
 
 
 class KeptRows:
-    """Rows of a problem: appended once, read repeatedly.
+    """Rows of a linear problem with n joints and l unknowns. They are appended once and read repeatedly.
 
-    n joints, l unknowns;  held  bytes in memory before a file is used
+    held  most bytes in memory before a file is used
     """
 
     def __init__(self, n: int, l: int, held: int) -> None:
@@ -32,7 +32,7 @@ class KeptRows:
         return self._columns.on_disk
 
     def append(self, columns: Array, noise: Array) -> None:
-        """(k, n, l) each: the columns, and the columns that sensor noise alone would give."""
+        """Append k rows: columns (k, n, l), and the columns (k, n, l) that sensor noise alone would give."""
         for store, values in ((self._columns, columns), (self._noise, noise)):
             store.append(np.ascontiguousarray(values.reshape(len(values), -1)))
 

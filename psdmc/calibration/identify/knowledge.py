@@ -1,5 +1,5 @@
-"""What a user knows of the bodies before the fit: confidence in the file's values, and bounds, from the tables `prior` and
-[[bodies]] of a description."""
+"""What a user knows of the links before the fit: confidence in the file's values, and bounds. It comes from the tables
+`prior` and [[bodies]] of a log description."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ HINT = "docs/how-to/priors.md describes these tables"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Knowledge:
-    """What is known before the fit.
+    """What is known of the links before the fit.
 
-    confidence  by number of the link; empty: nothing is stated
-    bounds      of masses and centres of mass
+    confidence  confidence in a link's values, by its index; empty: none is stated
+    bounds      bounds of masses and centres of mass
     essential   how parameters are dropped; None: all are kept
     """
 
@@ -52,9 +52,10 @@ def knowledge_of(
     share: float | None = None,
     essential: EssentialOptions | None = None,
 ) -> Knowledge:
-    """What tables and options say; InputError where they are wrong, or state confidence in values that the file lacks.
+    """Return what tables and options state. Raises InputError if they are wrong, or if they state confidence in values
+    that the file does not give.
 
-    share  relative standard deviation of every link's mass, radius of gyration and inertia; None: what `prior` says
+    share  relative standard deviation of every link's mass, radius of gyration and inertia; None: the value in `prior`
     """
     faults: list[str] = []
     if share is not None and not SHARES[0] <= share <= SHARES[1]:

@@ -1,4 +1,4 @@
-"""A known load on a robot: its torques along a log, and which joints its weight does not reach."""
+"""A known load on a robot: its torques along a log, and the joints on which its weight does not act."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ truer."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownLoad:
-    """A body of known mass on a frame of a robot.
+    """A body of known mass that is fixed to a frame of a robot.
 
     mass, com, inertia  kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz); zeros: a
-                        point
-    frame               its name; None: the tip
+                        point mass
+    frame               name of the frame; None: the tip
     """
 
     mass: float
@@ -46,7 +46,8 @@ class KnownLoad:
         return not np.any(self.inertia)
 
     def parameters(self, chain: Mechanism) -> Array:
-        """(11 n,) standard parameters of the chain if it had no body but the load; InputError where no body is like it."""
+        """Return the standard parameters (11 n,) of a robot with no body but the load. Raises InputError if no real
+        body has them."""
         place = carrying_frame(chain, self.frame)
         alone = np.zeros(PARAMETERS_PER_LINK * len(chain))
         alone[body_parameters(place.joint)] = load_parameters(
@@ -57,7 +58,8 @@ class KnownLoad:
     def torques(
         self, chain: Mechanism, logs: Sequence[AnyLog], options: FilterOptions, check: CheckOptions, rows: int
     ) -> Array:
-        """(N, n) N m that the load takes at the independent samples of checked logs, filtered as what was measured."""
+        """Return the torques (N, n), N m, of the load at the independent samples of checked logs, filtered like the
+        measurement."""
         alone = self.parameters(chain)
         found = []
         for log in logs:
@@ -72,7 +74,8 @@ class KnownLoad:
 
 
 def unreached(chain: Mechanism, q: Array, load: KnownLoad) -> dict[str, str]:
-    """Why a load's weight is not felt by a joint in any of the poses q (N, n), by joint name; other joints are left out."""
+    """Return, by joint name, why the weight of a load does not act on the joint in any of the poses q (N, n). Other
+    joints are left out."""
     down = chain.gravity / (np.linalg.norm(chain.gravity) or 1.0)
     weight = load.mass * float(np.linalg.norm(chain.gravity))
     still = np.zeros_like(q)

@@ -1,5 +1,5 @@
-"""Linear least squares, shared by the steps: weights, robustness, standard deviations, and directions that the data do
-not show."""
+"""Linear least squares for all steps: weights, outliers, standard deviations, and directions that the data do not
+show."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def estimate(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """The solution of target = columns @ values by the least squares that the options choose.
+    """Return the least-squares solution of target = columns @ values.
 
-    columns  (N, n, l), target (N, n): samples that may be taken as independent (filter.thinned)
-    use      (N, n)  entries that count; None: all
-    prior    None: zero, in units of the columns, without a bound on believable values
+    columns  (N, n, l), target (N, n): samples that count as independent (filter.thinned)
+    use      (N, n)  entries that are used; None: all
+    prior    None: zero, with the columns' units and without a plausible size of values
     """
     noise = None if prior is None else prior.noise
     rows = [Block(columns, noise, None if consider is None else consider.columns)]
@@ -40,10 +40,10 @@ def estimate_rows(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """The same solution for columns that come block by block and need not be held at once.
+    """Return the same solution as `estimate` for columns that come in blocks, so that not all of them are in memory.
 
-    considered  (k, k)  covariance of the quantities of the blocks' `consider` columns
-    prior       whose noise is the blocks'
+    considered  (k, k)  covariance of the quantities that belong to the blocks' `consider` columns
+    prior       without noise, which the blocks contain
     """
     options = options or FitOptions()
     use = np.ones(target.shape, dtype=bool) if use is None else use
@@ -145,7 +145,10 @@ class _Solved:
         )
 
     def estimate(self, covariance: Array | None) -> Estimate:
-        """The solution with its covariance; `covariance` (k, k) is that of the quantities considered, None without any."""
+        """Return the solution with its covariance.
+
+        covariance  (k, k) of the uncertain quantities in Consider; None if there are none
+        """
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
         sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))

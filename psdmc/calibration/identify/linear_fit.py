@@ -1,7 +1,7 @@
-"""One linear fit of one log: base parameters, Coulomb and viscous friction, offsets.
+"""One linear fit of plain logs: base parameters, Coulomb and viscous friction, and offsets.
 
-The alternative to the four steps for a single exciting log with torques, or currents with known constants. Regressor
-and friction columns pass through the same filter as the measurement.
+It replaces the four steps for a log of an exciting motion with torques, or with currents and known torque constants.
+Regressor and friction columns get the same filter as the measurement.
 """
 
 from __future__ import annotations
@@ -29,14 +29,15 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearResult:
-    """One vector: theta_b, then each joint's friction and offset, then the values of the extra columns.
+    """The result of a linear fit, one vector: theta_b, then each joint's friction and offset, then the values of
+    springs and further friction.
 
-    estimate   of the whole vector, without constraints
+    estimate   of the whole vector, without physical constraints
     problem    the rows of the fit
-    prior      the values in unseen directions
-    motors     that made torques of what was logged
-    dropped    (l + n f + m,)  entries that are left at the prior, as the data do not need them; None: none
-    stated     whether a prior of theta_b was joined with the data
+    prior      the values in directions that the data do not show
+    motors     the motors that convert logged effort to torques
+    dropped    (l + n f + m,)  entries that stay at the prior, because the data do not need them; None: none
+    stated     whether a prior of theta_b with a stated confidence was used
     """
 
     estimate: Estimate
@@ -49,7 +50,7 @@ class LinearResult:
 
     @property
     def samples(self) -> int:
-        """Independent samples that were fitted, all joints together."""
+        """Number of independent samples that were fitted, all joints together."""
         return int((~self.problem.held_out).sum()) * len(self.problem.chain)
 
     @property
@@ -66,13 +67,13 @@ class LinearResult:
 
     @property
     def friction(self) -> Array:
-        """(n, f) in the order of problem.friction."""
+        """Friction values (n, f), in the order of problem.friction."""
         start, n = self.problem.l, len(self.problem.chain)
         return self.estimate.values[start : self.problem.first_extra].reshape(n, -1)
 
     @property
     def extra(self) -> Array:
-        """(m,) in the order of problem.columns.unknowns."""
+        """Values (m,) of springs and further friction, in the order of problem.columns.unknowns."""
         return self.estimate.values[self.problem.first_extra :]
 
 
@@ -86,10 +87,10 @@ def calibrate_linear(
     theta_b: Array | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> LinearResult:
-    """Base parameters and simple friction by linear least squares; InputError where a log cannot be used.
+    """Return base parameters and simple friction by linear least squares. Raises InputError if a log cannot be used.
 
-    theta_b   (l,)  the file's values, kept in directions that the logs do not show; None: zero
-    progress  is told how much of the logs has been read
+    theta_b   (l,)  the file's values, which remain in directions that the logs do not show; None: zero
+    progress  function that is called with the share of the logs that has been read
     """
     options = options or LinearOptions()
     motors = motors or Motors.torques(len(chain))
@@ -97,7 +98,7 @@ def calibrate_linear(
     remarks = tuple(note for log in checked_logs for note in log.notes)
 
     def fitted(chosen: LinearOptions, carried: Array | None) -> LinearResult:
-        """One fit; `carried` (l,) are the base parameters of the load that friction depends on."""
+        """Return one fit; `carried` (l,) are the base parameters of the load on which friction depends."""
         problem, resting = linear_problem(chain, model, l, checked_logs, chosen, motors, progress, carried)
         progress("linear fit: solving")
         prior = linear_prior(chain, model, problem, chosen, theta_b)
@@ -131,8 +132,8 @@ def _solved(
 def linear_prior(
     chain: Mechanism, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
 ) -> Prior:
-    """The file's theta_b, no springs, and friction where its laws start, which for psdmc's is zero; friction may be as large
-    as its joint's torque at an ordinary speed."""
+    """Return the prior of a linear fit: the file's theta_b, no springs, and the start values of friction laws (zero in
+    psdmc's own). The plausible size of friction is the joint's torque at an ordinary speed."""
     sizes = torque_sizes(problem.torque[~problem.held_out])
     rigid = base_parameter_scale(chain, model, sizes, theta_b)
     own = np.repeat(sizes, len(problem.friction))

@@ -1,4 +1,4 @@
-"""The rows of one linear fit: columns of base parameters, friction and springs, filtered like the measured torques."""
+"""The rows of a linear fit: columns of base parameters, friction and springs, filtered like the measured torques."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearProblem:
-    """The stacked rows of independent samples.
+    """The rows of all independent samples of a linear fit.
 
-    terms     of every joint's friction, which have f values
-    rows      of the l + n f + m unknowns, N samples, with what the position sensors' noise alone would make of them
+    terms     friction terms of every joint, which have f values
+    rows      N samples of the l + n f + m unknowns, and the columns that the position sensors' noise alone would give
     torque    (N, n)  N m;  held_out (N,)
-    columns   whose m values come last
+    columns   springs and further friction, whose m values come last
     """
 
     chain: Mechanism
@@ -43,17 +43,17 @@ class LinearProblem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the n f + m unknowns behind the base parameters, for messages."""
+        """Names of the n f + m unknowns after the base parameters, for messages."""
         return (*(f"{name} of {joint}" for joint, name in self.plain), *self.columns.names)
 
     @property
     def friction(self) -> tuple[str, ...]:
-        """f names of a joint's values, in order."""
+        """Names of the f friction values of a joint, in order."""
         return names_of(self.terms)
 
     @property
     def plain(self) -> tuple[tuple[str, str], ...]:
-        """n f joints and names of plain friction, in order."""
+        """Joints and names of the n f values of plain friction, in order."""
         return tuple((joint, name) for joint in self.chain.joint_names for name in self.friction)
 
     @property
@@ -62,24 +62,24 @@ class LinearProblem:
 
     @property
     def never_negative(self) -> NDArray[np.bool_]:
-        """(l + n f + m,) true for friction that only takes energy and may not be negative, and for extra columns that say
-        so."""
+        """(l + n f + m,) whether an unknown may not be negative, as for friction, which only dissipates energy."""
         own = [value.low >= 0.0 for term in self.terms for value in term.law.values] * len(self.chain)
         return np.concatenate([np.zeros(self.l, dtype=bool), np.array(own), self.columns.never_negative])
 
     @property
     def limits(self) -> Array:
-        """(k, l + n f + m) whose products with the vector may not be negative either."""
+        """(k, l + n f + m) rows of linear inequalities: their products with the vector of unknowns may not be
+        negative."""
         return limits_of(self.columns, self.plain, self.l)
 
 
 def names_of(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Names of a joint's values, in order."""
+    """Return the names of the values of a joint's friction terms, in order."""
     return tuple(name for term in terms for name in term.names)
 
 
 def friction_columns(terms: Sequence[Term], qd: Array, sign_speed: float) -> list[Array]:
-    """(N, n) each: torque per unit of each value, before the filter."""
+    """Return arrays (N, n) of the torque per unit of each friction value, before the filter."""
     at = At(v=qd, sign=np.tanh(qd / sign_speed))
     return [np.broadcast_to(column, qd.shape) for term in terms for column in term.columns(at)]
 
@@ -94,9 +94,9 @@ def linear_problem(
     progress: Callable[[str], None],
     carried: Array | None = None,
 ) -> tuple[LinearProblem, tuple[str, ...]]:
-    """The stacked independent samples of all logs, each log split separately; and remarks on joints that rest.
+    """Return the independent samples of all logs, each of which is split separately, and remarks on joints that rest.
 
-    carried  (l,)  base parameters of the load that friction depends on, where a column asks for it
+    carried  (l,)  base parameters of the load on which friction depends, if a column needs it
     """
     terms = options.terms
     width = l + len(chain) * len(names_of(terms)) + len(options.columns)
@@ -154,7 +154,7 @@ def _filtered_columns(
     carried: Array | None,
 ) -> Array:
     def whole(rows: slice) -> Array:
-        """Rigid columns and extra ones."""
+        """Join the columns of rigid bodies with those of springs and further friction."""
         q, qd, qdd = (part[rows] for part in motion)
         rigid = model.regressor(q, qd, qdd)
         if not len(options.columns):

@@ -1,5 +1,4 @@
-"""Rows of a linear problem block by block, and the sums that a fit needs of them, so that no fit holds all rows at
-once."""
+"""Rows of a linear problem in blocks, and the sums over rows that a fit needs. So no fit needs all rows in memory."""
 
 from __future__ import annotations
 
@@ -14,11 +13,11 @@ from psdmc.calibration.logs.log import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Some samples of a linear problem. N samples, n joints, l unknowns.
+    """Some samples of a linear problem, with N samples, n joints and l unknowns.
 
     columns   (N, n, l)
     noise     (N, n, l)  the columns that the sensors' noise alone would give; None: none
-    consider  (N, n, k)  columns of what is uncertain and not estimated (least_squares.Consider); None: nothing
+    consider  (N, n, k)  columns of quantities that are uncertain but not estimated (estimate.Consider); None: nothing
     """
 
     columns: Array
@@ -30,18 +29,18 @@ class Block:
 
 
 class Rows(Protocol):
-    """Blocks of a problem, in the order of its samples; may be iterated repeatedly."""
+    """The blocks of a problem, in the order of its samples. They can be iterated repeatedly."""
 
     def __iter__(self) -> Iterator[Block]: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """Weighted rows A and targets y in triangular form: R'R = A'A.
+    """Weighted rows A and targets y after triangularisation, R'R = A'A.
 
     factor  (l, l)  R
     onto    (l,)    R^-T A'(y - A start)
-    noise   (l, l)  N'N of the weighted noise columns; None where there are none
+    noise   (l, l)  N'N of the weighted noise columns; None if there are none
     """
 
     factor: Array
@@ -50,9 +49,9 @@ class Reduced:
 
 
 def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> Reduced:
-    """The triangular form of all blocks; only one block's rows and the triangle are held at a time.
+    """Return the triangular form of all blocks. Only the rows of one block and the triangle are in memory at a time.
 
-    target, weights (N, n);  start (l,) from which targets are counted; None: zero
+    target, weights (N, n);  start (l,) values from which the unknowns are counted; None: zero
     """
     triangle, noise, l = np.zeros((0, 0)), None, 0
     for block, own in _with_rows(rows):
@@ -71,7 +70,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
 
 
 def residual_of(rows: Rows, target: Array, values: Array) -> Array:
-    """(N, n) target less columns @ values."""
+    """Return the residual (N, n): target minus columns @ values."""
     residual = np.empty_like(target)
     for block, own in _with_rows(rows):
         residual[own] = target[own] - block.columns @ values
@@ -80,11 +79,11 @@ def residual_of(rows: Rows, target: Array, values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collected:
-    """Sums over weighted rows for standard deviations.
+    """Sums over weighted rows, from which standard deviations are computed.
 
     squares   (n, l, l)  A'A of each joint's rows
-    scores    (c, l)     A' of the weighted residual, per stretch of time
-    consider  (l, k)     A' of the weighted columns of what is considered
+    scores    (c, l)     A' times the weighted residual, for each period of time
+    consider  (l, k)     A' times the weighted columns of the quantities in Consider
     """
 
     squares: Array
@@ -93,7 +92,8 @@ class Collected:
 
 
 def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Collected:
-    """The sums. `weighted` (N, n) is the residual; `clusters` the number of stretches of time, 0: none."""
+    """Return the sums over all rows; `weighted` (N, n) is the residual, `clusters` the number of periods of time (0:
+    none)."""
     count, n = weighted.shape
     squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
     for block, own in _with_rows(rows):

@@ -1,4 +1,4 @@
-"""A load's ten parameters from logs with it, by a model that is known without it: one linear fit, friction refitted."""
+"""Fits the ten parameters of a load to logs with the load, by a model that is known without it. Friction is refitted."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LOAD_NAMES = ("mass", "m x", "m y", "m z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "I
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadRegressor:
-    """Torque per load parameter: Y map, (..., n, 10)."""
+    """The torque per load parameter (..., n, 10): the model's regressor times the map from load to base parameters."""
 
     model: Regressor
     map: Array
@@ -41,11 +41,11 @@ class LoadRegressor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadFit:
-    """One vector: the load's ten parameters, then each joint's friction and offset.
+    """The result of the fit of a load, one vector: its ten parameters, then each joint's friction and offset.
 
-    estimate   without constraints; its standard deviations include those of the model's theta_b
-    problem    the columns; its torque is the measured one
-    rigid      (N, n) what the model takes without the load and without friction
+    estimate   without physical constraints; its standard deviations include those of the model's theta_b
+    problem    the columns and the measured torque
+    rigid      (N, n) torque of the model without the load and without friction
     prior      no load, and the model's friction
     """
 
@@ -63,7 +63,7 @@ class LoadFit:
         return self.problem.never_negative
 
     def predicted(self, values: Array) -> Array:
-        """(N, n) torques of the whole vector."""
+        """Return the torques (N, n) for a vector of load, friction and offsets."""
         return np.concatenate([block.columns @ values for block in self.problem.rows]) + self.rigid
 
 
@@ -79,12 +79,13 @@ def fit_load(
     progress: Progress,
     beside: Callable[[States, NDArray[np.intp]], Array] | None = None,
 ) -> LoadFit:
-    """The load and the friction that explain what the model without the load leaves of checked logs' torques.
+    """Return the load and the friction that explain the difference between measured torques and the model without the
+    load.
 
     onto_theta  (l, 10) theta_b that a load adds (psdmc.model.payload.load_map)
-    friction    (n, f) the model's own, in the order of friction_names; None: unknown
-    theta_std   (l,) standard deviations of the model's theta_b, taken as independent; zero where it has none
-    beside      (rows, n) torque at rows of states that the model has beside rigid bodies and plain friction; None: none
+    friction    (n, f) the model's own friction, in the order of friction_names; None: unknown
+    theta_std   (l,) standard deviations of the model's theta_b, taken as independent; zero if unknown
+    beside      function that returns (rows, n) torques of springs and further friction at rows of states; None: none
     """
     chain = model.mechanism
     load = LoadRegressor(regressor, onto_theta)

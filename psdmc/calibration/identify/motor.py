@@ -1,4 +1,4 @@
-"""Step one: torque constants from the current that a known load adds, (16) and (17)."""
+"""Step one: determines torque constants from the current that a known load adds. Source: Denso-2022, (16) and (17)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SMALLEST_SHARE = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorResult:
-    """Torque constants, joint by joint; NaN where the load cannot reach the joint, or no run was given.
+    """Torque constants by joint; NaN if the load does not act on the joint, or if there is no run.
 
     torque_constant, std  (n,)  N m/A (N/A for sliding joints)
     """
@@ -43,9 +43,10 @@ class MotorResult:
 
 
 def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
-    """Torque constants from pairs of sweeps; InputError where a run is no sweep of its joint.
+    """Return torque constants from pairs of sweeps without and with the load. Raises InputError if a run is no sweep
+    of its joint.
 
-    The current is fitted on the load's torque, which is known exactly, so that noise does not bias the slope.
+    The current is fitted to the load's torque, which is known exactly. So noise does not bias the slope.
     """
     n = len(chain)
     constant, std = np.full(n, np.nan), np.full(n, np.nan)
@@ -68,7 +69,7 @@ def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOp
 
 
 def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str, ...]:
-    """A warning for each torque constant (N m/A, NaN: none) that is negative."""
+    """Return a warning for each torque constant (N m/A, NaN: none) that is negative."""
     return tuple(
         Remark(
             f"joint {name}: torque constant is negative: the current's sign is against the joint's",
@@ -82,7 +83,8 @@ def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str
 def judge_motors(
     chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
 ) -> StepQuality:
-    """Quality of the known load's torque against these constants (N m/A, by joint name) times the current that it adds."""
+    """Return the quality of the known load's torque, compared with the added current times these constants (N m/A, by
+    joint name)."""
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []
     for k, joint in enumerate(chain.joints):

@@ -1,7 +1,7 @@
 """Coulomb friction that differs between the directions: coulomb + asymmetry forward, coulomb - asymmetry backward.
 
-Its column is the size of the smooth sign. It differs from an offset's near rest only: a fit with both shows little more
-than their sum.
+Its column in a fit is the magnitude of the smooth sign. This column differs from that of a constant offset only near
+rest, so a fit with both determines little more than their sum.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Constants that are closer than their uncertainty are made the same float."""
+"""Constants that differ by less than their uncertainty are replaced by the same float."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ SMALLEST_UNCERTAINTY = 1e-15
 
 
 class Constants:
-    """A growing table of magnitudes. `merged` returns each value's entry, so that equal values have equal bits.
+    """A growing table of magnitudes. `merged` replaces each value by its entry in the table. Equal values then have
+    equal bits.
 
-    The most certain values are entered first and replace less certain ones near them: no value moves by more than its
+    The most certain values are entered first and replace less certain ones near them: no value changes by more than its
     own uncertainty plus its entry's, and no uncertain value joins two certain ones.
     """
 
@@ -25,7 +26,7 @@ class Constants:
         self._uncertainty: Array = np.full(len(EXACT), SMALLEST_UNCERTAINTY)
 
     def merged(self, values: Array, uncertainty: Array) -> Array:
-        """Entries of the table with the values' signs, (k,), for (k,) values and relative uncertainties."""
+        """Return the table's entries, (k,), with the values' signs, for (k,) values and relative uncertainties."""
         out = np.abs(values)
         uncertainty = np.maximum(uncertainty, SMALLEST_UNCERTAINTY)
         decade = np.floor(np.log10(uncertainty)).astype(int)

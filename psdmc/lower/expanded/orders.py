@@ -1,4 +1,5 @@
-"""The orders in which the expanded lowering takes the rows of E."""
+"""The orders in which the expanded lowering takes the rows of E, the matrix of exponents. The order determines the
+number of operations."""
 
 from __future__ import annotations
 
@@ -14,22 +15,22 @@ TRIGONOMETRY = ((0, 2, 1), (0, 1, 2))
 
 
 def base_first(n: int) -> Joints:
-    """Joint order for torques, from the base outward: the inner parts of the nested forms then depend on the outer
-    links only, and recur often."""
+    """Return the joint order for torques, from the base outward. The inner parts of the nested forms then depend on the
+    outer links only, and recur often."""
     return tuple(range(n))
 
 
 def tip_first(n: int) -> Joints:
-    """Joint order for regressors, from the tip inward: a column is about one link and does not contain the joints
-    beyond it."""
+    """Return the joint order for regressors, from the tip inward. A column belongs to one link and does not contain the
+    joints after this link."""
     return tuple(reversed(range(n)))
 
 
 def candidates(joints: Joints, rows: int) -> Iterator[Order]:
-    """Orders of all rows, outermost first, with the joints' positions in the order given.
+    """Return orders of all rows, outermost first, with the joints' positions in the order given.
 
-    Rates stand outermost, where the torques of two joints share polynomials of position, or joint by joint. Parameters,
-    the rows from 5 n on, stay innermost.
+    Rows of rates are outermost, so that the torques of two joints share polynomials of position; in other orders, they
+    are joint by joint. Parameters, the rows from 5 n on, are always innermost.
     """
     n = len(joints)
     parameters = tuple(range(BLOCKS * n, rows))

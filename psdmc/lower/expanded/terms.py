@@ -1,4 +1,4 @@
-"""The expanded lowering's input: outputs as sums of monomials, read from E, P and theta_b."""
+"""The input of the expanded lowering: a function's outputs as sums of monomials, read from E, P and theta_b."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ nearer to each other are made one."""
 class Terms:
     """Polynomials as monomials: value[output] = sum of coefficient * product over rows of row ** exponent.
 
-    t terms over r rows: the 5 n of E, then one per base parameter where these stay symbols.
+    There are t terms over r rows: the 5 n rows of E, then one row per base parameter if these stay symbols.
 
-    output       (t,) int      which polynomial the term belongs to
+    output       (t,) int      the polynomial to which the term belongs
     exponents    (r, t) uint8  0..2
     coefficient  (t,) float    not zero
     uncertainty  (t,) float    absolute; coefficients closer than this may be equal
@@ -58,7 +58,7 @@ class Terms:
 
 
 def torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """tau[0..n-1] over rows of E and theta_b; InputError where the model was not expanded."""
+    """Return tau[0..n-1] as terms over rows of E and theta_b. Raises InputError if the model was not expanded."""
     expansion = _expanded(model)
     terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     one_hot = (np.arange(model.l)[:, None] == parameter).astype(np.uint8)
@@ -67,7 +67,8 @@ def torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Term
 
 
 def baked_torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """tau[0..n-1] over rows of E, theta_b in the coefficients; InputError where it is unknown."""
+    """Return tau[0..n-1] as terms over rows of E, with theta_b in the coefficients. Raises InputError if theta_b is
+    unknown."""
     expansion, theta_b = _expanded(model), known_parameters(model)
     n, p = expansion.n, expansion.p
     joint, row, column, value = expansion.entries
@@ -78,7 +79,7 @@ def baked_torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -
 
 
 def regressor_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """Y[i, k] as output i * l + k, over rows of E."""
+    """Return the regressor's entries Y[i, k], as output i * l + k, as terms over rows of E."""
     expansion = _expanded(model)
     terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     output = terms.output * model.l + parameter
@@ -119,9 +120,11 @@ def _stacked(E: NDArray[np.uint8], weights: Entries, width: int, noise: float) -
 
 
 def mass_matrix_terms(torque: Terms, n: int) -> Terms:
-    """M[i, j], i <= j, as output i * n + j. The terms are those with qdd[j] in tau[i] or with qdd[i] in tau[j],
-    whichever torque's coefficients are less uncertain: what is rounding beside an arm's inertia may matter for its
-    finger."""
+    """Return M[i, j], i <= j, as output i * n + j.
+
+    The terms are those with qdd[j] in tau[i] or those with qdd[i] in tau[j], whichever have the less uncertain
+    coefficients. An amount that is only rounding compared with an arm's inertia may matter for its finger.
+    """
     accelerations = torque.exponents[RowBlocks.of(n).qdd]
     own, other = torque.output, np.argmax(accelerations, axis=0)
     doubt = np.zeros(n)
@@ -135,17 +138,17 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
 
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
-    """h[i]: the terms of tau[i] without joint accelerations."""
+    """Return the nonlinear effects h[i] as terms: the terms of tau[i] without joint accelerations."""
     return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).qdd].any(axis=0)))
 
 
 def gravity_terms(torque: Terms, n: int) -> Terms:
-    """g[i]: the terms of tau[i] without joint rates and accelerations."""
+    """Return the gravity torques g[i] as terms: the terms of tau[i] without joint rates and accelerations."""
     return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).rates].any(axis=0)))
 
 
 def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
-    """The terms with gravity's multiplied by |g| (m/s^2), which E leaves to the monomials y."""
+    """Return the terms with the gravity terms multiplied by |g| (m/s^2). In E, |g| is a part of the monomials."""
     n = len(chain)
     at_rest = ~terms.exponents[RowBlocks.of(n).rates].any(axis=0)
     factor = np.where(at_rest, length(np.asarray(chain.gravity)), 1.0)
@@ -153,7 +156,7 @@ def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
 
 
 def joined(first: Terms, second: Terms, offset: int) -> Terms:
-    """Both lists of terms; `offset` is added to the second one's output numbers."""
+    """Return both lists of terms as one list; `offset` is added to the second one's output numbers."""
     return Terms(
         np.concatenate([first.output, second.output + offset]),
         np.concatenate([first.exponents, second.exponents], axis=1),

@@ -1,4 +1,5 @@
-"""A diagram's polynomials computed on values of its rows: symbols, which record the PROGRAM, or numbers."""
+"""Evaluation of a diagram's polynomials on values of its rows. The values are symbols, which record the PROGRAM, or
+numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from psdmc.program.trace import Tracer
 
 
 def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
-    """A value per row of the terms' exponents: q, sin q, cos q, qd, qdd, then theta_b if that is an input."""
+    """Return a symbol for each row of the terms' exponents: q, sin q, cos q, qd, qdd, then theta_b if that is an input."""
     n = model.n
     q = tracer.symbols("q", n)
     sincos = [
@@ -24,7 +25,7 @@ def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scala
 
 
 def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
-    """The diagram's polynomials by output number, computed on the rows' values."""
+    """Evaluate the diagram's polynomials on the rows' values, and return the values by output number."""
     nodes: dict[int, Scalar] = {NOTHING: 0.0, ONE: 1.0}
     for level in diagram.levels:
         _compute_level(nodes, level, rows[level.row])

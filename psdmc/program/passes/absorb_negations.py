@@ -11,8 +11,9 @@ from psdmc.program.program import Instr, Op, Program
 def absorb_negations(program: Program) -> Program:
     """Remove negations that the operation after or before them can absorb.
 
-    A use absorbs one as x + -y = x - y, x - -y = x + y, -x * -y = x * y, -x / -y = x / y, --x = x, |-x| = |x|. A producer
-    that nothing else needs absorbs one as -(x - y) = y - x, -(c x) = (-c) x, -((x - y) z) = (y - x) z.
+    A use absorbs a negation as in x + -y = x - y, x - -y = x + y, -x * -y = x * y, -x / -y = x / y, --x = x, |-x| =
+    |x|. An operation whose result is used once absorbs a negation after it as in -(x - y) = y - x, -(c x) = (-c) x,
+    -((x - y) z) = (y - x) z.
 
     Needs:  every argument precedes its use.
     Keeps:  output values, bit for bit but for the sign of a zero; output names and order.

@@ -9,7 +9,7 @@ def drop_unused(program: Program) -> Program:
     """Keep only the instructions that some output depends on.
 
     Needs:  every argument precedes its use.
-    Keeps:  output values, bit for bit; the order of what stays.
+    Keeps:  output values, bit for bit; the order of the remaining instructions.
     Gives:  every instruction is an output or an argument.
     """
     if all(program.uses()):  # by what lies behind, and the last one by an output

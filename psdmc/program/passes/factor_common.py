@@ -1,4 +1,4 @@
-"""Take common factors out of sums, and leave out what cancels."""
+"""A pass of the code generator: it takes common factors out of sums, and leaves out terms that cancel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ class _Term:
     factors: tuple[int | _Sum, ...]
 
     def is_product_with(self, factor: int) -> bool:
-        """Whether the term has this factor and others: a * b + a gains nothing as a * (b + 1)."""
+        """Whether the term is a product of this factor and others. The factor alone does not count: a * b + a gains
+        nothing as a * (b + 1)."""
         return len(self.factors) > 1 and factor in self.factors
 
     def without(self, factor: int) -> _Term:
@@ -34,10 +35,11 @@ class _Sum:
 
 
 def factor_common(program: Program) -> Program:
-    """Write a*b + a*c as a*(b + c), over chains of sums and of products of which nothing else uses a part.
+    """Write a*b + a*c as a*(b + c), in chains of sums and products whose parts have no other use.
 
-    The factor that most terms of a sum share goes first, then again among the others and within the bracket.
-    A term that is added and subtracted is left out. A sum in which no two terms share a factor or cancel stays as it is.
+    The factor that most terms of a sum share is taken out first. This is repeated for the other terms and within the
+    bracket. A term that is added and subtracted is left out. A sum in which no two terms share a factor or cancel stays
+    as it is.
 
     Needs:  every argument precedes its use.
     Keeps:  outputs up to rounding (it reorders floating point); output names and order.
@@ -187,7 +189,8 @@ class _Builder:
         return len(self.body) - 1
 
     def total(self, terms: tuple[_Term, ...]) -> int:
-        """The index of the sum of some terms. The first one has a plus, as in every chain of sums and every bracket."""
+        """Return the index of the sum of some terms. The first term has a plus, as in every chain of sums and every
+        bracket."""
         value = self._product(terms[0])
         for term in terms[1:]:
             op = Op.ADD if term.sign > 0 else Op.SUB

@@ -1,4 +1,4 @@
-"""Compute at compile time what does not depend on the inputs."""
+"""A pass of the code generator: operations that do not depend on the inputs are computed at compile time."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ def fold_constants(program: Program) -> Program:
 
     Needs:  every argument precedes its use; finite inputs (0 * x is taken for 0).
     Keeps:  output values, bit for bit but for the sign of a zero; output names and order.
-    Gives:  no operation has only constants as arguments, but one whose result is not finite; what is no longer
-            needed stays.
+    Gives:  no operation has only constants as arguments, except if its result is not finite; unused instructions stay.
     """
     constants = {i for i, instr in enumerate(program.body) if instr.value is not None}
     if not any(_folds(instr, program.body) for instr in program.body if not constants.isdisjoint(instr.args)):

@@ -1,5 +1,5 @@
-"""Nest sums so that their results are ready early: the term that is ready last is added last, and products are added by
-multiply-add."""
+"""A pass of the code generator: it nests sums so that their results are ready early. The term that is ready last is
+added last, and products are added by fused multiply-add."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Term = tuple[bool, int]
 
 
 def cycles(latency: Latency) -> dict[Op, int]:
-    """Cycles until the result of each operation is ready."""
+    """For each operation, the number of processor cycles until its result is ready."""
     return {op: 0 if op.unit is Unit.NONE else getattr(latency, op.unit) for op in Op}
 
 
 def fuse_sums(program: Program, latency: Latency = COSTS.latency) -> Program:
-    """Re-nest every sum, always adding the two parts that are ready soonest on the target.
+    """Nest the terms of every sum anew: the two parts that are ready soonest on the target are always added first.
 
     Needs:  every argument precedes its use.
     Keeps:  operation counts; output values up to rounding (sums are reordered).

@@ -8,7 +8,7 @@ from psdmc.program.program import Instr, Program
 
 
 def merge_duplicates(program: Program) -> Program:
-    """Compute equal things once (value numbering).
+    """Compute equal values only once (value numbering).
 
     Needs:  every argument precedes its use.
     Keeps:  output values, bit for bit; output names and order.

@@ -1,4 +1,5 @@
-"""Put instructions in an order that keeps few values alive at a time."""
+"""A pass of the code generator: it orders instructions so that few values are alive (computed and still needed) at a
+time."""
 
 from __future__ import annotations
 
@@ -10,9 +11,9 @@ from psdmc.program.program import Program
 def schedule(program: Program) -> Program:
     """Compute each value shortly before its first use.
 
-    Outputs are taken one after the other, in their order; of an operation's arguments the one is computed
-    first that needs more values alive itself (Sethi and Ullman 1970, exact for trees). The order given is
-    kept where this one would hold more values alive over the whole PROGRAM.
+    Outputs are computed one after the other, in their order. Of an operation's arguments, the one that needs more live
+    values is computed first (Sethi and Ullman 1970, exact for trees). The given order is kept if the new one would hold
+    more values alive over the whole PROGRAM.
 
     Needs:  every argument precedes its use; every instruction is needed.
     Keeps:  output values, bit for bit; output names and order; the set of instructions.
@@ -24,7 +25,8 @@ def schedule(program: Program) -> Program:
 
 
 def live_values(program: Program) -> int:
-    """Sum over all instructions of the values alive behind it; loads and constants do not count."""
+    """Return the sum, over all instructions, of the values that are still needed after the instruction; loads and
+    constants do not count."""
     arguments, users = program.arguments()
     here = np.arange(len(program.body))
     last = here.copy()
@@ -35,8 +37,8 @@ def live_values(program: Program) -> int:
 
 
 def beyond_registers(program: Program, registers: int) -> int:
-    """Sum over all instructions of the values alive behind it that no register is left for; loads and constants do not
-    count."""
+    """Return the sum, over all instructions, of the needed values for which no register is left; loads and constants do
+    not count."""
     ends = [0] * (len(program.body) + 1)
     last = list(range(len(program.body)))
     for i, (_, args, _, _) in enumerate(program.body):
@@ -100,7 +102,8 @@ def _depth_first(program: Program) -> list[int]:
 
 
 def reordered(program: Program, order: list[int]) -> Program:
-    """The instructions in this order of their numbers, in which every argument precedes its use."""
+    """Return the PROGRAM with its instructions in this order of their numbers, in which every argument precedes its
+    use."""
     new_index = [0] * len(program.body)
     for new, old in enumerate(order):
         new_index[old] = new

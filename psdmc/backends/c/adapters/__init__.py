@@ -1,4 +1,7 @@
-"""Adapters: files by which other programs call the emitted functions, chosen by `emit-c --with`; one module each."""
+"""Adapters: files through which other programs, such as CasADi, call the generated C functions.
+
+Users choose adapters with `emit-c --with`. Each adapter is one module of this folder.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,8 @@ REMARKS = dict.fromkeys((casadi.FIRST, casadi.BY_THETA, casadi.HESSIANS), casadi
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, each once, in the order of ADAPTERS; InputError where one is unknown."""
+    """Return the chosen adapters' names without duplicates, in the order of ADAPTERS. Raises InputError for an unknown
+    name."""
     for name in names:
         if name not in ADAPTERS:
             raise InputError(f"there is no adapter {name!r}", f"choose from {', '.join(ADAPTERS)}")
@@ -43,7 +47,7 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -> list[str]:
-    """The functions, followed by those that the adapters need besides."""
+    """Return the given functions, followed by further functions that the chosen adapters call."""
     found = dict.fromkeys(functions)
     for adapter in adapters:
         found |= dict.fromkeys(NEEDS[adapter](functions, wide) if adapter in NEEDS else ())
@@ -53,13 +57,19 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
 def remarks(
     robot: Mechanism, adapters: Sequence[str], functions: Sequence[str], l: int = 0
 ) -> tuple[str, ...]:
-    """What users should know of these adapters' functions of a robot with l base parameters, one clause each."""
+    """Return the remarks of these adapters for users, one clause each, such as how CasADi treats quaternions.
+
+    l  number of base parameters
+    """
     found = (REMARKS[adapter](robot, functions, l) for adapter in chosen(adapters) if adapter in REMARKS)
     return tuple(dict.fromkeys(reason for reason in found if reason is not None))
 
 
 def with_own_kernels(package: PackageView, kernels: Mapping[str, Kernel]) -> PackageView:
-    """The package with the functions that its adapters call and that no header declares. `kernels`: of the package."""
+    """Return the package with the functions that only its adapters call. No header declares these functions.
+
+    kernels  the arithmetic of the package's functions, by name
+    """
     alone = package.alone
     own = casadi.own_kernels(kernels, package.adapters, package.info, package.target.costs)
     views = [make_kernel_view(kernel, package.info.sizes, package.robot, alone.options) for kernel in own]

@@ -1,13 +1,15 @@
-"""CasADi's external functions: the emitted functions under its calling convention, with exact derivatives.
+"""The adapter that makes the generated functions external functions of CasADi, with exact derivatives.
 
-The convention is CasADi's documented one (user guide, "Using the generated code"; Function::jacobian): beside f itself a
-library exports what f_n_in, f_sparsity_out and so on return, and jac_f: inputs of f, then its outputs (not read: empty
-patterns), to one block per output and input. Matrices are column by column, nonzeros only.
+The calling convention is in CasADi's user guide ("Using the generated code") and in the reference of
+Function::jacobian. For a function f, a library exports f itself and what f_n_in, f_sparsity_out and so on return. The
+function jac_f computes one block per output and input; its inputs are those of f and then the outputs of f, which are
+not read (empty patterns). Matrices are stored column by column, without their zeros.
 
-CasADi differentiates by the entries of q. Where q has quaternions, CasADi's f is the emitted one at q with its quaternions
-divided by their lengths, and its derivative is the emitted one, along the tangent, times d tangent / dq. What no emitted
-function computes is made of PROGRAMs (casadi_kernels.py): Jacobians of other functions, and second derivatives, which CasADi
-asks for as jac_adj1_f, the Jacobian of the gradient adj1_f.
+CasADi differentiates by the entries of q. If q has quaternions, CasADi's f normalizes them before it calls the
+generated function. The generated derivative is along the tangent; the adapter multiplies it by d tangent / dq.
+
+casadi_kernels.py makes the derivatives that no generated function computes from PROGRAMs: Jacobians of other functions, and
+second derivatives. For these, CasADi looks for jac_adj1_f, the Jacobian of the gradient adj1_f.
 """
 
 from __future__ import annotations
@@ -57,7 +59,11 @@ MAP, REGRESSOR = "tangent_map", "regressor"
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Sparsity in CasADi's form: rows, columns, then 1 (dense), or starts of columns and rows of the nonzeros."""
+    """A sparsity pattern in CasADi's form: number of rows, number of columns, and the positions of the nonzeros.
+
+    For a dense matrix, the positions are the number 1. Otherwise, they are where each column starts, and the row of
+    each nonzero.
+    """
 
     name: str
     numbers: tuple[int, ...]
@@ -65,7 +71,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output in CasADi's order; `at` is its place in the work vector, in reals."""
+    """An input or output of a CasADi function; `at` is the offset of an output in the work vector, counted in reals."""
 
     name: str
     pattern: str
@@ -74,18 +80,18 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class External:
-    """One external function.
+    """One external function of CasADi.
 
-    name      that CasADi looks for
-    inputs    all of them
-    called    the emitted function
-    given     what it is called with, as C
-    work      number of reals for results and what leads to them
-    fails     whether it returns a status
-    restored  what is made a position of the robot before: C of q, and where to
-    before    C statements before the call, and
-    after     behind it
-    symbols   emitted functions that are called, `called` first
+    name      the name by which CasADi finds the function
+    inputs    all inputs of the function
+    called    the generated function that it calls
+    given     C text of the arguments of this call
+    work      number of reals for results and intermediate values
+    fails     whether the generated function returns a status
+    restored  positions that are normalized before the call: C text of q, and of the place for the result
+    before    C statements before the call
+    after     C statements after the call
+    symbols   all generated functions that are called, `called` first
     """
 
     name: str
@@ -103,17 +109,17 @@ class External:
 
 @dataclass(frozen=True, slots=True)
 class CasadiView:
-    """What templates/adapters/casadi.c.jinja prints.
+    """The data that the template adapters/casadi.c.jinja prints.
 
-    robot    identifier that every symbol starts with
+    robot    identifier with which every symbol starts
     library  ending of the library's name
-    hidden   emitted functions whose names CasADi's take: they are compiled under others
-    zeros    length of the longest input: what is not given to a function is zero
-    units    parts of q, from an entry to before another, that are made of length one, and
-    nq       length of q, where there are such parts, and
-    nv       number of rates, and
-    map      entries of d tangent / dq that may differ from zero: row and column
-    spoils   whether results become NaN where a function fails
+    hidden   generated functions that have the same name as a CasADi function; they are compiled under other names
+    zeros    length of the longest input: an input that the caller omits is read as zeros
+    units    slices (start, end) of q that are normalized to length one
+    nq       length of q
+    nv       number of rates
+    map      (row, column) of each entry of d tangent / dq that may differ from zero
+    spoils   whether results become NaN if a function fails
     helpers  C functions of casadi_calls.h.jinja that are called
     """
 
@@ -133,7 +139,11 @@ class CasadiView:
 
 
 def needed(functions: Sequence[str], wide: bool, theta: bool = False) -> list[str]:
-    """Functions that compute derivatives of these. `wide`: q is longer than the rates; `theta`: also by theta_b."""
+    """Return the functions that compute the derivatives of the given functions.
+
+    wide   q is longer than the rates
+    theta  derivatives by theta_b are needed, too
+    """
     found = [name + DERIVATIVES for name in functions if _has_blocks(name)]
     return found + [MAP] * wide + [REGRESSOR] * (theta and bool(found))
 
@@ -154,7 +164,7 @@ def _has_blocks(name: str) -> bool:
 
 
 def _is_by_program(name: str, sizes: Sizes, theta: bool = False) -> bool:
-    """Whether a function's Jacobian is made of its PROGRAM: no function of psdmc computes it, and it is not too large."""
+    """True if psdmc makes the Jacobian of a function from its PROGRAM: no function computes it, and it is not too large."""
     if not _is_differentiated(name):
         return False
     recipe = RECIPES[name]
@@ -163,7 +173,7 @@ def _is_by_program(name: str, sizes: Sizes, theta: bool = False) -> bool:
 
 
 def _is_differentiated(name: str) -> bool:
-    """Whether a function has inputs, and is neither a derivative itself nor there to make some."""
+    """True if a function has inputs, and does not compute derivatives or the tangent map."""
     ending = (DERIVATIVES, GRADIENT, PARAMETERS, DIRECTION, MAP)
     return name in RECIPES and bool(RECIPES[name].signature.inputs) and not name.endswith(ending)
 
@@ -171,7 +181,7 @@ def _is_differentiated(name: str) -> bool:
 def own_kernels(
     kernels: Mapping[str, Kernel], adapters: Sequence[str], info: PackageInfo, costs: Costs
 ) -> list[Kernel]:
-    """Kernels of derivatives that these adapters need, and that are no functions of the package."""
+    """Return the kernels of derivatives that these adapters need in addition to the functions of the package."""
     found: list[Kernel] = []
     for kernel in kernels.values():
         name, derived = kernel.function.name, Derived(kernel, info, costs)
@@ -185,14 +195,17 @@ def own_kernels(
 
 
 def _is_of(adapter: str, kernel: Kernel | KernelView) -> bool:
-    """Whether an adapter's library has this variant of a function."""
+    """True if the library of an adapter has this variant of a function."""
     wants = kernel.theta == (adapter == BY_THETA and kernel.function.theta)
     return adapter in (FIRST, BY_THETA, HESSIANS) and wants
 
 
 def files_of(adapter: str) -> Callable[[PackageView], dict[str, str]]:
-    """The function that makes an adapter's C file; InputError where CasADi cannot call the package. The file includes the
-    library's sources and becomes a shared library of its own."""
+    """Return the function that makes the C file of an adapter, by path.
+
+    The file includes the library's sources and is compiled to a separate shared library. The function raises InputError if
+    CasADi cannot call the package.
+    """
 
     def files(package: PackageView) -> dict[str, str]:
         view = casadi_view(package, adapter)
@@ -203,7 +216,10 @@ def files_of(adapter: str) -> Callable[[PackageView], dict[str, str]]:
 
 
 def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
-    """What users should know of CasADi's functions of this robot; None where q has an entry for each rate."""
+    """Return a remark about CasADi's functions of this robot. None if q has exactly one entry for each rate.
+
+    l  number of base parameters
+    """
     if robot.nq == robot.nv:
         return None
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
@@ -216,7 +232,10 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
 
 
 def casadi_view(package: PackageView, adapter: str = FIRST) -> CasadiView:
-    """What one of CasADi's adapters prints of a package. InputError for float, and if theta_b is unknown and not taken."""
+    """Return what the template of one of CasADi's adapters prints for a package.
+
+    Raises InputError if the package is in float, or if theta_b is unknown and no argument.
+    """
     info, theta = package.info, adapter == BY_THETA
     if package.real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
@@ -268,7 +287,8 @@ class _Patterns:
         self._names: dict[tuple[int, ...], str] = {}
 
     def of(self, shape: Sequence[int], zero: Iterable[int] = ()) -> str:
-        """The name of a pattern for a row-major array whose entries `zero` are always zero."""
+        """Return the name of the sparsity pattern of a row-major array. The entries `zero` of the array are always
+        zero."""
         return self._named(_numbers(shape, frozenset(zero)))
 
     def unread(self, shape: Sequence[int]) -> str:
@@ -301,7 +321,8 @@ class _Externals:
         self.helpers: set[str] = set()
 
     def of(self, kernel: KernelView) -> Iterable[External]:
-        """A function, and its Jacobian, its reverse and its forward mode where there are kernels for them."""
+        """Yield CasADi's external functions for one kernel: the function itself, and its Jacobian, reverse mode and
+        forward mode if the package has kernels for these."""
         patterns, name, call = self.patterns, kernel.function.name, _Call(kernel, kernel, self)
         own = [(output.name, call.at(output.name), patterns.of(output.shape)) for output in kernel.outputs]
         yield call.external("", self._inputs(kernel), own)
@@ -350,7 +371,7 @@ class _Externals:
         return call.external("jac_", inputs, shown)
 
     def _by_program(self, prefix: str, kernel: KernelView, called: KernelView) -> External:
-        """A derivative that one kernel puts out as CasADi wants it."""
+        """Return the external function of a derivative that one kernel computes in the form that CasADi expects."""
         inputs, call = self._inputs_and_outputs(kernel), _Call(kernel, called, self)
         seeds = [
             Argument(f"adj_{one.name}", self.patterns.of(one.shape))
@@ -370,8 +391,11 @@ class _Externals:
     def _with_unread(
         self, kernel: KernelView, shown: list[tuple[str, int, str]], seeds: list[Argument]
     ) -> tuple[list[tuple[str, int, str]], list[Argument]]:
-        """The blocks of a Jacobian of gradients with those by the function's outputs, which are not read; and the inputs
-        behind these outputs with the gradients, likewise."""
+        """Insert what CasADi expects but nobody reads: blocks for the function's outputs, and the gradients as inputs.
+
+        shown  the blocks of the gradients' Jacobian, by inputs and weights
+        seeds  the weights
+        """
         found, blocks = [], iter(shown)
         for one in kernel.inputs:
             found += [next(blocks) for _ in kernel.inputs]
@@ -425,12 +449,12 @@ class _Call:
             of.helpers.add("restore")
 
     def is_wide(self, k: int) -> bool:
-        """Whether an input of the function is a position with quaternions."""
+        """Whether input k of the function is a position with quaternions."""
         inputs = self.kernel.function.inputs
         return bool(self.of.info.units) and k < len(inputs) and inputs[k].axes == Q.axes
 
     def read(self, k: int) -> str:
-        """C of an input, positions as the called function reads them."""
+        """Return C text of input k as the called function reads it: a position may have to be normalized first."""
         if k in self.restored and not self.called.function.normalizes:
             return self.restored[k]
         return f"given(arg[{k}])"
@@ -439,8 +463,10 @@ class _Call:
         return self.starts[output]
 
     def by_entries(self, block: OutputView, k: int) -> tuple[int, tuple[int, ...], frozenset[int]]:
-        """Where the derivatives by the entries of input k are put, their shape, and what is zero of them, from those along
-        the tangent."""
+        """Convert derivatives along the tangent to derivatives by the entries of input k.
+
+        Returns the offset of the result in the work vector, its shape, and its entries that are always zero.
+        """
         info, place = self.of.info, self._map(k)
         rows = prod(block.shape[:-1])
         to = self._room(rows * info.nq)
@@ -453,7 +479,8 @@ class _Call:
         return _offset(to), (*block.shape[:-1], info.nq), frozenset(range(rows * info.nq)) - kept
 
     def by_theta(self) -> tuple[int, tuple[int, ...]]:
-        """Where the derivatives by theta_b are put, and their shape: those of torques are the regressor's entries."""
+        """Add the call that computes derivatives by theta_b, and return the offset and shape of its result. Derivatives
+        of torques by theta_b are the entries of the regressor."""
         info, regressor = self.of.info, self.of.kernels[REGRESSOR]
         names = {vector.name: self.read(k) for k, vector in enumerate(self.kernel.inputs)}
         names |= {output.name: f"w + {self.at(output.name)}" for output in self.called.outputs}
@@ -471,7 +498,8 @@ class _Call:
         return _offset(found), (info.nv, info.l)
 
     def direction(self, k: int, given: str) -> str:
-        """C of a direction of input k, along the tangent."""
+        """Return C text of a direction of input k, converted to the tangent if the input is a position with
+        quaternions."""
         if not self.is_wide(k):
             return given
         place, to = self._map(k), self._room(self.of.info.nv)
@@ -486,7 +514,12 @@ class _Call:
         shown: Sequence[tuple[str, int, str]],
         seeds: Sequence[str] = (),
     ) -> External:
-        """prefix: of CasADi's name; shown: name for CasADi, place, pattern; seeds: C of what is read behind the inputs."""
+        """Return the external function of this call.
+
+        prefix  of CasADi's name for the function, such as jac_
+        shown   name, offset and pattern of each output
+        seeds   C text of arguments after the function's own inputs
+        """
         own = [self.read(k) for k in range(len(self.kernel.inputs))]
         theta = [f"given(arg[{len(own)}])"] * self.called.theta
         results = [f"w + {start}" for start in self.starts.values()]

@@ -1,8 +1,8 @@
-"""Derivatives for CasADi that no generated function computes: kernels made of the functions' PROGRAMs.
+"""Kernels of derivatives that CasADi needs and no generated function computes. They are made from the functions' PROGRAMs.
 
-CasADi's function is the emitted one at q with its quaternions divided by their lengths. Here this division stands in front
-of the PROGRAM, so that all derivatives, also second ones, are by the entries of q of any length. Entries of matrices are in
-CasADi's order, column by column.
+CasADi's function normalizes the quaternions of q before it calls the generated function. This module writes the
+normalization in front of the PROGRAM. Thus all derivatives, also second derivatives, are by the entries of q, for
+quaternions of any length. The entries of matrices are in CasADi's order, column by column.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from psdmc.program.trace import Tracer
 from psdmc.target.costs import Costs
 
 JACOBIAN, ADJOINT, SECOND = "_jac", "_adj1", "_jac_adj1"
-"""Endings of these kernels' names: derivatives of all outputs by all inputs; gradients by all inputs of the outputs' sum
-with weights; and derivatives of these gradients by all inputs and weights."""
+"""Endings of the kernels' names. The first has derivatives of all outputs by all inputs, the second the gradient of the
+outputs' weighted sum by all inputs, the third derivatives of this gradient by all inputs and weights."""
 
 MOST = 10_000
-"""Entries up to which a Jacobian is made: those of a quadruped's mass matrix and of its frame Jacobians are fewer."""
+"""Largest number of entries of a Jacobian. A quadruped's mass matrix has fewer, and its frame Jacobians, too."""
 
 THETA = "theta_b"
 
 
 def sizes_of(function: Signature, sizes: Sizes, theta: bool) -> tuple[dict[str, int], dict[str, int]]:
-    """Reals of each input, theta_b included, and of each output."""
+    """Return the length of each input, including theta_b, and of each output."""
     inputs = {quantity.name: sizes.size(quantity) for quantity in function.inputs}
     return inputs | ({THETA: sizes.l} if theta else {}), {q.name: sizes.size(q) for q in function.outputs}
 
 
 def has_small_jacobian(function: Signature, sizes: Sizes, theta: bool = False) -> bool:
-    """Whether a function has inputs, and at most MOST derivatives."""
+    """True if a function has inputs, and at most MOST derivatives."""
     inputs, outputs = sizes_of(function, sizes, theta)
     return 0 < sum(inputs.values()) * sum(outputs.values()) <= MOST
 
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The kernels of one function's derivatives; `kernel` is a straight line."""
+    """Makes the kernels of one function's derivatives. `kernel` has a straight-line PROGRAM."""
 
     kernel: Kernel
     info: PackageInfo
@@ -89,7 +89,7 @@ class Derived:
 
     @cached_property
     def _function(self) -> Program:
-        """CasADi's function."""
+        """The PROGRAM of CasADi's function."""
         function, sizes = self.kernel.function, self.info.sizes
         at = {q.name: _columns_first(sizes.shape(q.axes)) for q in function.outputs}
         tracer = Tracer()
@@ -118,7 +118,7 @@ class Derived:
     def _of_blocks(
         self, ending: str, more: Sequence[Quantity], program: Program, blocks: Sequence[Block]
     ) -> Kernel:
-        """By the mode that takes fewer operations."""
+        """Return the kernel of Jacobians, by the mode that gives the shorter PROGRAM."""
         found = min((jacobians(program, blocks, mode) for mode in ("forward", "reverse")), key=len)
         outputs = [Quantity(block.name, (str(block.rows), str(block.columns))) for block in blocks]
         return self._kernel(ending, more, outputs, found)
@@ -144,23 +144,23 @@ class Derived:
 
 
 def matrix_of(shape: Sequence[int]) -> tuple[int, int]:
-    """Rows and columns: the last axis is that of columns, a vector is a column."""
+    """Return rows and columns. The last axis is that of columns; a vector is a column."""
     return (prod(shape[:-1]), shape[-1]) if len(shape) > 1 else (prod(shape), 1)
 
 
 def shape_of_input(shape: Sequence[int]) -> tuple[int, ...]:
-    """What CasADi is told: a matrix has a column for each row of ours, so that the numbers lie in the same order."""
+    """Return an input's shape in CasADi. A matrix has one column per row of ours, so the order in memory is the same."""
     return matrix_of(shape)[::-1] if len(shape) > 1 else (prod(shape),)
 
 
 def _columns_first(shape: Sequence[int]) -> list[int]:
-    """Where CasADi keeps the entries of a row-major array, whose last axis is that of columns."""
+    """Return where CasADi stores the entries of a row-major array, whose last axis is that of columns."""
     rows, columns = matrix_of(shape)
     return [column * rows + row for row in range(rows) for column in range(columns)]
 
 
 def _divided(tracer: Tracer, name: str, first: int, end: int) -> Iterator[tuple[Slot, Value]]:
-    """A part of a position, divided by its length."""
+    """Yield a quaternion of a position, divided by its length."""
     slots = [Slot(name, k) for k in range(first, end)]
     entries = [tracer.symbol(slot) for slot in slots]
     square: Value = sum((entry * entry for entry in entries), start=0.0)
@@ -169,5 +169,5 @@ def _divided(tracer: Tracer, name: str, first: int, end: int) -> Iterator[tuple[
 
 
 def _storing(program: Program, names: Sequence[str]) -> Program:
-    """The PROGRAM with outputs of these names alone."""
+    """Return the PROGRAM with only the outputs of these names."""
     return Program(program.body, tuple(each for each in program.outputs if each[0].vector in names))

@@ -1,7 +1,9 @@
-"""A Python module of the emitted functions: `pip install DIR` compiles it, and it then needs NumPy alone.
+"""The adapter that makes a Python module of the generated functions. `pip install DIR` compiles the module, which then
+needs NumPy only.
 
-An extension in CPython's stable ABI reads arrays as buffers. A module in Python converts arguments, checks shapes and
-allocates results. Only functions for many states are called: one state then has the same bits alone and in a batch.
+An extension in CPython's stable ABI reads arrays as buffers. A Python file converts arguments, checks shapes and
+allocates results. Only batch functions are called: the result for one state then has the same bits alone and in a
+batch.
 """
 
 from __future__ import annotations
@@ -29,13 +31,13 @@ FILES = {
 
 @dataclass(frozen=True, slots=True)
 class WheelKernel:
-    """A C function for many states, as the extension calls it.
+    """A generated C function for many states, as the Python extension calls it.
 
-    name, call  of the kernel; C text of the call with arrays a[0], a[1], ...
+    name, call  name of the kernel; C text of the call with arrays a[0], a[1], ...
     fails       whether the call returns a status
-    sizes       reals per state of each array; of theta_b all reals
-    inputs      number of arrays that are read, which come first
-    theta       place of theta_b, whose reals are the same for all states; -1 if it is none of the arrays
+    sizes       reals per state of each array; for theta_b, all its reals
+    inputs      number of arrays that are read; these come first
+    theta       index of theta_b, whose reals are the same for all states; -1 if no array is theta_b
     """
 
     name: str
@@ -48,7 +50,8 @@ class WheelKernel:
 
 @dataclass(frozen=True, slots=True)
 class WheelArray:
-    """An array of a Python function: its trailing axes, also as a caller sees them after batch axes, and its meaning."""
+    """An input or output array of a Python function, with its meaning and two shapes per state: in memory, and as a
+    caller sees it."""
 
     name: str
     tail: tuple[int, ...]
@@ -58,12 +61,12 @@ class WheelArray:
 
 @dataclass(frozen=True, slots=True)
 class WheelFunction:
-    """A function of the Python module.
+    """One function of the Python module.
 
     meaning      a line of ASCII without quotation marks
-    result       class of several results; empty for one
+    result       class of the result if there are several outputs; else empty
     kernels      Python text of the extension's functions without and with theta_b; None for one that does not exist
-    takes_theta  whether there is one with theta_b
+    takes_theta  whether a function with theta_b exists
     positions    numbers of the inputs whose quaternions must have length one
     """
 
@@ -79,7 +82,10 @@ class WheelFunction:
 
 
 def files(package: PackageView) -> dict[str, str]:
-    """Path -> text of the extension, the module and what pip reads. InputError for a name that Python takes itself."""
+    """Return the text of each file of the Python package (extension, module, files for pip), by path.
+
+    Raises InputError if Python already uses a name, such as a keyword.
+    """
     robot = package.robot
     if keyword.iskeyword(robot) or robot in {"numpy", *sys.stdlib_module_names}:
         raise InputError(f"a Python module cannot be called {robot!r}", "choose another name with --name")

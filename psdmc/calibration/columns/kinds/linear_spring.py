@@ -1,4 +1,4 @@
-"""A spring whose tension grows with its length: between two points of two bodies, or along joint coordinates."""
+"""A spring whose tension grows with its length. It acts between two points of two links, or along joint coordinates."""
 
 from __future__ import annotations
 
