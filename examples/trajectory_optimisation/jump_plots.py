@@ -35,9 +35,10 @@ def plot(found: Jump, file: Path) -> None:
         torques.axhline(limit, color="black", linewidth=0.8, linestyle=":")
     torques.set(xlabel="time (s)", ylabel="joint torques (N m), limits dotted")
     moments = [0, nodes * 2 // 5, nodes * 11 // 20, nodes]
-    for shade, k in zip((0.75, 0.5, 0.25, 0.0), moments, strict=True):
+    for shade, k, above in zip((0.75, 0.5, 0.25, 0.0), moments, (-0.045, 0.03, 0.03, -0.045), strict=True):
         draw(side, legs[k], str(shade))
-        side.annotate(f"{k * dt:.2f} s", legs[k][:, 0].mean(axis=0)[[0, 2]] + [-0.05, 0.03], fontsize="small")
+        place = legs[k][:, 0].mean(axis=0)[[0, 2]] + [-0.05, above]
+        side.annotate(f"{k * dt:.2f} s", place, fontsize="small")
     dress(side, legs)
     for axis in (height, forces):
         axis.legend(fontsize="small")

