@@ -1,7 +1,7 @@
-"""Functions that write a file as a whole or not at all. psdmc writes all its files with them.
+"""Functions that write a file completely or not at all. psdmc writes all its files with these functions.
 
-psdmc writes a file under a temporary name in the same folder, flushes it to disk, and renames it. A reader sees the
-old content or the new, even if the writing is interrupted. A process that is killed leaves its temporary file. The
+psdmc writes a file under a temporary name in the folder of the file, flushes it to disk, and renames it. A reader sees
+the old content or the new, even if the writing is interrupted. A process that is killed leaves its temporary file. The
 next process that writes into the folder recognises that file by its name and its released lock, and removes it.
 """
 
@@ -47,8 +47,9 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path to write to. At the end of the block the file is renamed to `path`; after an error it is
-    removed. Raises the same errors as write_whole."""
+    """Give a temporary path for the `with` statement of the caller, who writes one file there. After the statement, the
+    temporary file is renamed to `path`; after an error, the temporary file is removed. Raises the same errors as
+    write_whole."""
     with system_errors_at(path):
         target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         if _is_stream(target):
@@ -62,9 +63,9 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_together(root: Path, files: Mapping[str, str] | Mapping[str, str | bytes]) -> None:
-    """Write files that belong together, given as path under `root` -> content. The content of all files is on disk
-    before the first file is renamed to its final name; the renames follow the given order. Raises the same errors as
-    write_whole."""
+    """Write several files that belong together. `files` maps each path, relative to the folder `root`, to the content
+    of that file. The content of all files is on disk before the first file is renamed to its final name. The renames
+    follow the order of `files`. Raises the same errors as write_whole."""
     with system_errors_at(root), contextlib.ExitStack() as all_of_them:
         ready = []
         for path, text in files.items():
@@ -103,8 +104,8 @@ def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
 
 
 def refuse_foreign_file(path: str | os.PathLike[str], mark: str, remedy: str) -> None:
-    """Raise InputError if psdmc did not write the file at `path`: if `mark`, psdmc's own text, is not in its first
-    HEAD bytes.
+    """Raise InputError if psdmc did not write the file at `path`. psdmc wrote the file if its first HEAD (1 MiB) bytes
+    contain `mark`, a text that psdmc puts into all files of this kind.
 
     Commands call this function for files that they write in addition to the file that the user named.
     """
@@ -118,7 +119,8 @@ def refuse_foreign_file(path: str | os.PathLike[str], mark: str, remedy: str) ->
 
 
 def check_place(path: str | os.PathLike[str]) -> None:
-    """Raise InputError if no file can be written at `path`. A command that runs for hours calls this function first."""
+    """Raise InputError if no file can be written at `path`. A command that computes for hours calls this function
+    first, so that a wrong path is found at once."""
     target = Path(path)
     with system_errors_at(path):
         if target.is_dir():
@@ -132,8 +134,8 @@ def check_place(path: str | os.PathLike[str]) -> None:
 
 @contextlib.contextmanager
 def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn an OSError within the block into an error of psdmc with a remedy. Its message names `path`, not a temporary
-    file."""
+    """Turn an OSError that is raised inside the `with` statement into an error of psdmc, whose hint suggests a remedy.
+    The message names `path`, not a temporary file."""
     try:
         yield
     except OSError as error:
@@ -184,7 +186,11 @@ def _locked_new_file(target: Path) -> tuple[int, Path]:
 
 
 def lock(handle: int, wait: bool = True) -> bool:
-    """Lock an open file or folder until it is closed or the process ends. Return whether that was possible."""
+    """Lock the open file or folder `handle` against other processes. The lock lasts until the file is closed or the
+    process ends. Return True if the lock was obtained.
+
+    wait  True: wait while another process holds the lock; False: return False in this case
+    """
     if sys.platform == "win32":
         return False
     try:
@@ -195,8 +201,8 @@ def lock(handle: int, wait: bool = True) -> bool:
 
 
 def can_lock(handle: int) -> bool:
-    """Return whether the file system of this open file supports locks, also if another process holds a lock on the
-    file."""
+    """Return whether the file system of the open file `handle` supports locks. The answer is also True if another
+    process holds a lock on this file."""
     if sys.platform == "win32":
         return False
     try:
@@ -210,7 +216,8 @@ def can_lock(handle: int) -> bool:
 
 
 def unlock(handle: int) -> None:
-    """Release the lock of an open file, also for child processes that were forked meanwhile and share the handle."""
+    """Release the lock of the open file `handle`. Child processes that were forked after the lock was taken also lose
+    the lock."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_UN)

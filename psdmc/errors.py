@@ -73,8 +73,8 @@ def exit_status_of(action: Callable[[], int | None]) -> int:
     """Run `action`, the main function of a `python -m` module, and return its exit status (None counts as 0).
 
     If `action` raises a PsdmcError, this function prints its message and hint to standard error, one line each, and
-    returns the status of that error. Ctrl-C and a full disk behind standard output also give one line; a closed output
-    gives none.
+    returns the status of that error. Ctrl-C also gives one line, and so does a full disk to which standard output is
+    written. If standard output is closed, nothing is printed.
     """
     discard_output_if_closed()
     try:
@@ -96,7 +96,8 @@ def exit_status_of(action: Callable[[], int | None]) -> int:
 
 
 def discard_output_if_closed() -> None:
-    """Discard what is printed if the caller has closed standard output, as in `psdmc derive robot.urdf >&-`."""
+    """If the caller has closed standard output, as in `psdmc derive robot.urdf >&-`, let print write to the null
+    device."""
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 

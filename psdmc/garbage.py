@@ -1,4 +1,5 @@
-"""Makes Python's search for reference cycles rare while psdmc creates millions of small objects.
+"""Makes Python search less often for reference cycles (unused objects that refer to each other), while psdmc creates
+millions of small objects.
 
 The PROGRAMs (lists of operations) of psdmc are tuples of tuples and have no cycles. By default Python searches for
 cycles each time 700 more tuples exist. For a humanoid this search takes a fifth of the time to generate the C code.
@@ -21,10 +22,10 @@ _usual = (0, 0, 0)
 
 @contextmanager
 def collecting_rarely() -> Iterator[None]:
-    """Within the block, let Python search for reference cycles only every RARELY objects.
+    """Within the `with` block, let Python search for reference cycles only each time RARELY more objects exist.
 
-    Blocks can be nested or run in several threads; after the last one ends, the process gets its own thresholds back.
-    A process that searches more rarely than this, or never, is not changed.
+    Blocks can be nested or run in several threads. After the last block ends, Python's settings from before the first
+    block are restored. If Python already searches less often, or never, nothing is changed.
     """
     global _stages, _usual
     with _lock:

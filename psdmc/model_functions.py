@@ -1,7 +1,7 @@
-"""Evaluates every generated function of a model in NumPy, without compiling code: from E, P and theta_b, or by the
-NumPy reference of the function. It is slower than a compiled robot.
+"""Evaluates every generated function of a model in NumPy, without compiled code. Torques and similar functions use E, P
+and theta_b; others use the function's reference in NumPy. A compiled robot is faster.
 
-Broadcasting, results, errors and NaN are the same as for compiled robots.
+Broadcasting, results, errors and NaN are as for compiled robots.
 """
 
 from __future__ import annotations
@@ -49,12 +49,13 @@ _ADMITTED: WeakKeyDictionary[DynamicsModel, set[str]] = WeakKeyDictionary()
 
 
 def provider() -> Provider:
-    """Return the object through which models compute generated functions."""
+    """Return the object from which models get the generated functions, computed in NumPy."""
     return Provider(lambda: SIGNATURES, function_of)
 
 
 def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
-    """Return a function of the model by its name, with the same arguments as the method of a compiled robot."""
+    """Return the function of the model with this name. It has the arguments of the compiled robot's method with this
+    name."""
     recipe = RECIPES[name]
 
     def function(*given: Any, **named: Any) -> Any:
@@ -78,9 +79,12 @@ def evaluated(
     theta_b: ArrayLike | None = None,
     out: Any = None,
 ) -> Any:
-    """Compute a generated function at the given states. Return its output, or a named tuple if it has several outputs.
+    """Compute a generated function (such as forward dynamics) at the given states in NumPy. Return its output, or a
+    named tuple if it has several outputs.
 
-    out  arrays into which the results are written
+    inputs   arrays of states, with leading axes that broadcast
+    theta_b  base parameters that replace the model's; optional
+    out      arrays into which the results are written; optional
     """
     signature = recipe.signature
     axes = _axes(model, recipe)

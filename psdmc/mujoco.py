@@ -58,7 +58,7 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
 
 
 def from_qpos(model: DynamicsModel | str | Path, qpos: ArrayLike, mj_model: Any = None) -> Array:
-    """Return the positions q (..., nq) for MuJoCo's qpos (..., nq of MuJoCo). The arguments are those of `to_qpos`.
+    """Return the positions q (..., nq) for MuJoCo's qpos (..., nq of MuJoCo). `to_qpos` explains the other arguments.
 
     Entries of qpos for mimic joints, and for joints that the model does not have, are ignored.
     """
@@ -67,10 +67,10 @@ def from_qpos(model: DynamicsModel | str | Path, qpos: ArrayLike, mj_model: Any 
 
 
 def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_model: Any = None) -> Array:
-    """Return MuJoCo's qvel (..., nv of MuJoCo) for rates qd (..., nv) at positions q (..., nq), both as psdmc defines
-    them.
+    """Return MuJoCo's qvel (..., nv of MuJoCo) for rates qd (..., nv) at positions q (..., nq), both in psdmc's
+    convention.
 
-    The other arguments are those of `to_qpos`. Joints that only MuJoCo has get the rate zero.
+    `to_qpos` explains the other arguments. Joints that only MuJoCo has get the rate zero.
     """
     layout = _Layout.of("to_qvel", model, mj_model)
     rates = layout.checked("qd", qd, layout.nv)
@@ -84,10 +84,10 @@ def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_m
 def from_qvel(
     model: DynamicsModel | str | Path, q: ArrayLike, qvel: ArrayLike, mj_model: Any = None
 ) -> Array:
-    """Return the rates qd (..., nv) for MuJoCo's qvel (..., nv of MuJoCo) at positions q (..., nq) as psdmc defines
-    them.
+    """Return the rates qd (..., nv) for MuJoCo's qvel (..., nv of MuJoCo) at positions q (..., nq), both in psdmc's
+    convention.
 
-    The other arguments are those of `to_qpos`. For a state of MuJoCo, first compute q = from_qpos(model, qpos).
+    `to_qpos` explains the other arguments. For a state of MuJoCo, first compute q = from_qpos(model, qpos).
     """
     layout = _Layout.of("from_qvel", model, mj_model)
     here, rates = layout.broadcast(
@@ -156,7 +156,8 @@ class _Layout:
         return len(self.own_speeds)
 
     def checked(self, name: str, values: ArrayLike, size: int) -> Array:
-        """Return the values as an array (..., size). Raises InputError if they have another shape."""
+        """Return the values as an array of floats, (..., size). Raises InputError if the last axis has another
+        length."""
         array = real_array(f"{self.what}: {name}", values)
         if array.shape[-1:] != (size,):
             raise InputError(
@@ -176,8 +177,8 @@ class _Layout:
         return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
-        """Rotate the linear rates of a floating base from the base's axes to the world's axes, or back if `back` is
-        true."""
+        """Rotate the linear rates of a floating base from the base's axes to the world's axes. If `back` is true,
+        rotate them from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

@@ -18,7 +18,8 @@ Result = TypeVar("Result")
 
 
 def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """Return the results of `work` for each job, in order. With one worker or one job, no other process is started.
+    """Yield the result of `work` for each job, in the order of the jobs, computed in up to `workers` processes. With
+    one worker or one job, no other process is started.
 
     If the caller stops early, by an error or by Ctrl-C, the worker processes are ended.
     """

@@ -19,8 +19,8 @@ PIECE = 1 << 20
 def read_file(
     path: str | os.PathLike[str], most: int, hint: str, begins: bytes = b"", name: str | None = None
 ) -> bytes:
-    """Return the content of a file, pipe or device. Arguments and errors are those of read_rest. Raises OSError if the
-    file cannot be read."""
+    """Return the content of a file, pipe or device. Arguments and other errors are those of read_rest. Raises OSError
+    if the file cannot be read."""
     with Path(path).open("rb") as file:
         named = name or os.fspath(path)
         if os.fstat(file.fileno()).st_size > most:
@@ -29,9 +29,9 @@ def read_file(
 
 
 def read_rest(file: BinaryIO, most: int, name: str, hint: str, begins: bytes = b"") -> bytes:
-    """Return the bytes that are left in an open file. It reads at most one byte more than `most`.
+    """Return the bytes that are left in an open file. The function reads at most one byte more than `most`.
 
-    begins   expected first bytes; if the file begins with other bytes, only its first bytes are returned
+    begins   expected first bytes; if the file begins with other bytes, only the first bytes of the file are returned
 
     Raises InputError, which calls the file `name`, if more than `most` bytes are left.
     """
@@ -59,7 +59,7 @@ def _up_to(file: BinaryIO, count: int) -> bytes:
 
 
 def in_words(size: int) -> str:
-    """Return a size in bytes as text for people, such as '64 MiB'."""
+    """Return a size in bytes as a text for messages, such as '64 MiB'."""
     for unit, bits in (("GiB", 30), ("MiB", 20), ("KiB", 10)):
         if size >= 1 << bits and size % (1 << bits) == 0:
             return f"{size >> bits} {unit}"

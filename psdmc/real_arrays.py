@@ -1,8 +1,8 @@
-"""Turns a caller's numbers into arrays of reals. A value that is no real array gives an error with the argument's
-name.
+"""Turns a caller's numbers into arrays of real numbers. A value that is no array of real numbers gives an error that
+names the argument.
 
-The columns of data frames are matched with the robot's joints by name. psdmc recognises a data frame by its
-attributes, so it does not import pandas or another library for this.
+The columns of data frames are matched with the robot's joints by name. psdmc recognises a data frame by its attributes,
+so it does not import pandas or another library for this.
 """
 
 from __future__ import annotations
@@ -35,13 +35,14 @@ def real_array(
     axes: Sequence[str] = (),
     names: AxisNames = _NO_NAMES,
 ) -> NDArray[Any]:
-    """Return the values as an array of this dtype. They are copied only if they are no such array yet.
+    """Return the values as an array with the NumPy type `dtype`. Values are copied only if they are not yet an array of
+    this type.
 
-    axes   words for the last axes; if a data frame has labels along one of them, its entries are put in the robot's order
-    names  for each word, the names along that axis
+    axes   words for the last axes, such as nq; entries with labels, as in a data frame, are put in the robot's order
+    names  for each word, the robot's names of the entries along the axis
 
     Raises InputError, which begins with `what`, for complex numbers, texts, dates, masked entries, ragged lists, and
-    labels that are not the names. Ascending integer labels, the default of pandas, count as positions.
+    labels that are not the robot's names. Ascending integer labels, the default of pandas, count as positions.
     """
     if type(values) is np.ndarray and values.dtype == dtype:
         return values
@@ -91,7 +92,8 @@ def _in_order(
 
 
 def order_of(what: str, labels: Sequence[Any], names: Sequence[str]) -> list[int] | None:
-    """Return for each name its position among the labels. Return None if the labels are ascending integers.
+    """Return for each name the position of the equal label, which a data frame gives. Return None if the labels are
+    ascending integers.
 
     Raises InputError, which begins with `what`, if the labels are not the names in some order.
     """

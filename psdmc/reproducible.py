@@ -1,9 +1,11 @@
 """Arithmetic that gives the same digits on every processor and with any number of threads.
 
 BLAS, LAPACK and einsum order their sums, and fuse products with sums, differently on different processors. Vectorised
-sines and exponentials differ, too. So psdmc computes all numbers in models and packages with the functions of this
-module. They use only NumPy's elementwise operations, which IEEE 754 defines to the last bit, in an order that depends
-on shapes and zeros alone. Results have the precision of the arguments.
+sines and exponentials differ, too.
+
+So psdmc computes all numbers in models and packages with the functions of this module. These functions use only NumPy's
+elementwise operations, which IEEE 754 defines to the last bit. The order of operations depends on shapes and zeros
+alone. Results have the precision of the arguments.
 """
 
 from __future__ import annotations
@@ -29,8 +31,9 @@ _any_order: ContextVar[bool] = ContextVar("any order", default=False)
 
 @contextmanager
 def in_any_order() -> Iterator[None]:
-    """Within the block, use the products of BLAS and the sines of NumPy. They are several times faster, but their last
-    digits depend on the processor. They are meant for values that are not written to a file."""
+    """Within the block, use the products of BLAS and the sines of NumPy, which are several times faster than this
+    module's. The last digits of results then depend on the processor. Use the block only for values that are not
+    written to a file."""
     before = _any_order.set(True)
     try:
         yield
@@ -39,8 +42,8 @@ def in_any_order() -> Iterator[None]:
 
 
 def times(a: Array, b: Array) -> Any:
-    """Return a @ b for matrices, vectors and stacks of matrices (..., m, n) and (..., n, k). Terms are added one by
-    one."""
+    """Return the matrix product a @ b of matrices and vectors, or of stacks of matrices (..., m, n) and (..., n, k).
+    The terms of each entry are added in order."""
     if _any_order.get():
         return a @ b
     if b.ndim > 2:
@@ -75,7 +78,8 @@ def _stacked(a: Array, b: Array) -> Array:
 
 
 def combined(weights: Array, rows: Array) -> Array:
-    """Return the sum (k,) of the rows (m, k), each multiplied by its weight in (m,). The rows are added one by one."""
+    """Return the weighted sum (k,) of the m rows of an array (m, k), with one weight per row, (m,). The rows are added
+    in order."""
     return np.asarray(np.add.reduce(weights[:, None] * rows, axis=0))
 
 
@@ -96,8 +100,8 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def solved(matrices: Array, right: Array) -> Array:
-    """Return the solutions x (..., n, k) of matrices (..., n, n) @ x = right (..., n, k), by elimination with partial
-    pivoting.
+    """Return the solutions x (..., n, k) of linear systems `matrices` @ x = `right`, by elimination with partial
+    pivoting. The n x n systems have k right sides (..., n, k).
 
     A singular matrix gives numbers that are not finite.
     """
@@ -119,15 +123,16 @@ def solved(matrices: Array, right: Array) -> Array:
 
 
 def inverse(matrices: Array) -> Array:
-    """Return the inverses (..., n, n) of matrices. A singular matrix gives numbers that are not finite."""
+    """Return the inverses of n x n matrices (..., n, n). A singular matrix gives numbers that are not finite."""
     unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)
     return solved(matrices, np.broadcast_to(unit, matrices.shape))
 
 
 def triangle_solved(triangle: Array, right: Array) -> Array:
-    """Return the solution x (l, k) of triangle (l, l) @ x = right (l, k), where `triangle` is upper triangular.
+    """Return the solution x (l, k) of `triangle` @ x = `right`, for an upper triangular matrix (l, l) and k right sides
+    (l, k).
 
-    Entries below the diagonal are not read. They are rounding errors, which would matter in a row of length 1e-13.
+    Entries below the diagonal are rounding errors and are not read. They would matter in a row of length 1e-13.
     """
     solution = right.copy()
     for r in reversed(range(len(triangle))):
@@ -140,43 +145,44 @@ def triangle_solved(triangle: Array, right: Array) -> Array:
 def sine(angle: Any) -> Any:
     """Return sin of a float or an array in rad, in the precision of the argument.
 
-    The value is computed with the C library's long double and rounded to double, so it is the same on all processors.
+    The value is computed with the C library's long double and rounded to double, so the value is the same on all
+    processors.
     """
     return _rounded(np.sin, angle)
 
 
 def cosine(angle: Any) -> Any:
-    """Return cos of a float or an array in rad, computed like `sine`."""
+    """Return the cosine of a float or an array in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.cos, angle)
 
 
 def arcsine(value: Any) -> Any:
-    """Return asin of a float or an array, in rad, computed like `sine`."""
+    """Return the arcsine of a float or an array, in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.arcsin, value)
 
 
 def angle_of(y: Any, x: Any) -> Any:
-    """Return atan2(y, x) of floats or arrays, in rad, computed like `sine`."""
+    """Return the angle atan2(y, x) of floats or arrays, in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.arctan2, y, x)
 
 
 def exponential(value: Any) -> Any:
-    """Return exp of a float or an array, computed like `sine`."""
+    """Return the exponential of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.exp, value)
 
 
 def hyperbolic_tangent(value: Any) -> Any:
-    """Return tanh of a float or an array, computed like `sine`."""
+    """Return the hyperbolic tangent of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.tanh, value)
 
 
 def logarithm(value: Any) -> Any:
-    """Return the natural logarithm of a float or an array, computed like `sine`."""
+    """Return the natural logarithm of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.log, value)
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Return base^exponent of floats or arrays, computed like `sine`."""
+    """Return base^exponent of floats or arrays, with equal digits on all processors (see `sine`)."""
     return _rounded(np.power, base, exponent)
 
 

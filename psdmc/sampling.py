@@ -1,7 +1,7 @@
 """Draws random states of a robot within its limits and writes them with the values of functions to Parquet files.
 
-The output folder has a manifest, which fixes what is sampled, and numbered parts. The manifest and the number of a
-part determine the content of that part. Each part is written as a whole, so an interrupted run continues with the
+The output folder has a manifest (settings of the sampling) and numbered parts, each a file. The manifest and the number
+of a part determine the part's content. Each part is written as a whole, so an interrupted run continues with the
 missing parts. The memory that psdmc needs does not grow with the number of states.
 """
 
@@ -87,12 +87,13 @@ class Sampling:
 
     states     number of states
     functions  names of the functions, as for the option `--functions`
-    draw       'uniform': independent states; 'sobol': states that fill the limits more evenly, by a scrambled Sobol sequence
+    draw       'uniform': independent states; 'sobol': states that fill the limits more evenly, by a scrambled Sobol
+               sequence
     seed       seed of the random states
     real       precision of states and values
-    spread     0 to 1: for each state, the mass and inertia of each link are multiplied by a random factor between
-               1 - spread and 1 + spread
-    given      by the words of LIMITS: range, plus and minus, of joints whose limit is missing in the robot file
+    spread     0 to 1: for each state, the mass and inertia of each link are multiplied by a random factor between 1 -
+               spread and 1 + spread
+    given      ranges, plus and minus, for joints without a limit in the robot file: word of LIMITS -> range
     rows       number of states per part; None: as many as PART_BYTES and PART_STATES allow
     """
 
@@ -125,8 +126,8 @@ def _range(option: str, value: float, least: float, most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """The content of a folder after sampling: number of states, parts and bytes, how many parts were there before, and
-    the length of each column."""
+    """The content of an output folder after sampling: number of states, parts (output files) and bytes. It also has the
+    number of parts that were there before, and the length of each column."""
 
     states: int
     parts: int
@@ -142,13 +143,13 @@ def sample(
     progress: Progress = silent,
     scheduler: str | None = None,
 ) -> Sampled:
-    """Draw the states, evaluate the functions, and write the parts that are missing in the folder.
+    """Draw random states, evaluate the functions, and write the parts (output files) that are missing in the folder.
 
     scheduler  address of a Dask scheduler, whose workers compute the parts; None: this process computes them
 
-    Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit,
-    or if a function needs an input that psdmc cannot sample. Raises ToolchainError if the disk is full or too small
-    for the missing parts, or if the scheduler does not answer.
+    Raises InputError if the folder holds another sampling or files that psdmc did not write. The error is also raised
+    if a joint has no limit, or if a function needs an input that psdmc cannot sample. Raises ToolchainError if the disk
+    is full or too small for the missing parts, or if the scheduler does not answer.
     """
     if find_spec("pyarrow") is None:
         raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'")
@@ -313,8 +314,8 @@ class _Plan:
 
     @cached_property
     def functions(self) -> tuple[Signature, ...]:
-        """The functions to evaluate. Raises InputError if a function is unknown, or needs an input that psdmc cannot
-        sample."""
+        """Return the functions whose values are sampled. Raises InputError if a function is unknown, or needs an input
+        that psdmc cannot sample."""
         names = [name for name in wanted(self.what.functions, self.model.mechanism) if name not in BY_ROWS]
         found = tuple(SIGNATURES[name] for name in names)
         for function in found:
@@ -330,14 +331,14 @@ class _Plan:
 
     @cached_property
     def reads(self) -> tuple[Quantity, ...]:
-        """The quantities that are sampled as inputs of the functions, such as q and qd."""
+        """Return the input quantities that are drawn at random for the sampled functions, such as q and qd."""
         read = {quantity.name: quantity for function in self.functions for quantity in function.inputs}
         return tuple(read[name] for name in LIMITS if name in read)
 
     @cached_property
     def columns(self) -> dict[str, tuple[int, ...]]:
-        """The columns of the Parquet files: name -> shape for one state. The inputs come first, then the outputs of
-        the functions."""
+        """Return the columns of the Parquet files: name -> shape for one state. The inputs come first, then the outputs
+        of the sampled functions."""
         model = self.model
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
         found = {quantity.name: sizes.shape(quantity.axes) for quantity in self.reads}
@@ -352,13 +353,13 @@ class _Plan:
 
     @property
     def row_bytes(self) -> int:
-        """Number of bytes of one state in a part."""
+        """Return the number of bytes that one state takes in a part (one output file)."""
         return (8 if self.what.real == "float64" else 4) * sum(map(math.prod, self.columns.values()))
 
     @cached_property
     def rows(self) -> int:
-        """Number of states in a full part. It is a power of two, because such numbers of Sobol points are spread most
-        evenly."""
+        """Return the number of states in a full part (one output file). It is a power of two, because such numbers of
+        Sobol points are spread most evenly."""
         fit = max(PART_BYTES // self.row_bytes, 1)
         return self.what.rows or min(1 << (fit.bit_length() - 1), PART_STATES)
 
@@ -367,12 +368,13 @@ class _Plan:
         return -(-self.what.states // self.rows)
 
     def count(self, part: int) -> int:
-        """Number of states in the part with this number."""
+        """Return the number of states in the part (output file) with this number."""
         return min(self.rows, self.what.states - part * self.rows)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[Array, Array]]:
-        """Lower and upper bounds of the entries of each quantity. Raises InputError if a joint has no limits."""
+        """Return the lower and upper bounds of the random values of each quantity: name -> two arrays. Raises
+        InputError if a joint has no limits."""
         robot, found, lacking = self.model.mechanism, {}, {}
         for quantity in self.reads:
             word, _ = LIMITS[quantity.name]
@@ -389,7 +391,7 @@ class _Plan:
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """Everything that determines the content of the parts, as JSON values."""
+        """Return the settings that determine the content of all output files, as JSON values."""
         model, what = self.model, self.what
         found = {
             "generator": "psdmc sample",
@@ -416,18 +418,20 @@ class _Plan:
         return plain
 
     def described(self, part: int) -> bytes:
-        """Return the metadata of a part as bytes."""
+        """Return the metadata of a part (one output file) as bytes: the settings, the part's number and the states in
+        the part."""
         own = {"part": part, "first_state": part * self.rows, "states_of_part": self.count(part)}
         return json.dumps({**self.manifest, **own}).encode()
 
     def files(self, progress: Progress) -> Callable[[int], bytes]:
-        """Compile the functions. Return a function that computes the bytes of a part's file from the number of the
-        part."""
+        """Compile the sampled functions. Return a function that computes the bytes of an output file from the number of
+        the part."""
         columns = self.evaluated(progress)
         return lambda part: _file(columns(part), self.described(part))
 
     def evaluated(self, progress: Progress) -> Callable[[int], dict[str, Array]]:
-        """Compile the functions. Return a function that computes the columns of a part from the number of the part."""
+        """Compile the sampled functions. Return a function that computes the columns of an output file from the number
+        of the part."""
         by_rows = {function.name for function in self.functions if function.theta and self.what.spread}
         names = [
             f"{function.name}{THETA_ROWS}" if function.name in by_rows else function.name
@@ -449,11 +453,12 @@ class _Plan:
 
     @property
     def links(self) -> int:
-        """Number of links whose masses and inertias are multiplied by a random factor."""
+        """Return the number of links whose masses and inertias are multiplied by a random factor, which may be zero."""
         return len(self.model.mechanism) if self.what.spread else 0
 
     def drawn(self, shares: Array) -> dict[str, Array]:
-        """Map numbers between 0 and 1 to states within the limits, and to theta_b if masses and inertias are sampled."""
+        """Return states within the limits, made from random numbers between 0 and 1. If masses and inertias are
+        sampled, return base parameters theta_b, too."""
         robot, found = self.model.mechanism, {}
         for name, (lower, upper) in self.ranges.items():
             own, shares = shares[:, : len(lower)], shares[:, len(lower) :]

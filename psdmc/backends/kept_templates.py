@@ -1,8 +1,9 @@
-"""A cache of the templates' compiled code, in the folder `__pycache__` next to them, where Python caches modules.
+"""A cache of compiled templates (text patterns for the generated files), in the folder `__pycache__` next to the
+templates.
 
 Jinja translates a template to Python, and Python compiles this to bytecode. Both steps take longer than filling the
-template. As with modules, the code is cached once per installation if the folder is writable. A cached file is valid
-for one source text, one version of Python and one version of Jinja.
+template. So the bytecode is stored once per installation if the folder is writable. A stored file is valid for one
+template text, one version of Python and one version of Jinja.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ made again."""
 
 
 class CodeBesideTemplates(BytecodeCache):
-    """Jinja's bytecode cache in `__pycache__`. Jinja looks for a template's code there before it compiles the template,
-    and stores the code there afterwards."""
+    """Jinja's cache of compiled templates in `__pycache__`. Jinja looks for the bytecode of a template there before it
+    compiles the template, and stores the bytecode there afterwards."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -44,7 +45,8 @@ class CodeBesideTemplates(BytecodeCache):
                 bucket.code = marshal.loads(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Store the template's compiled code in the cache; do nothing if the folder is not writable."""
+        """Write the compiled code of a template to a file in the cache. Nothing is written if the folder is not
+        writable."""
         if sys.dont_write_bytecode:
             return
         code = marshal.dumps(bucket.code)

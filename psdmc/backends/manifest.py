@@ -1,4 +1,4 @@
-"""The file manifest.json: what the package is, and hashes of its files as psdmc wrote them."""
+"""The file manifest.json, which describes a package and lists the SHA-256 of each file as psdmc wrote it."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def manifest(
     functions: Sequence[Mapping[str, Any]],
     files: Mapping[str, str],
 ) -> str:
-    """Return the JSON text of the manifest. `own` are the entries of this back end only. `files` are all other files of
-    the package, which the manifest lists with their SHA-256."""
+    """Return the JSON text of manifest.json, which describes the package. `own` are entries for the language of the
+    package, such as C. `files` are all other files of the package, which the manifest lists with their SHA-256."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "generator": GENERATOR,
@@ -53,10 +53,10 @@ def manifest(
 
 
 def renamed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return pairs of symbols in an older package and their new names.
+    """Return the C names that changed from an older package to the new one, as pairs (old name, new name).
 
-    If the robot's name changed, the pair `R_*` stands for all symbols. Further pairs are functions that psdmc renamed.
-    The older manifest may be forged.
+    If the robot's name changed, one pair such as (`old_*`, `new_*`) represents all C names. Further pairs are functions
+    that psdmc itself renamed. The older manifest may be forged.
     """
     old, new = before.get("robot"), after["robot"]
     if not isinstance(old, str) or not NAME.fullmatch(old):

@@ -14,9 +14,9 @@ class EmitOptions:
     """The options with which a package is generated.
 
     real    precision of the whole package
-    trig    'inline': psdmc's own branch-free vector sincos, the library's for angles outside its range; 'freestanding':
-            the same without a library, NaN outside the range; 'libm': the library's sin and cos
-    target  the machine; a target has a default precision and sincos for users who choose none
+    trig    code of sine and cosine. 'inline': code without branches for SIMD vectors, and the C library for very large
+            angles; 'freestanding': no C library, very large angles give NaN; 'libm': the C library only
+    target  the target machine; some targets have their own defaults of `real` and `trig`
     """
 
     real: Real = "float64"
@@ -25,7 +25,8 @@ class EmitOptions:
 
     @property
     def lanes(self) -> int:
-        """Number of states in one block of the lane-by-lane layout, the same for every target."""
+        """Return how many states one block holds in the batch layout [block][entry][lane]. The number is equal for all
+        target machines."""
         return LANE_BLOCK_BYTES // self.real_bytes
 
     @property

@@ -1,4 +1,5 @@
-"""Which files of a folder psdmc wrote, according to the manifest or to the journal of an interrupted `emit-c`.
+"""Finds out which files of a folder psdmc wrote, from the manifest of the package. If `emit-c` was interrupted, it also
+reads the journal, a list of the files that were to be written.
 
 Both lists are ordinary files and may be forged. Names that psdmc would not give, and everything behind a symbolic link,
 count as foreign.
@@ -46,8 +47,8 @@ Digests = Mapping[str, frozenset[str]]
 
 
 def listed(path: Path) -> Digests:
-    """Return the digests of files as listed in a manifest or journal, by path. Empty if there is no such list, or if it
-    is not psdmc's."""
+    """Return, by path, the SHA-256 digests of the files that a manifest or journal lists. Return an empty mapping if
+    there is no such list, or if psdmc did not write it."""
     return {
         name: frozenset([value] if isinstance(value, str) else map(str, value))
         for name, value in _entries(path).items()
@@ -73,10 +74,11 @@ def link_in(root: Path, path: str) -> bool:
 
 
 def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
-    """Return the paths of a package's files that are missing or differ from what psdmc wrote. None if the folder holds
-    no package.
+    """Return the paths of files in a package that are missing or differ from what psdmc wrote. Return None if the
+    folder holds no package.
 
-    The manifest lists all files except itself. Raises InputError if a file cannot be read.
+    The manifest.json of the package lists the digests of all files except itself. Raises InputError if a file cannot be
+    read.
     """
     root = Path(directory)
     try:

@@ -1,7 +1,8 @@
-"""The interface of a back end (C, Rust): it receives metadata, arithmetic and reference values, and returns the text of
-files.
+"""The interface of a back end, which writes packages in one language (C, Rust). A back end receives metadata,
+arithmetic and reference values, and returns the text of files.
 
-Each back end is a folder next to this file. Other code uses only the constant BACK_END of its module `back_end`.
+Each back end is a folder next to this file. Other code uses only the constant BACK_END in the module `back_end` of the
+folder.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ BACK_ENDS = ("c", "rust")
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One generated function: `meaning` describes it for this robot; of its kernels, the one with compiled-in
-    parameters comes first."""
+    """One generated function: `signature` has its inputs and outputs, `meaning` describes it for this robot. `kernels`
+    are its variants without and with the base parameters as an input; the variant without comes first."""
 
     signature: Signature
     meaning: str
@@ -34,11 +35,11 @@ class Function:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Emission:
-    """The content of a package, independent of the language in which it is written.
+    """The content of a package, independent of the language (such as C) in which it is written.
 
     info        the robot's metadata; its names are untrusted text
-    kernels     the functions' arithmetic, by name
-    references  states and the functions' values there, for the package's self-test
+    kernels     the arithmetic of each function variant, by name
+    references  states and the functions' values there, for the package's self-test; None: no self-test
     adapters    names of the other programs for which the package has files
     """
 
@@ -50,7 +51,8 @@ class Emission:
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """The generated functions that `kernels` contain, in the order of headers."""
+        """Return the generated functions of which the package has kernels (variants), in the order of the function
+        list."""
         return functions_of(self.kernels, self.info.base_frame)
 
 
@@ -59,12 +61,12 @@ class BackEnd:
     """A language in which psdmc can write packages.
 
     language    the name of the language for users
-    named       what has the robot's name in this language, such as a crate
-    files       returns path -> text of every file of the package, manifest.json last
-    identifier  returns the robot's name in the language
-    entry       from this name, returns the file that a user opens first, and how it is used
-    next        from the package's folder, returns the next command to type
-    lacks       options of `emit` that the back end does not have
+    named       what a package is called in this language, such as crate
+    files       function that returns the text of every file of the package, by path, manifest.json last
+    identifier  function that converts the robot's name to a valid name in the language
+    entry       function that returns, for this valid name, the file that a user opens first, and how it is used
+    next        function that returns, for the package's folder, the next command to type
+    lacks       options of `emit` that this language does not support
     """
 
     language: str
@@ -85,8 +87,8 @@ def back_end(name: str) -> BackEnd:
 
 
 def functions_of(kernels: Mapping[str, Kernel], base_frame: str = BASE_FRAME) -> tuple[Function, ...]:
-    """Return the functions to which the kernels belong, in the order of the functions' signatures. `base_frame` is the
-    name of the base frame in their descriptions."""
+    """Return the functions to which the given kernels (variants of generated functions) belong, in the order of the
+    function list. `base_frame` is the name of the base frame in the functions' descriptions."""
     wrong = [name for name, kernel in kernels.items() if name != kernel.name]
     if wrong:
         raise InternalError(f"kernel {wrong[0]!r} is filed under a name that is not its own")

@@ -25,8 +25,10 @@ MORE_SOURCES = {name: f"src/{name}.c" for name in ("payload", "friction", "bodie
 class Differences:
     """How a package on disk differs from what psdmc writes now.
 
-    missing, added, changed  paths that the folder lacks, that psdmc no longer writes, and whose bytes differ
-    reasons                  possible reasons, in sentences, from a comparison of the manifests
+    missing  paths of files that the folder lacks
+    added    paths of files that psdmc no longer writes
+    changed  paths of files whose bytes differ
+    reasons  possible reasons, in sentences, from a comparison of the manifests
     """
 
     missing: tuple[str, ...]
@@ -39,8 +41,8 @@ class Differences:
 
 
 def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the options of psdmc.compiler.emit with which a package was generated, from its manifest, which may be
-    forged.
+    """Return the options of psdmc.compiler.emit with which a package was generated. They are read from the manifest of
+    the package, which may be forged.
 
     Raises InputError if the folder holds no package, or if the manifest lacks an option.
     """

@@ -23,7 +23,8 @@ def _kept() -> CodeBesideTemplates | None:
 
 
 def environment_with(**filters: Callable[..., str]) -> Environment:
-    """Return a Jinja environment with the filters of a language, which make untrusted text safe in it."""
+    """Return a Jinja environment (settings for filling templates) with the filters of one language. The filters make
+    untrusted text safe in this language."""
     made = Environment(
         loader=FunctionLoader(_source),
         undefined=StrictUndefined,

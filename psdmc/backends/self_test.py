@@ -1,4 +1,4 @@
-"""What a package's self-test compares: labels, inputs and tolerances, the same in every language."""
+"""What the self-test of a package compares: names of outputs, inputs and tolerances, which are equal in all languages."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ def tolerance(function: Signature, real: str) -> str:
 
 
 def compared_by_row(output: Quantity) -> bool:
-    """Whether each row of an output is compared relative to its own largest value. Otherwise, all entries are compared
-    relative to the largest one."""
+    """Return whether the self-test compares each row of an output relative to the largest value of that row. Otherwise,
+    all entries are compared relative to the largest entry of the output."""
     return bool(output.axes) and output.axes[0] in _ROWS
 
 
 def given_name(vector: str, variant: str) -> str:
-    """Return the name of a kernel's input in the reference states.
+    """Return the name under which the reference states hold an input of a function.
 
-    Input torques depend on the kernel's parameters and have one name per variant: compiled-in parameters (''), theta_b
-    (_theta) and one theta_b per state (THETA_ROWS).
+    Only the torques tau have several names, because they depend on the base parameters: tau for compiled-in parameters,
+    tau_theta for the input theta_b, and tau_theta_rows for one theta_b per state.
+
+    variant  ending of the function variant: '', '_theta' or THETA_ROWS
     """
     return f"{vector}{variant}" if vector == TAU.name else vector

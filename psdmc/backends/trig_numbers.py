@@ -1,5 +1,5 @@
-"""The numbers of the inline sincos for all languages. tests/trig/minimax.py derives these numbers, and a test compares
-them."""
+"""The numbers of the sine and cosine code for all languages. tests/trig/minimax.py derives the numbers, and a test
+compares both."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ Real = Literal["double", "float"]
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """The numbers of one precision's sincos. For angles up to `limit` (rad), the product of k and each part of pi/2
-    except the last is exact."""
+    """The numbers of the sine and cosine code for float or double. For angles up to `limit` (rad), k (the number of
+    quarter revolutions) times each part of pi/2 except the last is exact."""
 
     two_over_pi: float
     half_pi: tuple[float, ...]

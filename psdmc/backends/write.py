@@ -1,8 +1,8 @@
 """Writes a package to its own folder. Only changed files are written, and no file that psdmc did not write is
 overwritten.
 
-A file belongs to psdmc if it has the digest in the folder's manifest.json, or in the journal of an interrupted
-`emit-c`. Every other file is foreign: another program wrote it, or somebody edited it.
+psdmc recognises its files by their SHA-256. The manifest.json of the folder lists these digests; so does the journal of
+an interrupted `emit-c`. Every other file is foreign: another program wrote it, or somebody edited it.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from psdmc.errors import InputError
 
 
 class Changes(list[str]):
-    """Paths of a package's files that changed, removed files included.
+    """Paths of a package's files that changed, including removed files.
 
-    removed   files of the package that was there before, which the new package does not have
-    kept      files of others that were in the way -> names under which they are kept
-    renamed   symbols of the package that was there before, and their new names
+    removed  files of the earlier package that the new package does not have
+    kept     foreign files that were in the way, and the new names under which they are kept
+    renamed  C names in the earlier package, and their new names
     """
 
     def __init__(

@@ -62,8 +62,8 @@ def _measure(options: argparse.Namespace) -> int:
 def scaling_cases(
     joints: Sequence[int] = JOINTS, progress: Callable[[str], None] = lambda message: None
 ) -> Iterator[Case]:
-    """Derive the KUKA LBR with different numbers of joints, each in its own process, to show how times grow with the
-    joints."""
+    """Yield the KUKA LBR with different numbers of joints, as benchmark robots that show how times grow with the
+    joints. Each model is derived in a new process."""
     longest = generic_chain(eight_joints(bundled_chain("LBR7")), SEED)
     for n in joints:
         progress(f"LBR with {n} joints: deriving")

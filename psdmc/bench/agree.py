@@ -29,12 +29,14 @@ SMALL = 1e-3
 
 
 def checked_states(outputs: int) -> int:
-    """Number of states to compare for a function with this many outputs: a power of two, so that whole batches fit."""
+    """Return how many states of a function with this number of output values are compared. The number is a power of
+    two, so that the states fill whole batches."""
     return min(CHECKED, 1 << int(np.log2(max(FEWEST, CHECKED_REALS // outputs))))
 
 
 def disagreement(runner: Runner, states: States) -> float:
-    """Return the largest error of a library's outputs for one function, divided by the largest value of each output."""
+    """Return the largest error of a library's results for one function. The error of each output array is divided by
+    the largest value of this array."""
     expected = states.expected(runner.contestant.function)
     found = runner.outputs()
     if runner.contestant.convention == "MuJoCo":

@@ -21,18 +21,18 @@ def native_flags() -> tuple[str, ...]:
 
 
 def counted_flags() -> tuple[str, ...]:
-    """Compiler flags for counting instructions. They allow AVX2 only, as valgrind has no AVX-512 and counts should be
-    the same everywhere."""
+    """Return the compiler flags for counting instructions. They permit AVX2 instructions but no AVX-512, which valgrind
+    does not support. So counts are equal on all machines."""
     return (*find_compiler().portable, *X86_64_V3.flags)
 
 
 def built(
     product: str, command: Sequence[str], sources: Mapping[str, str], depends: Sequence[str] = ()
 ) -> Path:
-    """Write the source files into a folder, run a command there, and return the path of the file `product` that it
-    makes.
+    """Run a command that makes the file `product` from source files, and return the path of this file. The sources are
+    first written into a folder.
 
-    command  argument list; it does not run if the cache has a result from the same content
+    command  argument list; it does not run if the cache has a result from equal content
     sources  text of each file by its path in the folder
     depends  what else the result depends on, such as versions of libraries
 
@@ -53,8 +53,8 @@ def built(
 
 
 def produced(build: Callable[[Path], None], sources: Mapping[str, str], parts: Sequence[str]) -> Path:
-    """Return the folder that `build` fills, from the cache if possible. `parts` lists what it depends on besides the
-    sources."""
+    """Return the folder that `build` fills with compiled files; from the cache if possible. `parts` lists what the
+    files depend on in addition to the sources, such as compiler flags."""
     compiler = find_compiler()
     target = [compiler.target] if any("native" in part for part in parts) else []
     return cached(cache_key(sources, (compiler.version, *target, *parts)), build)

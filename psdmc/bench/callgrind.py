@@ -32,9 +32,10 @@ def valgrind() -> str:
 
 
 def instructions(contestants: Sequence[Contestant], chain: Mechanism) -> dict[tuple[str, str], float]:
-    """Count the instructions per state, including the few of the loop, and return them by (library, symbol).
+    """Count the instructions per state of each compared function, and return the counts by (library, C name). The few
+    instructions of the loop that calls the function are included.
 
-    contestants  compared functions, compiled with counted_flags(); valgrind runs once for each of their libraries
+    contestants  the compared functions, compiled with counted_flags(); valgrind runs once for each of their libraries
     """
     states = States.random(chain, STATES, SEED)
     found: dict[tuple[str, str], float] = {}

@@ -38,10 +38,10 @@ class Case:
     """A robot of the benchmark.
 
     name            name in tables
-    model           its model; theta_b and all inertias are known
-    note            where the numbers come from
-    derive_seconds  time of a derivation whose imports are already loaded, None if the model was given
-    derive_bytes    peak memory of a process that only derived the model, None if unknown
+    model           its model; the base parameters and all inertias are known
+    note            where the robot's inertias come from
+    derive_seconds  time of a derivation by a process that already has its imports; None if the model was given
+    derive_bytes    peak memory of a process that only derived the model; None if unknown
     named           functions to measure; if empty, those that are measured for every robot
     """
 
@@ -89,7 +89,8 @@ class Case:
 
     @property
     def costly(self) -> tuple[str, ...]:
-        """Names of the derivative functions that take too long for a robot with more than MOST_DIFFERENTIATED rates."""
+        """Return the names of the derivative functions that the benchmark leaves out for this robot. They take too long
+        if the robot has more than MOST_DIFFERENTIATED degrees of freedom."""
         large = self.chain.nv > MOST_DIFFERENTIATED
         return tuple(name for name in self.named or BENCHED if large and name.endswith(DIFFERENTIATED))
 
@@ -104,10 +105,10 @@ class Case:
 
 
 def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
-    """Return a robot of the given geometry with random physically possible inertias, no drive inertia, and gravity along
-    -z.
+    """Return a robot with the joints and lengths of the given robot and random, physically possible inertias. The robot
+    has no drive inertia, and gravity is along -z.
 
-    As no inertia is zero, no library profits from zeros. The same seed gives the same robot.
+    As no inertia is zero, no library profits from zeros. Equal seeds give equal robots.
     """
     rng = np.random.default_rng(seed)
     n = len(chain)
@@ -122,7 +123,8 @@ def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
 
 
 def physical_body(rng: np.random.Generator) -> Array:
-    """Return (10,) random standard parameters of a possible body, made of eight point masses; no entry is zero."""
+    """Return the ten standard parameters (mass, first moments, inertia) of a random body that is physically possible.
+    The body consists of eight point masses; no parameter is zero."""
     masses = rng.uniform(0.1, 0.6, size=8)
     places = rng.normal(scale=0.08, size=(8, 3)) + rng.normal(scale=0.05, size=3)
     second = np.einsum("k,ki,kj->ij", masses, places, places)
@@ -148,8 +150,9 @@ def robot_as_numbers(chain: Mechanism) -> str:
     """Return the robot as plain text for the C++ programs of other libraries, so that they need no parser for robot
     files. Raise InputError as refuse_unlike does.
 
-    The text has n and gravity. For each joint follow Pinocchio's name of its type, its parent (0: base, else from 1),
-    its rotation (9, row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
+    The text has the number n of joints, and gravity. Then follow, for each joint: Pinocchio's name of the joint type,
+    the parent (0: base, else from 1), rotation (9, row-major), translation (3), body (10 standard parameters about the
+    joint frame) and drive inertia.
     """
     refuse_unlike(chain)
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]

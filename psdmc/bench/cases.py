@@ -72,7 +72,7 @@ def standard_cases(
     seed: int = SEED,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[Case]:
-    """Derive the standard robots of the benchmark, each in its own process.
+    """Derive the models of the standard robots of the benchmark, each in a new process.
 
     Raise InputError if a robot's file is not installed, or if a name is unknown.
     """
@@ -91,7 +91,8 @@ def legged_cases(
     names: Sequence[str] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[Case]:
-    """Derive legged robots with the inertias of their files, each in its own process; without names, all of them.
+    """Derive the models of legged robots with the inertias of their files, each in a new process. Without names, all
+    legged robots are derived.
 
     Raise InputError as `standard_cases` does.
     """
@@ -125,7 +126,8 @@ def oblique_chain(n: int, seed: int) -> Mechanism:
 
 
 def first_joints(chain: Mechanism, n: int) -> Mechanism:
-    """Return the robot without the joints after its first n, to measure how times grow with the number of joints."""
+    """Return the robot without the joints after joint n. The benchmark uses it to measure how times grow with the
+    number of joints."""
     rows = PARAMETERS_PER_LINK * n
     span = chain.parameter_span[:rows]
     kept = np.any(span != 0.0, axis=0)

@@ -46,22 +46,23 @@ class Unavailable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contestant:
-    """A library's code of one function for one robot, with all that is needed to call and time it.
+    """The code of one library for one function and one robot, with all data that are needed to call and time the code.
 
     rival         name of the library in tables: 'psdmc factored', 'Pinocchio' ...
     function      name in psdmc/functions
-    library       shared library that exports `symbol`_throughput and so on
+    library       shared library that exports the C functions `symbol`_throughput and so on
     outputs       number of output values per state
     variant       name of the algorithm if the library has several for the function, else ''
-    layout        how states are passed: one state per call, rows or lanes
+    layout        how states are passed: 'state' (one per call), 'rows' (one after the other) or 'lanes' (blocks of
+                  states)
     lanes         states per block if the layout is 'lanes'
-    sections      values per state of each output array of a batch call; () if there is one array
-    convention    convention for the states of a floating base
-    robot         text from which the library sets up the robot, None if the robot is compiled in
-    weights       only for regressors: the parameters by which an output row is multiplied to get a torque
+    sections      number of values per state of each output array of a batch call; () if there is one array
+    convention    convention for the states of a floating base: psdmc's or MuJoCo's
+    robot         text from which the library makes the robot; None if the robot is compiled in
+    weights       only for regressors: the parameters by which a row of the regressor is multiplied to get a torque
     operations    (multiplications, additions), None if unknown
-    instructions  per state on x86-64-v3, None if not counted
-    code_bytes    size of the machine code for one state, None if the library does not tell
+    instructions  number per state on x86-64-v3, None if not counted
+    code_bytes    size of the machine code for one state, None if the library does not provide it
     """
 
     rival: str
@@ -104,7 +105,7 @@ class Work(ctypes.Structure):
 
 
 class Runner:
-    """A loaded library with states in its memory layout, ready to time one function repeatedly."""
+    """A loaded library with input states in the memory layout of the library, ready to time one function repeatedly."""
 
     def __init__(self, contestant: Contestant, states: States) -> None:
         self.contestant = contestant
@@ -120,7 +121,8 @@ class Runner:
         self.setup()
 
     def move(self) -> None:
-        """Move the output array to another place in memory, for the reason that States.move gives."""
+        """Move the output array to another place in memory between trials. The place decides which cache lines collide,
+        and so changes the time of a call."""
         self._output = moved(self._output)
 
     def setup(self) -> None:
@@ -129,22 +131,26 @@ class Runner:
             self._library.setup(self.contestant.robot.encode())
 
     def throughput(self) -> Array:
-        """Measure the time per state in ns, one value per block of states. Other work on the machine hardly affects the
-        median."""
+        """Measure the time per state in ns if the states are independent. Returns one time for each block of states.
+        Other work on the machine hardly affects the median of these times."""
         return self._timed("throughput", self._output, self._block)
 
     def latency(self) -> Array:
-        """Measure the time per state in ns, one value per block, if each state depends on the result of the one
-        before."""
+        """Measure the time per state in ns if each state depends on the result of the state before. Returns one time
+        for each block of states."""
         return self._timed("latency", self._output, self._block, self._count // LATENCY_SHARE)
 
     def tail(self) -> Array:
-        """Measure the time per call in ns over blocks of 64 calls, without the time of reading the clock."""
+        """Measure the time per call in ns, without the time of reading the clock. Returns one time for each block of 64
+        calls, from which the slowest calls are found."""
         return self._timed("throughput", self._output, TAIL_BLOCK) - self._clock_cost() / TAIL_BLOCK
 
     def cold(self, calls: int, memory: Array) -> Array:
-        """Measure the times of single calls with empty caches, in ns, without the time of reading the clock. All of
-        `memory` is read between two calls."""
+        """Measure the times of single calls with empty caches, in ns, without the time of reading the clock. The array
+        `memory`, which is larger than the caches, is read between two calls.
+
+        calls  number of calls
+        """
         seconds = np.zeros(min(calls, self._states.count))
         loop = getattr(self._library, f"{self.contestant.symbol}_cold")
         work, sizes = self._work(self._output, len(seconds)), (len(seconds), memory.size)
@@ -153,7 +159,8 @@ class Runner:
         return seconds * 1e9 - self._clock_cost()
 
     def outputs(self) -> Array:
-        """Compute the function at every state and return its outputs, (count, outputs)."""
+        """Compute the function at every state and return the outputs, an array (number of states, output values per
+        state)."""
         count, size = self._states.count, self.contestant.outputs
         output = np.full(count * size, np.nan)
         self._copy_matrices(True)

@@ -47,8 +47,8 @@ def demo(model: DynamicsModel, progress: Progress) -> str:
 def errors_against_pinocchio(
     model: DynamicsModel, robot: CompiledRobot, functions: Sequence[str]
 ) -> dict[str, float]:
-    """Return the largest error of each compiled function, compared with Pinocchio at random states and divided by the
-    largest value of each output."""
+    """Return, for each compiled function, the largest difference from Pinocchio's results at random states. The
+    difference of each output array is divided by the largest value of the array."""
     pinocchio = reference(source_of(model))
     rng, sizes = np.random.default_rng(SEED), sizes_of(model.mechanism, model.l)
     q, qd, qdd = states_of(model.mechanism, rng, STATES)

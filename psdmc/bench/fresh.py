@@ -21,8 +21,8 @@ STATUS = Path("/proc/self/status")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivation:
-    """A MODEL with the time and memory of its derivation. peak_bytes is for the whole process, None if the system does
-    not tell."""
+    """A model with the time and memory of its derivation. peak_bytes is for the whole process; None if the system does
+    not report it."""
 
     model: DynamicsModel
     seconds: float
@@ -30,12 +30,14 @@ class Derivation:
 
 
 def derive_fresh(chain: Mechanism) -> Derivation:
-    """Derive a model in a new process. Leave out E and P if they do not fit into memory."""
+    """Return the model of a robot, derived in a new process, with time and memory of the derivation. The matrices E and
+    P are left out if they do not fit into memory."""
     return in_a_new_process(measured_derivation, chain)
 
 
 def measured_derivation(chain: Mechanism) -> Derivation:
-    """Measure the time of a second derivation in this process, and the peak memory of the process."""
+    """Derive a model twice in this process, and return it with the time of the second derivation and the peak memory of
+    the process."""
     derive_model(chain, expand=False)  # imports and first calls are not measured
     start = time.perf_counter()
     try:

@@ -33,7 +33,8 @@ SLACK = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A count that differs from the baseline. A side that has no such count is None."""
+    """An operation or instruction count that differs between the baseline (`before`) and the present code (`after`).
+    The value is None on the side that has no such count."""
 
     robot: str
     function: str
@@ -61,8 +62,8 @@ class Change:
 
 
 def changes(before: Baseline, after: Baseline) -> Iterator[Change]:
-    """Return all differences from the baseline, in its order of robots. Compare instructions only if both compilers are
-    equal."""
+    """Return all counts that differ between the baseline `before` and the present code `after`, robot by robot.
+    Instruction counts are compared only if both were made with one compiler version."""
     comparable = before.compiler == after.compiler and after.without is None
     for robot in after.counts:
         old_robot, new_robot = before.counts.get(robot, {}), after.counts[robot]
@@ -150,8 +151,8 @@ Counts = dict[str, dict[str, dict[str, float]]]
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Operation and instruction counts, and the compiler of the instruction counts. `without` says why they are
-    missing."""
+    """Operation and instruction counts of all robots and functions, and the compiler with which instructions were
+    counted. `without` says why instruction counts are missing; None: they are there."""
 
     compiler: str
     counts: Counts
@@ -180,9 +181,10 @@ def count(
     progress: Callable[[str], None] = lambda message: None,
     with_instructions: bool = True,
 ) -> Baseline:
-    """Count the operations of every function of each robot and its instructions per state, for factored lowering.
+    """Count the operations and instructions per state of every function of each robot, for code that psdmc factors into
+    few operations.
 
-    Leave out the instructions, and say why, if they are not wanted or valgrind is not installed.
+    Instructions are left out if they are not wanted or valgrind is not installed; the result then states the reason.
     """
     counts: Counts = {}
     without = None if with_instructions else "not asked for"

@@ -57,8 +57,8 @@ def _measure(options: argparse.Namespace) -> int:
 
 
 def as_text(result: BenchResult, cases: Sequence[Case]) -> str:
-    """Return a table per robot: psdmc's time for one state, and the times of other libraries and of psdmc's batches as
-    multiples of it."""
+    """Return the results as text, with a table for each robot. A row has psdmc's time for one state. The times of other
+    libraries and of psdmc's batch calls are given as multiples of psdmc's time."""
     machine = result.machine
     lines = [f"{machine.processor}, {machine.compiler}, {machine.flags}"]
     for case, found in zip(cases, result.cases, strict=True):

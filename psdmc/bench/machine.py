@@ -40,7 +40,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """Return the properties of this machine that the system tells."""
+    """Return the properties of this machine on which a time depends, as far as the system reports them."""
     return Machine(
         processor=_cpu_line("model name") or platform.processor() or platform.machine(),
         cores=os.cpu_count() or 1,
@@ -55,9 +55,10 @@ def this_machine() -> Machine:
 
 
 def others_share() -> Callable[[], float]:
-    """Return a function that says how many cores' worth of time other processes have used since this call.
+    """Return a function that measures how much processor time other processes have used since the call of others_share.
+    The result is an average number of busy cores.
 
-    It returns zero if the system does not tell (no /proc/stat).
+    The result is zero if the system does not report this time (no /proc/stat).
     """
     begin = _busy_seconds(), time.process_time(), time.monotonic()
 

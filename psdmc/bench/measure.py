@@ -22,7 +22,11 @@ PATIENCE = 3
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Median, quartiles and smallest value of a time over several trials, ns."""
+    """Median, quartiles and smallest value of the times of one function over several rounds of timing, ns.
+
+    low, high  lower and upper quartile
+    best       smallest time
+    """
 
     median: float
     low: float
@@ -37,8 +41,12 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """Slowest calls, ns per call over blocks of 64 calls, without the time of reading the clock. They limit a control
-    loop."""
+    """The slowest calls of one function, which limit a control loop. The values are times per call in ns, in blocks of
+    64 calls, without the time of reading the clock.
+
+    percentile_99_99  time that one block in 10,000 exceeds
+    blocks            number of blocks
+    """
 
     median: float
     percentile_99_99: float
@@ -48,7 +56,7 @@ class Tail:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """Times of one compared function. Latency, tail and cold are measured only if a call computes one state.
+    """Times of one compared function. The times except throughput are measured only if a call computes one state.
 
     cold  time of single calls with empty caches; None if not measured
     """
@@ -69,7 +77,8 @@ class _Trials:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Times of all compared functions, in the order of the runners, and whether the machine was otherwise idle."""
+    """Times of all compared functions, in the order in which the functions were given. It also states whether the
+    machine was otherwise idle."""
 
     times: tuple[Times, ...]
     rounds: int
@@ -83,8 +92,14 @@ def measure(
     between: Callable[[], None] = lambda: None,
     cold: bool = False,
 ) -> Measured:
-    """Time every runner once per round, until `rounds` rounds count. `between` is called before each round. If `cold`,
-    also time single calls with empty caches."""
+    """Time every compared function once per round, until `rounds` rounds were made while no other program ran. Returns
+    the times of each function. If the machine stays busy for PATIENCE times as many rounds, the times of all rounds are
+    returned.
+
+    runners  the compared functions, with their states
+    between  function that is called before each round
+    cold     True: also time single calls with empty caches
+    """
     _round(runners)  # caches, branch predictors and the clock speed settle
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
@@ -152,7 +167,8 @@ UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 
 @cache
 def swept_memory() -> Array:
-    """Return memory twice as large as the largest cache, within LEAST and MOST. Reading it empties the caches."""
+    """Return an array twice as large as the largest cache of the machine, within the limits LEAST and MOST (bytes). The
+    benchmark reads this array to empty the caches."""
     largest = max(map(_bytes, CACHES.glob("index*/size")), default=0)
     return np.ones(min(max(2 * largest, LEAST), MOST) // 8)
 
@@ -169,8 +185,9 @@ CODE = frozenset("tTwW")
 
 
 def code_sizes(library: Path) -> dict[str, int]:
-    """Return the size in bytes of each function's machine code, by name; empty if there is no GNU or LLVM nm. Parts that
-    a compiler splits off, such as `name.cold`, count as the function's."""
+    """Return the size in bytes of each C function's machine code in a library, by name; empty if there is no GNU or
+    LLVM nm. A compiler may move part of a function into another symbol, such as `name.cold`; its size is added to that
+    of the function."""
     nm = shutil.which("nm")
     if nm is None:
         return {}

@@ -1,5 +1,5 @@
-"""Times that the authors of psdmc's method published. Reports show them without ratios, as machines and inertias
-differ."""
+"""Times that the authors of the method behind psdmc published. Reports show them without ratios, because machines and
+inertias differ."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """Times that were published for one robot, ns per call; its derivation in s; None if not given."""
+    """Times that were published for one robot, in ns per call, and the time of its derivation in s. A time is None if
+    it was not published."""
 
     robot: str
     source: str

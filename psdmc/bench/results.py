@@ -21,13 +21,14 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """Result of one compared function for one robot.
+    """The result of one compared function for one robot.
 
-    layout        'state', 'rows' or 'lanes'
-    error         largest error of the outputs, divided by the largest value of each output
+    layout        how states are passed: 'state' (one per call), 'rows' (one after the other) or 'lanes' (blocks of
+                  states)
+    error         largest error of the outputs, divided by the largest value of each output array
     operations    (multiplications, additions), None if unknown
-    instructions  per state, as callgrind counts them on x86-64-v3; None if not counted
-    code_bytes    size of the machine code for one state; None if the library does not tell
+    instructions  number per state, as callgrind counts them on x86-64-v3; None if not counted
+    code_bytes    size of the machine code for one state; None if the library does not report it
     """
 
     rival: str
@@ -51,7 +52,8 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """Results for one robot, from `rounds` trials of each function; `idle` if no other program ran meanwhile."""
+    """The results for one robot, from `rounds` timed rounds over all functions. `idle` states whether no other program
+    ran during these rounds."""
 
     name: str
     note: str
@@ -68,7 +70,7 @@ class CaseResult:
     threads: tuple[ThreadTime, ...] = ()
 
     def of(self, function: str, layout: str = "state") -> Iterator[Measurement]:
-        """Return the measurements of one function, in the order of the libraries."""
+        """Return the measurements of one function in one memory layout of states, in the order of the libraries."""
         return (m for m in self.measurements if m.function == function and m.layout == layout)
 
     def best(self, rival: str, function: str, layout: str = "state") -> Measurement | None:
@@ -79,7 +81,11 @@ class CaseResult:
     def ratio(
         self, function: str, layout: str = "state", *, over: str, rival: str = "psdmc factored"
     ) -> float | None:
-        """Return how many times faster `rival` is than the fastest algorithm of `over`, for one state per call."""
+        """Return how many times faster the library `rival` is than the fastest algorithm of the library `over` for one
+        state per call. Return None if one of them was not measured.
+
+        layout  memory layout of the states of `rival`
+        """
         ours, theirs = self.best(rival, function, layout), self.best(over, function)
         return theirs.ns / ours.ns if ours and theirs else None
 

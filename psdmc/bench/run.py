@@ -33,10 +33,10 @@ SCALED_ROUNDS = 3
 class Settings:
     """The settings of a benchmark run.
 
-    rounds     trials of each function that count
-    states     number of random states per trial
-    seed       of the random states
-    rivals     names of the libraries to run, from EVERYONE; None: all
+    rounds     number of rounds of timing; each function is timed once in a round
+    states     number of random states per round
+    seed       seed of the random states
+    rivals     names of the libraries to run; None: all
     functions  names of the functions to measure; None: all
     count      whether to count instructions with callgrind
     threads    whether to time batch calls on one and two threads
@@ -62,8 +62,8 @@ def run(
     progress: Progress = silent,
     scaling: Sequence[Case] = (),
 ) -> BenchResult:
-    """Run the benchmark for all robots. List libraries that cannot be built with the reason; do not time wrong
-    functions.
+    """Run the benchmark for all robots, and return its results. Libraries that cannot be built are listed with the
+    reason. Functions with wrong results are listed and not timed.
 
     scaling  one robot with more and more joints; only some libraries and functions are measured for it
     """
@@ -125,7 +125,8 @@ def _measurement(c: Contestant, error: float, times: Times) -> Measurement:
 def checked(
     case: Case, contestants: Sequence[Contestant], seed: int
 ) -> tuple[list[Contestant], list[float], tuple[Unavailable, ...]]:
-    """Return the functions with right outputs, their errors, and the other functions with what is wrong."""
+    """Return three lists: the functions whose outputs agree with reference values, their relative errors, and the other
+    functions with a text on what is wrong."""
     drawn: dict[int, States] = {}
     right: list[Contestant] = []
     errors: list[float] = []
@@ -145,7 +146,7 @@ def checked(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembled:
-    """The compared functions for one robot, and the libraries that could not be built."""
+    """For one robot, the compiled functions of all libraries, and the libraries that could not be built."""
 
     case: Case
     contestants: tuple[Contestant, ...]
@@ -159,10 +160,11 @@ def assemble(
     count: bool,
     progress: Callable[[str], None],
 ) -> tuple[Assembled, ...]:
-    """Compile the libraries for every robot, and return their functions robot by robot.
+    """Compile the libraries for every robot, and return the compiled functions robot by robot.
 
-    functions  names to keep; None: all
-    count      whether to count instructions too, for which everything is compiled once more
+    entrants   the libraries
+    functions  names of the functions to keep; None: all
+    count      whether to count instructions; all libraries are then compiled a second time with other flags
     """
     assembled: list[Assembled] = []
     # What all cases share is built for the first, once, not by several processes at a time.
@@ -177,7 +179,11 @@ def assemble(
 
 
 def enter(job: tuple[Entrant, Case, bool]) -> list[Contestant | Unavailable]:
-    """Return one library's functions for one robot, with instruction counts if they are wanted and possible."""
+    """Return one library's compiled functions for one robot. If the job asks for it and the library permits it, the
+    functions have instruction counts.
+
+    job  the library, the robot, and whether instructions are counted
+    """
     entrant, case, count = job
     entries = list(entrant.contestants(case))
     if not count or not entrant.counted:

@@ -40,14 +40,15 @@ def _further(function: str) -> tuple[Quantity, ...]:
 
 
 def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
-    """Return the lengths of the axes in a function's signature (n, nq, nv, l ...) for a robot with l base parameters."""
+    """Return the lengths of array axes for a robot with l base parameters. Examples are n (joints), nq (entries of q)
+    and nv (entries of qd)."""
     return Sizes(
         len(robot), robot.nq, robot.nv, l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
     )
 
 
 def output_sizes(function: str, sizes: Sizes) -> tuple[int, ...]:
-    """Number of values per state of each output of a function."""
+    """Return the number of values per state of each output array of a function."""
     return tuple(sizes.size(output) for output in RECIPES[function].signature.outputs)
 
 
@@ -111,9 +112,11 @@ class States:
         return RobotOnArrays(self.chain, self.chain.parameters.reshape(-1), np.zeros((0, 0)))
 
     def expected(self, function: str) -> Array:
-        """Compute the (count, outputs) expected outputs of a function with psdmc's Newton-Euler recursion in NumPy.
+        """Return the expected outputs of a function, (number of states, output values per state), from psdmc's
+        Newton-Euler recursion in NumPy.
 
-        For a regressor return the torques instead: each library's regressor, times its parameters, must equal them.
+        For a regressor, return the torques instead. The regressor of each library, times the parameters of that
+        library, must equal the torques.
         """
         if RECIPES[function].times_theta:
             return self.tau
@@ -123,8 +126,8 @@ class States:
         return np.hstack([values.reshape(self.count, -1) for values in blocks])
 
     def inputs(self, function: str, lanes: int = 1, convention: Convention = "psdmc") -> tuple[Array, ...]:
-        """Return a function's inputs as flat arrays: q, qd, the third input (qdd or tau) and further inputs; if lanes >
-        1, in blocks [variable][lane]."""
+        """Return the inputs of a function as flat arrays: q, qd, the third input (qdd or tau), then further inputs. If
+        `lanes` is more than 1, states are stored in blocks [entry of the input][state] of `lanes` states."""
         x = next((q.name for q in RECIPES[function].signature.inputs[2:]), "qdd")
         given = self.mujocos if convention == "MuJoCo" else {n: getattr(self, n) for n in ("q", "qd", x)}
         first = [self._laid_out(name, given[name], lanes, convention) for name in ("q", "qd", x)]
@@ -135,7 +138,8 @@ class States:
 
     @cached_property
     def mujocos(self) -> dict[str, Array]:
-        """q, qd and qdd in MuJoCo's convention, converted beforehand, so that the conversion is not timed."""
+        """Return q, qd and qdd of all states, converted to MuJoCo's convention for a floating base. The conversion is
+        made before the timing starts."""
         states = (self.q, self.qd, self.qdd)
         converted = to_mujoco(*states) if self.has_free_root else states
         return dict(zip(("q", "qd", "qdd"), converted, strict=True))
@@ -149,13 +153,13 @@ class States:
         return self.chain.has_free_root
 
     def more(self, function: str) -> int:
-        """Number of values per state of the function's fourth input, 0 if it has none."""
+        """Return the number of values per state of the function's inputs after the third one; 0 if there are none."""
         return sum(self.sizes.size(quantity) for quantity in _further(function))
 
     def move(self) -> None:
-        """Move all inputs to another place in memory, as is done between trials. The place decides which cache lines
-        collide, which changes the time of a batch call by up to a fifth. Moving shows this effect in the spread of
-        the times."""
+        """Move all input arrays to other places in memory between rounds of timing. The places decide which cache lines
+        collide, which changes the time of a batch call by up to a fifth. The spread of the times over several rounds
+        then shows this effect."""
         for key, array in self._layouts.items():
             self._layouts[key] = moved(array)
 

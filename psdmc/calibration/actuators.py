@@ -19,8 +19,12 @@ from psdmc.model.calibrated import Calibrated, by_joint
 
 @dataclass(frozen=True, slots=True)
 class ActuatorView(StateLawView):
-    """The data for the templates of the C code of friction and motors. Every joint has friction; torque constants (N
-    m/A) may be missing for all joints."""
+    """The data for the templates of the C code of friction and motors.
+
+    joint_names       names of the joints
+    friction          values of the LuGre friction law, one vector for each joint
+    torque_constants  N m/A, one for each joint; empty if they are unknown
+    """
 
     robot: str = "robot"
     joint_names: tuple[str, ...] = ()
@@ -77,7 +81,8 @@ def actuator_files(view: ActuatorView) -> dict[str, str]:
 def calibrated_actuators(
     robot: str, joint_names: Sequence[str], found: Calibrated, real: str = "double"
 ) -> ActuatorView:
-    """Return the template data from the results of a calibration. Raises InputError if a joint has no LuGre friction."""
+    """Return the data for the C code of friction and motors, from the results of a calibration. Raises InputError if a
+    joint has no LuGre friction (a friction law with bristle deflection as its state)."""
     values = by_joint(found.friction)
     missing = [joint for joint in joint_names if any((joint, name) not in values for name in PARAMETERS)]
     if missing:

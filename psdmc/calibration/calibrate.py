@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign
+from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.fitted_logs import LogFit
 from psdmc.calibration.identify.essential import EssentialOptions
@@ -40,13 +40,13 @@ class CalibrateOptions:
 
     physical     True: the result must be physically possible, which means real bodies, and no negative drive inertia or
                  friction; False: the result is the unconstrained fit
-    campaign     options of the four steps
-    linear       options of the linear fit
-    consistency  options of the physically consistent estimate
-    verdict      limits of the verdict
-    choice       options of the linear fit that take precedence over a log description; for plain logs only
-    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then act as a
-                 prior; None: no prior. For plain logs
+    campaign     options of a calibration in four steps (motors, gravity, friction, inertia)
+    linear       options of the linear fit of plain logs
+    consistency  options of the search for a physically possible result
+    verdict      limits from which the verdict (usable or not) follows
+    choice       options of the linear fit that the user typed; they replace those of a log description. For plain logs
+    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then act
+                      as a prior; None: no prior. For plain logs
     essential    how parameters that the data do not need are dropped; None: all are kept. For plain logs
     """
 
@@ -73,13 +73,15 @@ def calibrate(
     load: KnownLoad | None = None,
     progress: Progress = lambda step: None,
 ) -> Calibration:
-    """Calibrate a model from a campaign (its folder or campaign.toml), a log description (log.toml) or plain logs.
+    """Calibrate a model from measured logs, and return the calibrated model with the identified values. The logs are a
+    campaign (its folder or campaign.toml), a log description (log.toml) or plain log files.
 
-    regressor         a compiled model, which is fast; None: psdmc computes the regressor in NumPy
+    regressor         compiled regressor of the model, which is fast; None: psdmc computes the regressor in NumPy
     torque_constants  N m/A by joint name, for plain logs of currents, and for joints that no load affects
-    validation        plain logs that are used for validation only
-    naming            topic and joint names of plain logs
-    loaded, load      further logs of currents, and the known load that was on the robot; they determine torque constants
+    validation        plain logs that psdmc uses only to test the fit
+    naming            topic, and joint names in plain logs
+    loaded, load      further logs of currents with a known load on the robot, and this load; they determine torque
+                      constants
 
     Raises InputError if a file is missing or a log cannot be used.
     """
@@ -97,6 +99,7 @@ def calibrate(
     campaign = campaign_of(paths)
     plain = None if campaign is None else _exciting_logs(campaign, model.joint_names)
     if plain is not None:
+        held += validation_logs(paths[0])
         paths, campaign = list(plain), None
     if campaign is not None:
         _require_plain(campaign, options, held, naming, with_load)
@@ -157,10 +160,10 @@ def calibrate_campaign(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """Calibrate a model by the four steps from the logs of a campaign.
+    """Calibrate a model from the logs of a campaign, in four steps: motors, gravity, friction, inertia.
 
-    If the result must be physical, it is the physically consistent vector nearest to that of the four steps. The
-    distance is measured by the uncertainties and the prior.
+    If the result must be physically possible, it is the vector of base parameters that is nearest to the result of the
+    four steps. The distance is measured in standard deviations of the fit and the prior.
     """
     progress("checking logs")
     logs = checked_runs(model.mechanism, runs, options.campaign)
@@ -213,9 +216,9 @@ def calibrate_logs(
     progress: Progress,
     loaded: LoadedLogs | None = None,
 ) -> Calibration:
-    """Calibrate a model by one linear fit of theta_b, friction and offsets.
+    """Calibrate a model from plain logs by one linear fit of base parameters, friction and torque offsets.
 
-    loaded  logs with a known load; torque constants are determined from them first
+    loaded  further logs with a known load; torque constants are first determined from these and the other logs
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
     if loaded is None:

@@ -1,4 +1,5 @@
-"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs."""
+"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs. A run is one motion of the robot
+that is recorded."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_non
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 
-Step = Literal["motor", "gravity", "friction", "inertial"]
-STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial")
+Step = Literal["motor", "gravity", "friction", "inertial", "validation"]
+STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial", "validation")
 FILE = "campaign.toml"
 WHAT = "a campaign (campaign.toml), as `psdmc excite` writes it"
 HINT = "`psdmc excite` writes campaigns; docs/calibration.md describes them"
@@ -36,7 +37,8 @@ _LOAD_KEYS = ("mass", "com")
 
 @dataclass(frozen=True, slots=True)
 class ListedRun:
-    """One entry [[run]] of a campaign.toml. Its paths are relative to the working directory."""
+    """One entry [[run]] of a campaign.toml: a recorded motion. The paths of the trajectory and the log are relative to
+    the working directory."""
 
     step: Step
     name: str
@@ -52,14 +54,16 @@ def is_campaign(path: Path) -> bool:
 
 
 def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """Return the runs of a campaign.toml (or its folder). Raises InputError with the run and the missing entry."""
+    """Return the runs (recorded motions) that a campaign.toml lists; the path may also name its folder. Raises
+    InputError with the run and the missing entry."""
     path = Path(path)
     path = path / FILE if is_folder(path) else path
     return runs_of(read_toml(path, WHAT), path)
 
 
 def runs_of(content: dict[str, Any], path: Path) -> tuple[ListedRun, ...]:
-    """Return the runs from the content of a campaign.toml; `path` is the path of that file."""
+    """Return the runs (recordings of one motion each) that the content of a campaign.toml lists. `path` is the path of
+    this file. Raises InputError with all faults."""
     faults: list[str] = []
     tables = TomlTable(content, "campaign", ("run",), faults).items("run")
     if not tables and not faults:
@@ -94,23 +98,30 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
 
 def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
     """Return the logs of a campaign that has only exciting motions without load, for one linear fit. Return None for
-    any other campaign.
+    any other campaign. Validation runs do not count.
 
     Raises InputError if a run names a joint that the model does not have.
     """
-    runs = listed_runs(path)
+    runs = [run for run in listed_runs(path) if run.step != "validation"]
     if any(run.step != "inertial" or run.load is not None for run in runs):
         return None
     _require_joints(runs, joint_names, path)
     return tuple(run.log for run in runs)
 
 
+def validation_logs(path: str | Path) -> tuple[Path, ...]:
+    """Return the logs of a campaign's validation runs, with which no step fits a value."""
+    return tuple(run.log for run in listed_runs(path) if run.step == "validation")
+
+
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
-    """Return all logs of a campaign, by the step of the calibration that uses them.
+    """Return all logs of a campaign except those of validation runs, by the step of the calibration that uses them:
+    motor, gravity, friction, inertial.
 
-    joint_names  joints of the robot to calibrate
+    joint_names  joints of the robot to calibrate; None: joints are not checked
 
-    Raises InputError if a log is missing, if a motor run has no counterpart, or if a run names an unknown joint.
+    Raises InputError if a log is missing or a run names an unknown joint. Also raises InputError if a motor run with
+    the load has no run without the load, or the reverse.
     """
     runs = listed_runs(path)
     if joint_names is not None:

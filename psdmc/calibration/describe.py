@@ -19,8 +19,8 @@ MODEL_ARRAYS = {"manifest", "B"}
 def describe_command(
     given: Sequence[str | Path], output: str | Path, topic: str = ""
 ) -> tuple[Path | None, tuple[str, ...]]:
-    """Write the draft of a log description. Return the model among the paths, and the quantities for which no column
-    was found.
+    """Write the draft of a log description to `output`. Returns the model file, or None if none was given, and the
+    joint quantities for which no column was found.
 
     given   paths of logs; the first one may be a model file, whose joints are then described
 

@@ -1,5 +1,5 @@
-"""Makes the results (records) of a linear fit: unconstrained, physically consistent, and without parameters that the
-data do not need."""
+"""Makes the final result of a linear fit of plain logs. It is unconstrained or physically possible, and has all
+parameters or only those that the data need."""
 
 from __future__ import annotations
 
@@ -27,10 +27,12 @@ MOST_NAMED = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogFit:
-    """Data that all results (records) of one linear fit share.
+    """Data that all results of one linear fit need.
 
-    physical     whether the user wants a physically consistent record
-    consistency  options of the physically consistent estimate
+    logs         logs that were fitted
+    physical     whether the result must be physically possible
+    consistency  options of the search for a physically possible result
+    known        what the user knows of the links before the fit, such as bounds of masses
     """
 
     model: DynamicsModel
@@ -42,8 +44,8 @@ class LogFit:
     progress: Progress
 
     def record(self, found: LinearResult) -> Calibration:
-        """Return the final record of the fit: with the prior, without parameters that the data do not need, and
-        physically consistent, as the options say."""
+        """Return the final result of a linear fit. As the options say, it uses what the user knows of the links, is
+        physically possible, and drops parameters that the data do not need."""
         if len(self.known.bounds) and not self.physical:
             raise InputError(
                 "[[bodies]] bounds masses or centres of mass, and the unconstrained fit knows none",
@@ -111,8 +113,13 @@ class LogFit:
 def with_price(
     fewer: Calibration, whole: Calibration, lesser: Essential, names: Sequence[str]
 ) -> Calibration:
-    """Return the record with essential parameters only, with a note on what was dropped and how much accuracy this
-    costs. Both accuracies are computed from the contents of model files."""
+    """Return the result `fewer`, which has essential parameters only, with a note for the user. The note says which
+    parameters were dropped, and how the accuracy on held-out data changed compared with the result `whole`. Both
+    accuracies are computed from the contents of model files.
+
+    lesser  the estimate in which parameters were dropped
+    names   names of all parameters
+    """
     gone = [name for name, is_dropped in zip(names, lesser.dropped.tolist(), strict=True) if is_dropped]
     before, after = whole.steps[-1].joints, fewer.steps[-1].joints
     cost = {name: before[name].held_out.r2 - after[name].held_out.r2 for name in after}

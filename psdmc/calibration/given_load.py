@@ -17,8 +17,9 @@ HINT = "write MASS,X,Y,Z: kg, and m to the centre of mass in the tip's frame; or
 
 
 def given_load(source: str | Path | Sequence[float]) -> KnownLoad:
-    """Return the known load from text 'MASS,X,Y,Z', from four numbers (kg, m in the tip frame: a point mass), or from
-    a file that `psdmc payload` wrote. Raises InputError if it is wrong."""
+    """Return the known load from text 'MASS,X,Y,Z', from four numbers, or from a file that `psdmc payload` wrote. The
+    numbers are the mass (kg) and the centre of mass (m, in the tip frame) of a point mass. Raises InputError if the
+    load is wrong."""
     if isinstance(source, Path) or (isinstance(source, str) and source.lower().endswith(".toml")):
         found = read_load(source)
         return KnownLoad(found.mass, found.com, found.inertia, found.frame)

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import stats
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign
+from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
@@ -212,7 +212,7 @@ def opened_logs(
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]
     campaign = campaign_of(paths)
     if campaign is not None:
-        plain_ones = plain_logs(campaign, names)
+        plain_ones = validation_logs(campaign) or plain_logs(campaign, names)
         if plain_ones is None:
             own = [run.log for run in read_campaign(campaign, names).inertial if run.tool is None]
             if not own:

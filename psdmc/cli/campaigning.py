@@ -17,7 +17,7 @@ from psdmc.calibration.motions.excite_options import (
     ExciteOptions,
     chosen_objective,
 )
-from psdmc.cli.lists import assignments
+from psdmc.cli.lists import assignments, names
 from psdmc.cli.next_step import quoted, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
@@ -31,6 +31,9 @@ def excite(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder to write")],
     one_log: Annotated[
         bool, typer.Option("--one-log", help="plan one motion and one log instead of four steps")
+    ] = False,
+    validation: Annotated[
+        bool, typer.Option("--validation", help="also plan a second motion, to test the calibration with")
     ] = False,
     load: Annotated[
         str | None,
@@ -89,6 +92,14 @@ def excite(
     collisions: Annotated[
         bool, typer.Option("--collisions/--no-collisions", help="check self-collision, or not")
     ] = True,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="NAME,...",
+            help="also write each trajectory for a controller: ros2, urscript, rsi (KUKA), franka",
+        ),
+    ] = None,
     seconds: Annotated[
         float,
         typer.Option(min=1.0, help="most CPU time of the search, s"),
@@ -142,9 +153,11 @@ def excite(
         load=None if carried is None else Load(*carried),
         repeats=repeats,
         one_log=one_log,
+        validation=validation,
         limits=limits,
         shapes=tuple(meshes or ()) if collisions else None,
         floor=floor,
+        formats=names(formats),
     )
     with steps() as progress:
         plan = excite_command(model, output, options, progress, force)

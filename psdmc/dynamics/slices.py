@@ -1,4 +1,4 @@
-"""Division of q, and of the rates, into the values of each joint."""
+"""Division of the vectors q and qd into the values of each joint."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def positions(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
 
 
 def rates(frames: Sequence[Frame], qd: Sequence[Scalar]) -> list[Scalar]:
-    """Return one entry per joint: its rate, or a tuple if the joint has several rates."""
+    """Return one entry per joint: the joint's rate, or the tuple of rates if the joint has several."""
     return _dealt([frame.joint.nv for frame in leading(frames)], qd)
 
 
 def first_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
-    """Return the index of each joint's first rate, and at the end the total number of rates."""
+    """Return, for each joint, the index of its first rate in qd; after the last joint, the number of all rates."""
     found = [0]
     for frame in leading(frames):
         found.append(found[-1] + frame.joint.nv)
@@ -36,7 +36,7 @@ def neutral(frames: Sequence[Frame]) -> list[Scalar]:
 
 
 def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
-    """(nq, ...) the nearest coordinates that the joints can have; for example, quaternions get length one."""
+    """Return the nearest positions that the joints can have, (nq, ...); for example, quaternions get length one."""
     own = leading(frames)
     ends = np.cumsum([frame.joint.nq for frame in own])[:-1]
     return np.concatenate([f.joint.normalized(part) for f, part in zip(own, np.split(q, ends), strict=True)])

@@ -1,14 +1,16 @@
-"""Derivatives of `integrate` along tangents: how the end of a step at constant rates depends on its start and on the
-rates.
+"""Derivatives of the function `integrate` along tangents. They say how the end of a step at constant rates depends on
+the start and on the rates.
 
-A joint moves from the placement T to T exp(x), where x is its constant rates times the duration. A small displacement e
-along the joint's own axes, of the start or of x, displaces the end by
+A joint moves from the placement T to T exp(x). The twist x is the joint's constant rates times the duration. A small
+displacement e along the joint's axes displaces the end, along the axes at the end, by
 
-    Ad(exp(-x)) e = (1 - ad(x) J) e   or   J e,   J = 1 - ad(x) / 2! + ad(x)^2 / 3! - ...,
+    Ad(exp(-x)) e = (1 - ad(x) J) e   if the start is displaced by e,
+    J e                               if x is changed by e,   J = 1 - ad(x) / 2! + ad(x)^2 / 3! - ...
 
-along the axes at the end. The motions of every joint type are a subgroup of the motions of a free body. One formula is
-therefore enough for all types, written for a linear part v and an angular part w of x. Source: Barfoot, State
-Estimation for Robotics, 2nd edition, section 8.1 (left Jacobian; here the right one, of -x).
+Ad(T) is the 6 x 6 matrix that transforms twists by a placement T, and ad(x) y is the Lie bracket of two twists. One
+formula serves all joint types, because the motions of each joint type are a subgroup of the motions of a free body. It
+is written for a linear part v and an angular part w of x. Source: Barfoot, State Estimation for Robotics, 2nd edition,
+section 8.1 (left Jacobian; here the right one, of -x).
 """
 
 from __future__ import annotations
@@ -33,8 +35,12 @@ TERMS = 12
 
 
 class StepSlopes(NamedTuple):
-    """Derivatives, nv x nv each, of a joint's end position along its tangent: by the start, and by the way (the rates
-    times the duration)."""
+    """Derivatives of a joint's position at the end of a step, as two nv x nv matrices. Rows and columns belong to small
+    displacements along the joint's nv rates.
+
+    by_start  by the position at the start of the step
+    by_way    by the joint's rates times the duration of the step
+    """
 
     by_start: Rows
     by_way: Rows
@@ -43,8 +49,11 @@ class StepSlopes(NamedTuple):
 def step_slopes(
     frames: Sequence[Frame], rates: Sequence[Scalar], seconds: Scalar = 1.0
 ) -> list[StepSlopes | None]:
-    """Return the derivatives of a step for each joint, for nv rates during `seconds`. None for a joint of one rate,
-    whose derivatives are both one."""
+    """Return, for each joint, the derivatives of the position after a step at the given nv constant rates for
+    `seconds`.
+
+    The entry is None for a joint of one rate, whose derivatives are both one.
+    """
     found: list[StepSlopes | None] = []
     used = 0
     for frame in leading(frames):

@@ -1,15 +1,17 @@
-"""Rows in the links' standard parameters, such that every joint torque at every state is a combination of them. They
-are computed joint by joint in extended precision.
+"""Combinations of the links' standard parameters on which the joint torques depend: matrix rows that span the torques
+at all states. They are computed joint by joint in extended precision.
 
-A combination of link k's parameters has no effect on joint k's torque if its Lagrangian does not depend on q_k and its
-rate. All torques then stay the same if link k is fixed to its parent, that is, if these parameters are moved to the
-parent. Let C_k be the rows that joint k's torque has in the parameters of its own link. Let T_c move the parameters of
-a link c to its parent, at the position where joint c has not moved. All torques depend on the parameters only through
+Consider a combination of link k's parameters whose Lagrangian does not depend on q_k and on its rate. It has no effect
+on joint k's torque. If these parameters are moved to the parent link, as if link k were fixed to the parent, no torque
+changes.
+
+Let C_k be the rows that joint k's torque has in the parameters of link k. Let T_c move the parameters of a link c to
+the parent link, at the position where joint c has not moved. All torques depend on the parameters only through
 
     C_k z_k,    z_k = x_k + sum of T_c z_c over the child links c of link k
 
-Each C_k has 11 columns and few samples, whatever the size of the robot. Every decision about rank is made on these
-rows, joint by joint, relative to that joint's own torque.
+Each C_k has 11 columns and few samples, for robots of any size. Every decision about rank is made on these rows, joint
+by joint, relative to that joint's own torque.
 """
 
 from __future__ import annotations
@@ -46,12 +48,13 @@ evaluating the torque in double leaves as much as this."""
 
 
 def torque_rows(frames: Sequence[Frame], link_frames: Sequence[Placed], up: Vector) -> Long:
-    """Return (r, 11 n) rows that span what any torque depends on, joint by joint. Each joint's rows have length one at
-    most.
+    """Return the (r, 11 n) rows in the standard parameters that span all joint torques, joint by joint. Each joint's
+    rows have length one at most.
 
     r is the number of base parameters of a robot whose standard parameters are not restricted by assumptions.
 
-    link_frames  the frames that the parameters are about, in the joint frames; `up`: the base's acceleration
+    link_frames  placements of the link frames, about which the parameters are given, in the joint frames
+    up           the base's acceleration against gravity
     """
     n = len(frames)
     own = [echelon_rows(samples) for samples in _own_torques(frames, up)]
@@ -107,8 +110,8 @@ def _own_torque(frame: Frame, motion: LinkMotion, acceleration: Scalar) -> Long:
 
 
 def echelon_rows(samples: Long) -> Long:
-    """Return (rank, k) rows with the same row space as the samples (m, k), without directions below EFFECT. The longest
-    column has length one."""
+    """Return (rank, k) rows that span the same space as the sampled rows (m, k). They are scaled so that the longest
+    column has length one. Directions shorter than EFFECT are left out."""
     longest = lengths(samples).max(initial=0.0)
     if not longest:
         return samples[:0]

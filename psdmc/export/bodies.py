@@ -1,4 +1,5 @@
-"""The robot from which both URDF and MJCF files are written: links and joints, with frames, inertias and friction."""
+"""The robot in the form from which URDF and MJCF files are written: links and joints, with frames, inertias and
+friction."""
 
 from __future__ import annotations
 
@@ -27,17 +28,17 @@ ALONG = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """One moving link as it is written to a file. The origin of its frame lies on the axis of its joint, as URDF
-    requires.
+    """One moving link as it is written to a URDF or MJCF file. The origin of the link's frame lies on the joint's axis,
+    as URDF requires.
 
     name      name of the link
-    parent    index of the body to which its joint is attached, or BASE
-    place     the link's frame in its joint frame
-    origin    the link's frame in its parent's frame (or the base frame) at q = 0
-    axis      (3,) of the joint, along the link's own axes
+    parent    index of the body to which the joint is attached, or BASE
+    place     placement of the link's frame in the joint frame
+    origin    placement of the link's frame in the parent link's frame (or the base frame) at q = 0
+    axis      (3,) direction of the joint's axis, along the axes of the link's frame
     inertial  mass (kg), centre of mass (3,) and inertia about it (6,) (kg m^2, INERTIA_NAMES); None: no mass
-    drive     drive inertia, kg m^2 (kg)
-    follows   the coordinate of a mimic joint
+    drive     drive inertia, kg m^2; kg for a sliding joint
+    follows   if the joint is a mimic joint, the coordinate that it follows
     """
 
     joint: Joint
@@ -58,7 +59,7 @@ class Written:
 
     world    placement of the base in a link WORLD whose z axis points against gravity; None if the z axis of the base
              already does, or if the base floats
-    gravity  (3,) m/s^2 along the axes of the outermost link
+    gravity  (3,) m/s^2, along the axes of WORLD or, without WORLD, of the base
     frames   named frames that are fixed to a body: the index of the body, and the frame's placement in the body's link
     """
 
@@ -71,10 +72,12 @@ class Written:
 
 
 def written(model: DynamicsModel, links: PhysicalLinks, keep_frames: bool) -> Written:
-    """Return the robot with these link parameters. Raises InputError if a name cannot be written.
+    """Return the robot in the form in which it is written, with the given masses and inertias. Raises InputError if a
+    name cannot be written.
 
-    keep_frames  True: links keep their frames, which lie on the joint axes (for models from a URDF). False: a link whose
-                 frame is off its axis gets a new frame on the axis, and its old frame is written as a separate link
+    keep_frames  True: links keep their frames, which lie on the joint axes (for models from a URDF). False: a link
+                 whose frame is off its axis gets a new frame on the axis, and its old frame is written as a separate
+                 link
     """
     chain = model.mechanism
     found = joint_friction(model)

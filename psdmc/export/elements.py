@@ -1,4 +1,4 @@
-"""XML elements of a URDF that are used for models from a URDF and for models from other files."""
+"""Functions that make the XML elements of a URDF file, such as <inertial> and <limit>."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ over it."""
 
 
 def inertial_element(body: Body) -> Element | None:
-    """Return the element <inertial>, about the centre of mass along the link's axes; None if the link has no mass."""
+    """Return the element <inertial> of a link, with the inertia about the centre of mass, along the link's axes. Return
+    None if the link has no mass."""
     if body.inertial is None:
         return None
     mass, com, six = body.inertial
@@ -42,15 +43,15 @@ def origin_element(place: Placement) -> Element:
 
 
 def dynamics_element(friction: JointFriction) -> Element:
-    """Return the element <dynamics> with the friction of a joint."""
+    """Return the element <dynamics> with the given damping and constant friction of a joint."""
     return Element("dynamics", damping=exact([friction.damping]), friction=exact([friction.constant]))
 
 
 def limit_element(limits: Limits) -> Element:
-    """Return the element <limit> of a joint.
+    """Return the element <limit> with the given limits of a joint.
 
-    URDF requires effort and velocity. If the robot has no such limit, 1e30 is written: psdmc and Pinocchio would read
-    a zero as a limit of zero.
+    URDF requires effort and velocity. If the robot has no limit of effort or velocity, 1e30 is written: psdmc and
+    Pinocchio would read a zero as a limit of zero.
     """
     given = {"effort": limits.effort, "velocity": limits.speed, "acceleration": limits.acceleration}
     given |= {"lower": limits.lower, "upper": limits.upper}
@@ -81,8 +82,8 @@ def fixed_link(robot: Element, frame: NamedFrame, parent: str) -> None:
 
 
 def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> None:
-    """Add a fixed joint to the robot. Its name is the child's with `_fixed` appended, and more underscores if that is
-    taken."""
+    """Add a fixed joint to the robot. The joint's name is the child link's name with `_fixed` appended. Underscores are
+    added if another joint has this name."""
     joint = SubElement(robot, "joint", name=free_joint_name(robot, f"{child}_fixed"), type="fixed")
     joint.append(origin_element(place))
     SubElement(joint, "parent", link=parent)
@@ -98,8 +99,8 @@ def free_joint_name(robot: Element, name: str) -> str:
 
 
 def put_on_world(robot: Element, what: Written) -> None:
-    """Attach the base to a new link whose z axis points against gravity, unless the z axis of the base does so
-    already."""
+    """Attach the base to a new link whose z axis points against gravity. Add no link if the z axis of the base already
+    points against gravity."""
     if what.world is None:
         return
     name, used = WORLD, {link.get("name") for link in robot.findall("link")}

@@ -36,11 +36,11 @@ GRAVITY_ROUNDING = 1e-12
 class Exported:
     """The result of `export_urdf`: the files, and how well the torques of other programs agree with theta_b.
 
-    urdf, mjcf     the files; mjcf is None if no MJCF was written
-    links          the links' standard parameters and their divergence from those of the robot file
-    readings       comparison of the URDF as Pinocchio and MuJoCo read it
-    mjcf_reading   comparison of the MJCF as MuJoCo reads it
-    notes          what the files do not contain, and what was changed, one sentence each
+    urdf, mjcf    the files; mjcf is None if no MJCF was written
+    links         standard parameters of the written links, and their distance from those of the robot file
+    readings      comparison of the torques of Pinocchio and MuJoCo for the URDF with those of the model
+    mjcf_reading  comparison of the torques of MuJoCo for the MJCF with those of the model
+    notes         what the files do not contain, and what was changed, one sentence each
     """
 
     urdf: Path

@@ -1,4 +1,5 @@
-"""Friction of a calibrated model in the form that robot files can hold: a constant against the motion, and damping."""
+"""Friction of a calibrated model in the form that robot files can hold: a constant torque against the motion, and
+viscous damping."""
 
 from __future__ import annotations
 
@@ -19,8 +20,8 @@ ORDINARY_SPEED = 1.0
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
-    """Friction of one joint as two numbers: `constant` N m (N) against the motion, and `damping` N m s/rad (N s/m).
-    Neither is negative.
+    """Friction of one joint as two numbers, neither negative. `constant` is a torque against the motion, N m (N for a
+    sliding joint), and `damping` is N m s/rad (N s/m for a sliding joint).
 
     lost  in words, which parts of the calibrated friction the two numbers cannot express
     """
@@ -31,10 +32,9 @@ class JointFriction:
 
 
 def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
-    """Return the friction by joint name, for the joints that were calibrated. It is empty if the model is not
-    calibrated.
+    """Return the friction of each calibrated joint, by joint name; empty if the model is not calibrated.
 
-    Each friction law states the constant and the damping that are nearest to it, if any.
+    Each friction law gives the constant torque and the damping that are nearest to it, if it has any.
     """
     calibrated = model.calibrated
     if calibrated is None:
@@ -86,7 +86,8 @@ def _of(rows: Sequence[Row], joint: Joint) -> JointFriction:
 
 
 def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """Return one sentence for each kind of friction that the files cannot hold, with the names of the joints."""
+    """Return one sentence for each kind of friction that URDF and MJCF files cannot hold, with the names of the
+    joints."""
     by_kind: dict[str, list[str]] = {}
     for name, friction in found.items():
         for what in friction.lost:
@@ -95,7 +96,8 @@ def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def calibrated_friction_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """Return notes on which part of the calibrated friction is in the files, and which part is not."""
+    """Return sentences that say which part of the calibrated friction is in the written files, and which part is
+    not."""
     if not found:
         return ()
     return (

@@ -21,7 +21,7 @@ from psdmc.robot.mechanism import BASE
 
 
 def urdf_of(what: Written) -> Element:
-    """Return the element <robot> of a URDF, built from the robot's links, joints and named frames."""
+    """Return the element <robot> of a URDF, which contains all links, joints and named frames of the robot."""
     robot = Element("robot", name=what.name, version="1.0")
     SubElement(SubElement(robot, "mujoco"), "compiler", MUJOCO)
     SubElement(robot, "link", name=what.base)

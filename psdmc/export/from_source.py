@@ -1,5 +1,5 @@
-"""Writes a URDF from the model's own URDF with new inertias. Names, limits, shapes and all other content stay as they
-are."""
+"""Writes a URDF from the URDF of which the model was derived, with new inertias. Names, limits, shapes and all other
+content stay unchanged."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ STILL = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller
 
 
 def urdf_with(what: Written, provenance: Mapping[str, Any]) -> tuple[Element, tuple[str, ...]]:
-    """Return the element <robot> of the model's URDF below the model's base, with the new inertias, and notes on the
-    changes.
+    """Return the element <robot> of the URDF of which the model was derived, with the new inertias, and sentences about
+    the changes. Links above the model's base are left out.
 
     Joints that the model locks become fixed at their locked positions. If several links move together, the link that
     the joint moves gets their whole mass.

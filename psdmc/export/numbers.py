@@ -1,4 +1,4 @@
-"""Writes placements and numbers as text that gives the same floats when it is read."""
+"""Writes placements and numbers as text. A program that reads the text gets exactly equal floats."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from psdmc.robot.placement import Array
 
 
 def exact(values: Iterable[float]) -> str:
-    """Return numbers as text with as many digits as needed to read the same floats. Minus zero is written as zero."""
+    """Return numbers as text with as many digits as are needed to read equal floats. Minus zero is written as zero."""
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 

@@ -1,5 +1,5 @@
-"""Lets Pinocchio and MuJoCo read a written robot, and returns the largest difference between their torques and the
-model's."""
+"""Compares the torques that Pinocchio and MuJoCo compute from a written URDF or MJCF file with those of the model. The
+result is the largest difference."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ LIMIT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The comparison of one program's torques with those of the model's theta_b, at random states.
+    """The comparison of the torques that another program computes with the model's torques, at random states.
 
-    reader   name of the program
-    error    largest difference, as a share of the joint's largest torque; NaN if the torques were not compared
-    reason   why they were not compared, in words
+    reader  name of the program, such as Pinocchio
+    error   largest torque difference, divided by the joint's largest torque; NaN if torques were not compared
+    reason  why torques were not compared, in words
     """
 
     reader: str

@@ -1,1 +1,1 @@
-"""Functions of compiled robots for JAX and PyTorch, which can differentiate them."""
+"""The functions of compiled robots for JAX and PyTorch, which can differentiate these functions."""

@@ -1,5 +1,5 @@
-"""The functions `psdmc.jax` and `psdmc.torch`. JAX and PyTorch are optional and are imported when the function is
-called."""
+"""The functions `psdmc.jax` and `psdmc.torch`. JAX and PyTorch are optional; `psdmc.jax` imports JAX when it is called,
+and `psdmc.torch` imports PyTorch."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """The functions of a compiled robot as functions of JAX, which can compile, batch and differentiate them.
 
-psdmc registers two JAX primitives for all functions. The first calls a generated function. The second computes its
-derivative along tangents, by the rules of differentiation.py; its transpose is the rule's reverse mode. Both accept
-any leading axes, so `vmap` adds one.
+psdmc registers two JAX primitives (basic operations) for all functions. The first calls a generated function. The
+second computes its derivative along tangents, by the rules of differentiation.py. For reverse mode, JAX transposes the
+second primitive, and psdmc then applies the rule's reverse mode. Both primitives accept any leading axes, so `vmap`
+adds one.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def jax_robot(
     trig: Trig | None,
     target: str | Target,
 ) -> JaxRobot:
-    """Return the robot of `psdmc.jax`. Equal requests get the same object."""
+    """Return the robot of a model for JAX. Equal arguments give the same object; `psdmc.jax` explains them."""
     found = model_of(model)
     compiled = compile(found, lowering, real=real, trig=trig, target=target)
     if compiled.dtype == np.float64 and not jax.config.jax_enable_x64:
@@ -74,12 +75,13 @@ def jax_robot(
 class JaxRobot:
     """A robot whose methods, one for each generated function, are functions of JAX. `psdmc.jax` makes such robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy. If
-    the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several results
-    returns a named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy.
+    If the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several
+    results returns a named tuple.
 
-    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
-    its nq entries, and zero along the quaternion.
+    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
+    derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
+    zero.
     """
 
     def __init__(
@@ -99,7 +101,8 @@ class JaxRobot:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"
 
     def call(self, function: Signature, inputs: Sequence[Any], theta_b: Any = None) -> Any:
-        """Call a generated function by its entry in `psdmc.functions.SIGNATURES`, and return the result."""
+        """Call a generated function of the robot, and return the result. `function` is an entry of
+        `psdmc.functions.SIGNATURES`."""
         if not function.inputs:
             return jnp.asarray(getattr(self.compiled, function.name)())
         pairs = zip(function.inputs, inputs, strict=True)
@@ -168,19 +171,22 @@ for _function in SIGNATURES.values():
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """The parameter of JAX's primitives: a generated function of one robot, and whether theta_b is its last argument."""
+    """The generated function that JAX's primitives call.
+
+    theta  whether theta_b is the last argument
+    """
 
     robot: JaxRobot
     function: Signature
     theta: bool
 
     def with_tail(self, lead: tuple[int, ...], quantity: Quantity) -> tuple[int, ...]:
-        """Return the shape of an input or output that has these leading axes."""
+        """Return the shape of an input or output: the leading axes `lead`, then the axes of one state."""
         return lead + self._sizes.shape(quantity.axes)
 
     def given(self, inputs: Sequence[Array], theta_b: Array | None) -> list[Array]:
-        """Return all arguments of the call, broadcast to common leading axes. A theta_b of shape (l,) is not
-        broadcast."""
+        """Return all arguments of one call of the function, broadcast to common leading axes. A theta_b of shape (l,)
+        is not broadcast."""
         named = [*zip(self.function.inputs, inputs, strict=True)]
         named += [] if theta_b is None else [(THETA, theta_b)]
         leads = [x.shape[: x.ndim - len(quantity.axes)] for quantity, x in named]
@@ -197,7 +203,7 @@ class Kernel:
         ]
 
     def lead(self, first: Any) -> tuple[int, ...]:
-        """Return the leading axes of the states, from the first argument."""
+        """Return the leading axes of the states, from the shape of the function's first argument."""
         return tuple(first.shape[: first.ndim - len(self.function.inputs[0].axes)])
 
     @cached_property
@@ -207,9 +213,10 @@ class Kernel:
         return replace(sizes, nonzeros=len(self.robot.compiled.pattern(name)[0])) if packed else sizes
 
     def number(self, by_rows: bool) -> int:
-        """The number by which XLA calls the function. If the function is not compiled yet, psdmc compiles it.
+        """Return the number under which XLA finds the compiled function. If the function is not compiled yet, psdmc
+        compiles it.
 
-        by_rows  whether each state has a theta_b of its own
+        by_rows  whether each state has its own theta_b
         """
         compiled, function = self.robot.compiled, self.function
         name = function.name + (THETA_ROWS if by_rows else "_theta" if self.theta else "")

@@ -75,14 +75,16 @@ def torch_robot(
 
 
 class TorchRobot:
-    """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such robots.
+    """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such
+    robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64, or
-    all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite,
-    the results of this state are NaN. A method with several results returns a named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64,
+    or all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
+    definite, the results of this state are NaN. A method with several results returns a named tuple.
 
-    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
-    its nq entries, and zero along the quaternion. Second derivatives are not available.
+    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
+    derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
+    zero. Second derivatives are not available.
     """
 
     def __init__(self, model: DynamicsModel, options: tuple[Any, ...], key: str) -> None:
@@ -107,7 +109,8 @@ class TorchRobot:
         return f"TorchRobot {self.model.mechanism.name!r}: {self.model.n} joints"
 
     def compiled(self, dtype: Any = torch.float64) -> CompiledRobot[Any]:
-        """Return the CompiledRobot, for NumPy arrays, whose C code the methods call for tensors of this dtype."""
+        """Return the CompiledRobot (functions in C for NumPy arrays) that the methods call for tensors of the given
+        floating-point type."""
         if dtype not in self._compiled:
             lowering, trig, target = self._options
             self._compiled[dtype] = compiled(
@@ -123,14 +126,15 @@ class TorchRobot:
         return None if known is None else torch.tensor(known)
 
     def shape(self, quantity: Quantity) -> tuple[int, ...]:
-        """Return the shape of an input or output for one state."""
+        """Return the shape of a function's input or output for one state."""
         model, chain = self.model, self.model.mechanism
         rows = chain.rows_of_contacts
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=rows)
         return sizes.shape(quantity.axes)
 
     def operator(self, function: str) -> Any:
-        """Return PyTorch's operator for a generated function, whose arguments are tensors, and theta_b or None."""
+        """Return PyTorch's operator that calls a generated function. The operator's arguments are tensors, and theta_b
+        or None."""
         return self._operators[function]
 
     def _on_coordinates(self, function: Signature, tensors: Sequence[Tensor]) -> Tensor:
@@ -220,7 +224,7 @@ class _Operator:
     function: Signature
 
     def registered(self, name: str) -> Any:
-        """Register the operator with PyTorch under this name, and return it."""
+        """Register this generated function with PyTorch as an operator of the given name, and return the operator."""
         given = [f"Tensor {quantity.name}" for quantity in self.function.inputs]
         given += ["Tensor? theta_b=None"] if self.function.theta else []
         returned = ", ".join(["Tensor"] * len(self.function.outputs))
@@ -234,8 +238,8 @@ class _Operator:
         return operator
 
     def compute(self, *given: Tensor) -> Any:
-        """Call the C function with the memory of the tensors. A tensor is copied only if its states are not contiguous
-        rows."""
+        """Compute the results by a call of the C function on the memory of the tensors. A tensor is copied only if its
+        entries are not contiguous for each state."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         named = list(
@@ -252,17 +256,19 @@ class _Operator:
         return made[0] if len(made) == 1 else tuple(made)
 
     def without_values(self, *given: Tensor) -> Any:
-        """Return tensors with the shapes of the results but without values. torch.compile calls this function."""
+        """Return tensors with the shapes of the results but without values. torch.compile needs these shapes when it
+        traces a program."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         return made[0] if len(made) == 1 else tuple(made)
 
     def differentiable(self, operator: Any) -> Callable[..., Any]:
-        """Return the operator's kernel for autograd. It calls the operator without autograd, and saves what its rule
-        needs.
+        """Return the function that PyTorch calls for differentiable arguments. It calls the operator, and saves the
+        values that the differentiation rule needs.
 
-        PyTorch's custom_op has no forward mode, and torch.compile cannot trace an autograd.Function that has one. An
-        autograd.Function within the operator's own kernel has neither limit (decision 0156).
+        PyTorch's custom_op has no forward mode, and torch.compile cannot trace an autograd.Function with forward mode.
+        An autograd.Function within the operator's kernel (the function that PyTorch runs) has neither limit (decision
+        0156).
         """
 
         def forward(*given: Tensor) -> Any:
@@ -280,7 +286,8 @@ class _Operator:
         return kernel
 
     def over_batches(self, operator: Any) -> Callable[..., Any]:
-        """Return the operator's rule for vmap: the batch becomes the first of the leading axes, which broadcast."""
+        """Return the function by which torch.func.vmap calls the operator: the batch axis becomes the first leading
+        axis. Leading axes broadcast."""
         quantities = (*self.function.inputs, THETA_B)
 
         def rule(info: Any, dims: Sequence[int | None], *given: Tensor) -> Any:
@@ -369,9 +376,9 @@ class _Operator:
         return saved[:count], saved[count] if self.function.theta else None, saved[end:]
 
     def checked(self, given: Sequence[Tensor]) -> tuple[list[Tensor], Tensor, tuple[int, ...]]:
-        """Return the inputs, theta_b or None, and the leading axes to which they broadcast.
+        """Return the tensors of the inputs, theta_b or None, and the leading axes to which they broadcast.
 
-        Raises TypeError for another dtype, ArgumentError for another shape.
+        Raises TypeError if a tensor has another dtype, ArgumentError if a tensor has another shape.
         """
         count, name = len(self.function.inputs), self.function.name
         pairs = [

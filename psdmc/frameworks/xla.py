@@ -25,14 +25,16 @@ BITS = 63
 
 
 def number_of(key: str) -> int:
-    """Return the number by which XLA programs call a function. It is the same in each process."""
+    """Return the number under which XLA programs find the function with the name `key`. The number is equal in every
+    process."""
     return int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big") >> (64 - BITS)
 
 
 def add(
     number: int, address: int, can_fail: bool, is_single: bool, theta: int | None, sizes: tuple[int, ...]
 ) -> None:
-    """Register a batch function with XLA under a number. The library of the function must stay open.
+    """Register a batch function (one call for many states) with XLA under a number. The library of the function must
+    stay loaded as long as XLA can call it.
 
     theta  index of theta_b among the arrays, or None
     sizes  number of entries of each array per state, in the order inputs, theta_b, outputs; of theta_b all entries

@@ -1,4 +1,4 @@
-"""The names that a Python file with a friction law imports: classes of laws and values, and elementary functions."""
+"""The names that a Python file with a friction law imports: the classes Law, Value and At, and elementary functions."""
 
 from psdmc.friction.law import At as At
 from psdmc.friction.law import Law as Law

@@ -22,11 +22,13 @@ MOST_TERMS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Friction:
-    """Friction torque of n joints, as a sum of terms. Terms that act against the motion come first.
+    """Friction torque of n joints, as a sum of m terms such as Coulomb and viscous friction. Terms that act against the
+    motion come first.
 
-    terms       each a friction law with its number, such as viscous friction with an exponent
-    values      (n, m) one row for each joint; zero if a joint lacks a term
-    sign_speed  rad/s (m/s) over which friction changes sign, so that it is smooth
+    terms       each a friction law and, if the law has one, its exponent or velocity
+    values      (n, k) fitted values, such as coefficients: a row for each joint, columns in the order of the terms;
+                zero if a joint lacks a term
+    sign_speed  speed, rad/s (m/s), near which the sign of the motion changes smoothly
     beyond      what else the calibration found in addition to rigid bodies, in words without names
     """
 
@@ -37,22 +39,25 @@ class Friction:
 
     @property
     def by_position(self) -> bool:
-        """Whether the friction torque depends on the joints' positions."""
+        """Return whether the friction torque depends on the joints' positions."""
         return any("q" in term.reads for term in self.terms)
 
     def by_speed(self, qd: Array) -> Array:
-        """Return the torque (..., n) of the terms that depend on speeds qd (..., n) but not on positions."""
+        """Return the friction torque (..., n) at speeds qd (..., n), N m (N for a sliding joint), from the terms that
+        do not depend on positions."""
         here = [(term, own) for term, own in self._rows(list(self.values.T)) if "q" not in term.reads]
         return self._torque(here, np.asarray(qd), 0.0)
 
     def torque(self, qd: ArrayLike, q: ArrayLike = 0.0) -> Array:
-        """Return the friction torque (..., n), N m (N), at speeds and positions (..., n). It adds to the torque of the
-        rigid bodies."""
+        """Return the friction torque (..., n), N m (N for a sliding joint), at speeds and positions (..., n). The motor
+        torque is the sum of this torque and the torque of the rigid bodies."""
         return self._torque(self._rows(list(self.values.T)), np.asarray(qd, dtype=np.float64), np.asarray(q))
 
     def program(self) -> Program:
-        """Return a PROGRAM (list of operations) for one joint. It computes the friction tau[0] from the values p[...],
-        the speed v[0] and the position q[0]."""
+        """Return a PROGRAM (list of operations) for one joint, which computes the friction torque tau[0].
+
+        The inputs of the PROGRAM are the joint's friction values p[...], the speed v[0] and the position q[0].
+        """
         tracer = Tracer()
         p = tracer.symbols("p", self.values.shape[1])
         v = tracer.symbol(Slot("v", 0))
@@ -72,7 +77,8 @@ class Friction:
 
 
 def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return the terms in the order that psdmc uses: terms that act against the motion first, constant torques last."""
+    """Return friction terms in the order that psdmc uses: terms that act against the motion first, constant torques
+    last."""
     return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
 
 
@@ -86,8 +92,8 @@ def found_friction(
     """Return the Friction that has the given values, without terms that depend on the load.
 
     values      fitted values by the names of the joint and of the value
-    everyone_s  terms that each joint must have
-    laws        friction laws by name, to which the values may belong
+    everyone_s  terms that every joint must have
+    laws        friction laws by name, among which psdmc finds the law of each value
 
     Raises KeyError if a value is missing, ValueError if a value is not finite or belongs to no law.
     """
@@ -114,11 +120,11 @@ def found_friction(
 
 
 def rows_of(values: Mapping[str, float], law: str, laws: Mapping[str, Law]) -> list[Row]:
-    """Return the friction terms of one joint, each with its values. Values that belong to no law are left out.
+    """Return the friction terms of one joint, each with its list of values. Values that belong to no law are left out.
 
     values  values of the joint by name
-    law     the name of a law with a state (such as LuGre), if the values belong to one
-    laws    friction laws by name, to which the values may belong
+    law     name of the joint's friction law if it has an internal state (such as LuGre)
+    laws    friction laws by name, among which psdmc finds the law of each value
     """
     whole = WITH_STATE.get(law)
     if whole is not None and set(whole.parameters) <= set(values):

@@ -1,5 +1,5 @@
-"""PROGRAMs (lists of operations) for a friction law with an internal state, for one joint: torque, step and number of
-steps."""
+"""PROGRAMs (lists of operations) for the friction of one joint by a law with an internal state. They compute the
+torque, the next state, and the number of time steps."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from psdmc.program.trace import Tracer
 
 
 def state_programs(law: Law) -> dict[str, tuple[Program, tuple[str, ...]]]:
-    """Return the PROGRAMs 'step', 'pieces' and 'torque' by name, each with the names of its inputs other than p.
+    """Return the PROGRAMs (lists of operations) 'step', 'pieces' and 'torque' of a friction law, by name. Each comes
+    with the names of its inputs, apart from the law's fitted values p.
 
-    The values of the law are p. Each PROGRAM has one output, `out`.
+    'step' computes the next state, 'pieces' the number of additional steps, 'torque' the friction torque. Each PROGRAM
+    has one output, `out`.
     """
     state = law.state
     assert state is not None

@@ -1,4 +1,4 @@
-"""Finds friction terms by their names in files and options, such as 'viscous^0.5'."""
+"""Functions that find the friction term for a name in files and options, such as 'viscous^0.5'."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ EXAMPLE = ",".join(law.name for law in (_ALWAYS, _GROWING, OPTIONAL))
 
 
 def every_joint_s(exponents: Iterable[float], offset: bool) -> tuple[Term, ...]:
-    """Return the terms that every joint has in a linear fit with these exponents of viscous friction.
+    """Return the friction terms that every joint has in a linear fit: Coulomb friction, and viscous friction with each
+    of the given exponents.
 
     offset  whether each joint has a constant torque, too
 
@@ -69,8 +70,8 @@ def options_of(words: Sequence[str]) -> tuple[tuple[float, ...], bool] | str:
 
 
 def named(name: str, laws: Mapping[str, Law]) -> tuple[Term, int] | None:
-    """Return the friction term that has a value of this name, and the position of the value in the term. Return None
-    if no law that is linear in its values has such a value."""
+    """Return the friction term to which the value of this name belongs, and the position of the value among the term's
+    values. Return None if the value belongs to no law that is linear in its values."""
     for law in laws.values():
         if law.state is not None:
             continue
@@ -88,9 +89,11 @@ def named(name: str, laws: Mapping[str, Law]) -> tuple[Term, int] | None:
 def with_present_names(
     rows: Sequence[dict[str, Any]], exponents: Sequence[float]
 ) -> Sequence[dict[str, Any]]:
-    """Return the friction rows of an older model file with the present names of terms, which contain exponents.
+    """Return the friction values of an older model file with the names that psdmc uses now, which contain exponents.
 
     In files of psdmc 0.1 the first viscous term has a name without an exponent, whatever its exponent is.
+
+    rows  one mapping per friction value, with its name and unit
     """
     first = Term(_GROWING, float(exponents[0])) if exponents else None
     if first is None or first.names[0] in [row.get("name") for row in rows]:

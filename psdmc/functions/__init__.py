@@ -1,4 +1,5 @@
-"""The functions that psdmc can generate. Each file of this folder describes one function by its RECIPE."""
+"""The functions that psdmc can generate. Each file of this folder describes one function by an object RECIPE: inputs,
+outputs and the computation."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ DEFAULT_WHERE_WIDE = tuple(
 
 
 def recipe_of(name: str) -> Recipe:
-    """Return the recipe of a function. The name may be that of a variant, such as NAME_theta_rows."""
+    """Return the recipe (specification) of a function that psdmc can generate. The name may be that of a variant, such
+    as NAME_theta_rows, which takes one theta_b per state."""
     return RECIPES[name.removesuffix(THETA_ROWS)]
 
 

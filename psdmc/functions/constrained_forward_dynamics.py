@@ -83,7 +83,12 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Return the accelerations from which the torques were computed, which are exact, plus the change by the contacts."""
+    """Return accelerations, contact forces and pivots for tests, from the given state and the accelerations without
+    contacts.
+
+    These accelerations are given, and the torques were computed from them, so they are exact. The change that the
+    contacts cause is added.
+    """
     free = given["qdd"]
 
     def wanted(jacobian: Array) -> Array:

@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Compute column j as the Slotine-Li torques of a unit reference rate of joint j, without gravity.
+    """Compute column j of the Coriolis matrix: the Slotine-Li torques of a unit reference rate of joint j, without
+    gravity.
 
-    Column j needs only the bodies that joint j moves and those that carry them. The first column is computed with all
-    bodies: this fixes the order of the operations that later columns share.
+    Column j needs only the bodies that joint j moves, and the bodies between joint j and the base. The first column is
+    computed with all bodies: this fixes the order of the operations that later columns share.
     """
     nv = len(g.still)
     columns = []
@@ -37,8 +38,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Compute column j as the torques of the velocities qd with joint j's unit rate as qd_r. All columns are computed
-    at once, like further states."""
+    """Compute column j of the Coriolis matrix as the Slotine-Li torques at the rates qd, with a unit reference rate of
+    joint j. All columns are computed in one call, as additional states."""
     nv, count = robot.nv, len(given["q"])
     q, qd = (np.tile(given[name], (nv, 1)) for name in ("q", "qd"))
     units = np.repeat(np.eye(nv), count, axis=0)

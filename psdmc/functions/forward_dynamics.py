@@ -1,4 +1,4 @@
-"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by articulated bodies."""
+"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by the articulated-body algorithm."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Return the accelerations from which the given torques were computed. They are exact; solving for accelerations
-    would lose digits if the mass matrix is badly conditioned."""
+    """Return the accelerations from which the tests computed the torques. They are exact, whereas a solution with the
+    mass matrix loses digits if the matrix is badly conditioned."""
     return {"qdd": given["qdd"]}
 
 

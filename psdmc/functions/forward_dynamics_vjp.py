@@ -26,8 +26,12 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Compute gradients from d qdd = M^-1 (d tau - d tau_id), where tau_id are the torques of inverse dynamics at the
-    same acceleration. With the solution of M weights = cotangent, they are the gradients of weights . (tau - tau_id)."""
+    """Compute accelerations, and the gradients of the weighted sum cotangent . qdd by q, qd and tau.
+
+    The accelerations change by d qdd = M^-1 (d tau - d tau_id). The function tau_id(q, qd, qdd) is inverse dynamics, at
+    the computed acceleration. Let w be the solution of M w = cotangent. The gradients of cotangent . qdd are then the
+    gradients of w . (tau - tau_id).
+    """
     qdd, factors = accelerations(g, g.inputs["tau"])
     weights = factors.solved(g.inputs[COTANGENT.name])
     by_q, by_qd = torque_gradients(g, qdd, weights)

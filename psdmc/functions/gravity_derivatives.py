@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Compute the derivatives of torques at rest. If all joints have one coordinate, d g / d q is symmetric, and one
-    triangle is enough. Tangents of rotations do not commute, so for other joints both triangles are computed."""
+    """Compute the gravity torques and their derivatives by joint positions. If all joints have one coordinate, d g / d
+    q is symmetric, and only one triangle is computed. With joints of several coordinates the matrix is not symmetric,
+    because rotations do not commute."""
     still = g.still
     found = inverse_dynamics_derivatives(
         g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base_acceleration, g.choices

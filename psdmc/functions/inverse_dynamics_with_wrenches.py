@@ -46,8 +46,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Compute torques by Pinocchio. Its argument fext takes each wrench in the frame of a joint, so wrenches are
-    converted from the named frames first."""
+    """Compute torques by Pinocchio, for tests. The given wrenches are moved from the named frames to the joint frames,
+    as Pinocchio's argument fext needs them."""
     import pinocchio as pin
 
     def loaded(model: Any, data: Any, q: Array, qd: Array, qdd: Array, wrenches: Array) -> Array:

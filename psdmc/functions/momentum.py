@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Compute the momentum of the links' real bodies. Bodies that represent theta_b have the same torques, but not the
-    same momentum."""
+    """Compute the robot's momentum with the masses and inertias of the links in the robot file. Base parameters give
+    the right torques, but not the right momentum."""
     bodies = g.link_bodies()
     linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
     axes, origin = g.root

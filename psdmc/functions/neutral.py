@@ -1,4 +1,5 @@
-"""The neutral position q, at which no joint has moved: zeros, and unit quaternions without rotation."""
+"""The neutral position q, at which no joint has moved: zero for each joint coordinate, and quaternions without
+rotation."""
 
 from __future__ import annotations
 

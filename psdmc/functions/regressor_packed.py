@@ -1,5 +1,5 @@
-"""The regressor of the torques in theta_b for recursive estimators, as a vector of the entries that can differ from
-zero."""
+"""The regressor of the torques in theta_b for recursive estimators, as a vector of the matrix entries that can differ
+from zero."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ Stage = tuple[Any, Any, Any, Any]
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Compute one step by executing the regions as straight-line code: derivatives of forward dynamics four times, and
-    the products with them."""
+    """Compute one step and its Jacobians as straight-line code, without loops. The derivatives of forward dynamics are
+    computed four times, once per Runge-Kutta stage."""
     nq, nv = len(g.inputs["q"]), len(g.still)
 
     def call(_: str, given: list[list[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
@@ -66,17 +66,18 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame]) -> Regions:
-    """Return the function's body as loops and calls: it computes the state after dt and its derivatives.
+    """Return the function's body as loops and calls of forward dynamics: it computes the state after dt and its
+    derivatives.
 
-    Both are the start plus a sixth of the weighted sum of the four stages' slopes, with weights 1, 2, 2, 1. Slopes are
-    those of q's coordinates and of their derivatives. Between stages, derivatives are along the tangent of q. The
-    arrays are:
+    The state is the start plus dt / 6 times the weighted sum of four slopes, with the weights 1, 2, 2, 1. The
+    derivatives are summed with the weights of the slopes. Each stage has slopes of q's entries and of qd. Between
+    stages, derivatives are along the tangent of q. The arrays are:
 
-    here, there     q and qd of a stage
-    by_q, by_v      nv x 3 nv, derivatives of q (along its tangent) and of qd, by q, qd and tau
-    rate, turn      nq + nv and nq + nv x 3 nv, slopes of q's coordinates and of qd, and their derivatives by q, qd and tau
-    start           the derivatives of coordinates and qd at the start
-    total, totals   sums of slopes
+    here, there    q and qd of a stage
+    by_q, by_v     nv x 3 nv, derivatives of q (along its tangent) and of qd, by q, qd and tau
+    rate, turn     nq + nv and nq + nv x 3 nv, slopes of q's entries and of qd, and their derivatives by q, qd and tau
+    start          the derivatives of q's entries and of qd at the start
+    total, totals  sums of slopes, and of their derivatives
     """
     nq, nv = (sum(getattr(frame.joint, size) for frame in leading(frames)) for size in ("nq", "nv"))
     width, rows = 3 * nv, nq + nv
@@ -247,8 +248,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Compute the step from Pinocchio's accelerations and their derivatives at the four stages. Pinocchio has no
-    Runge-Kutta step of coordinates."""
+    """Return the step and its Jacobians from Pinocchio's accelerations and their derivatives at the four stages, for
+    tests. Pinocchio has no Runge-Kutta step."""
     maps = CoordinateMaps(robot.joint_types)
     return _on_arrays(given, maps, lambda q, qd: robot.forward_dynamics_derivatives(q, qd, given["tau"]))
 

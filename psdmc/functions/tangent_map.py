@@ -1,5 +1,5 @@
-"""The matrix that maps changes of the entries of q to displacements. It converts derivatives along the tangent to
-derivatives by the entries of q."""
+"""The matrix that maps changes of the entries of q to changes along the joint rates (the tangent). It converts
+derivatives along the tangent to derivatives by the entries of q."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Return the pseudo-inverse of the matrix whose columns are the rates of the coordinates at unit joint rates."""
+    """Return the tangent map for tests: the pseudo-inverse of the matrix whose columns are the rates of q's entries at
+    unit joint rates."""
     rates = [robot.coordinate_rates(given["q"], unit) for unit in np.eye(robot.model.nv)]
     return {"T": np.linalg.pinv(np.stack(rates, axis=-1))}
 

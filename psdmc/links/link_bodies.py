@@ -1,5 +1,5 @@
-"""Pseudo-inertias (4 x 4 mass matrices) of links: rows that the model's assumptions make zero, and reference bodies to
-which a fit keeps links near."""
+"""Pseudo-inertias (4 x 4 mass matrices) of links in fits: rows that are zero by assumption, and the bodies near which a
+fit keeps the links."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ distribution of mass, and others are points."""
 
 
 def pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
-    """Return the pseudo-inertia (4 x 4) of a link with the parameters m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz.
+    """Return the pseudo-inertia (4 x 4 mass matrix) of a link with the parameters m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz,
+    Izz.
 
-    Its unit of length is 0.1 m, which gives entries of similar size for the solver.
+    Lengths are in units of 0.1 m, so that all entries have similar size in the solver.
     """
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
     half = 0.5 * (ixx + iyy + izz)
@@ -34,10 +35,10 @@ def pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
 
 
 def reference_body(link: Array, held: list[int]) -> tuple[Array, bool]:
-    """Return the pseudo-inertia to which a link should be near, and whether it comes from the robot file. If the file
+    """Return the pseudo-inertia near which a fit keeps a link, and whether it comes from the robot file. If the file
     gives no inertia, it is that of a 5 kg body of ordinary size.
 
-    held  rows of the pseudo-inertia that are not zero by assumption
+    held  numbers of the rows and columns of the 4 x 4 matrix that are not zero by assumption; the others are left out
     """
     if not np.isfinite(link[:10]).all() or not link[0] > 0:
         return np.diag([ORDINARY_BODY[k] for k in held]), False
@@ -47,8 +48,9 @@ def reference_body(link: Array, held: list[int]) -> tuple[Array, bool]:
 
 
 def held_rows(span: Array, start: int) -> list[int]:
-    """Return the rows of a link's pseudo-inertia that are not zero by assumption.
+    """Return the numbers (0 to 3) of the rows of a link's pseudo-inertia that are not zero by the model's assumptions.
 
+    span   (11 n, k)  basis of the standard parameters x that the assumptions allow
     start  index of the link's first parameter in x (11 n,)
     """
     flat = flat_rows(span, start)
@@ -56,10 +58,11 @@ def held_rows(span: Array, start: int) -> list[int]:
 
 
 def flat_rows(span: Array, start: int) -> list[int]:
-    """Return the rows of a pseudo-inertia that are zero for every real body that the assumptions allow.
+    """Return the numbers of the rows of a link's pseudo-inertia that are zero for every real body that the assumptions
+    allow.
 
-    A link without moment of inertia about an axis has no extent across that axis, whatever its other moments are. An
-    example is a rod along x whose Ixx is assumed zero.
+    If the moment of inertia about an axis is assumed zero, the link has no extent across that axis. An example is a rod
+    along x whose Ixx is assumed zero.
     """
     rows: set[int] = set()
     for axis, inertia in enumerate((4, 6, 9)):
@@ -69,8 +72,8 @@ def flat_rows(span: Array, start: int) -> list[int]:
 
 
 def flat_equations(span: Array, start: int) -> list[Array]:
-    """Return rows over x (11 n,) whose product with x is zero for every real body that the assumptions allow for one
-    link.
+    """Return linear equations in x, the (11 n,) standard parameters, for one link: each row times x is zero. Every real
+    body that the assumptions allow fulfils the equations.
 
     start  index of the link's first parameter in x
     """
@@ -86,8 +89,8 @@ def flat_equations(span: Array, start: int) -> list[Array]:
 
 
 def vanishes(span: Array, start: int, k: int) -> bool:
-    """Return whether the assumptions make the k-th row of a pseudo-inertia zero, as for a planar link without extent
-    along z."""
+    """Return whether the assumptions make row k of a link's pseudo-inertia zero. An example is row z of a planar link
+    without extent along z."""
     mass, moments = start, (start + 1, start + 2, start + 3)
     if k == 3:
         return not np.any(span[mass])

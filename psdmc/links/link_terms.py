@@ -22,9 +22,9 @@ class PhysicalOptions:
 
     smallest        smallest eigenvalue of each link's pseudo-inertia, in kg, with lengths in units of 0.1 m
     smallest_drive  smallest value of each drive inertia that is a parameter, kg m^2
-    known_body      weight of one unit of divergence from the file's body, in units of variance. The divergence compares two
-                    distributions of mass and does not depend on unit or frame (Lee, Wensing, Park 2020)
-    unknown_body    weight of the divergence from an ordinary body if the file has none: enough to keep the pseudo-inertia
+    known_body      weight of the distance (divergence) from the file's body, if the file has one. The divergence
+                    compares two distributions of mass and does not depend on unit or frame (Lee, Wensing, Park 2020)
+    unknown_body    weight of the distance from an ordinary body if the file has none: enough to keep the pseudo-inertia
                     positive definite
     """
 
@@ -35,8 +35,8 @@ class PhysicalOptions:
 
 
 def known_inner(model: DynamicsModel) -> Array:
-    """Return the coefficients of the file's standard parameters in the basis `parameter_span`; zero for unknown
-    parameters."""
+    """Return the coordinates of the file's standard parameters in the basis `parameter_span`, which the assumptions
+    allow. Unknown parameters count as zero."""
     span = model.mechanism.parameter_span
     known = np.nan_to_num(model.mechanism.parameters.reshape(-1))
     return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
@@ -45,10 +45,11 @@ def known_inner(model: DynamicsModel) -> Array:
 def link_terms(
     cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
 ) -> tuple[list[Any], Any]:
-    """Return the constraints for one link and its divergence from the body in the robot file.
+    """Return the constraints for one link in a fit, and the weighted divergence (distance between distributions of
+    mass) from the body in the robot file.
 
     The constraints keep the pseudo-inertia and the drive inertia above their bounds. A link that is assumed massless
-    has no divergence, and only the constraint of its drive inertia.
+    has no divergence, and only the constraint of the drive inertia.
     """
     start = PARAMETERS_PER_LINK * link
     span: Array = model.mechanism.parameter_span

@@ -1,11 +1,12 @@
-"""Finds positive definite matrices that depend linearly on parameters z and are nearest to given matrices.
+"""Finds the symmetric matrices P(z) nearest to given matrices among all positive definite ones. They depend linearly on
+parameters z.
 
     minimise the sum over blocks of  weight (tr(N P(z)) - log det P(z)),  P(z) = constant + sum of z_k slopes_k
 
-N is the inverse of the matrix that P should be near to. The problem is convex, and -log det P keeps every step within
-the positive definite matrices. Newton's method does not depend on the units of z or P and reaches rounding accuracy.
-Conic solvers stop at 1e-8 or fail if links of a gram and of ten kilograms occur together. Source: Boyd, Vandenberghe
-2004, chapters 9 and 11.
+Each block is one matrix P, for example of one link. N is the inverse of the given matrix that P should be near to. The
+problem is convex, and -log det P keeps every step within the positive definite matrices. Newton's method does not
+depend on the units of z or P and reaches rounding accuracy. Conic solvers stop at 1e-8 or fail if links of a gram and
+of ten kilograms occur together. Source: Boyd, Vandenberghe 2004, chapters 9 and 11.
 """
 
 from __future__ import annotations
@@ -40,8 +41,13 @@ MARGIN = 1e-13
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """One symmetric matrix P(z) = constant (m, m) + z slopes (k, m, m), and the matrix (m, m) that it should be near
-    to."""
+    """One symmetric matrix that depends linearly on z: P(z) = constant + sum of z_k slopes_k.
+
+    constant  (m, m)
+    slopes    (k, m, m)  derivatives of P by the k entries of z
+    near      (m, m)  the matrix that P should be near to
+    weight    factor of the distance between P and `near`
+    """
 
     constant: Array
     slopes: Array
@@ -53,8 +59,8 @@ class Block:
 
 
 def nearest_definite(blocks: Sequence[Block], z: Array) -> Array | None:
-    """Return the minimiser z (k,), by Newton's method from the start value z. Return None if no z makes all blocks
-    positive definite."""
+    """Return the z (k,) for which the blocks are positive definite and nearest to their given matrices. Newton's method
+    starts from the given z. Return None if no z makes all blocks positive definite."""
     found = feasible_point(blocks, z)
     if found is None:
         return None
@@ -71,8 +77,8 @@ def nearest_definite(blocks: Sequence[Block], z: Array) -> Array | None:
 def feasible_point(blocks: Sequence[Block], z: Array) -> Array | None:
     """Return some z (k,) that makes all blocks positive definite; None if there is none.
 
-    The search adds s times a well-conditioned positive definite matrix to each block. It increases the penalty on s
-    until the blocks are positive definite without this addition.
+    The search adds s times a positive definite matrix to each block. It makes s smaller, until the blocks are positive
+    definite without this addition.
     """
     if _are_definite(blocks, z):
         return z

@@ -1,5 +1,5 @@
 """Finds link masses and inertias that have given base parameters exactly and are nearest to those of the robot file.
-They are for programs that read links and not base parameters."""
+Programs that read links, and not base parameters, need these masses and inertias."""
 
 from __future__ import annotations
 
@@ -58,8 +58,9 @@ class PhysicalLinks:
     """Standard parameters of links that have the base parameters of the model.
 
     parameters  (n, 11)  standard parameters about the link frames: B @ parameters = theta_b
-    divergence  (n,)     distance of each link from the file's, tr(P0^-1 P) - log det(P0^-1 P) - 4, with the pseudo-inertias
-                         P and P0 (0: equal); NaN if the file does not give the link, or if one of the two is flat
+    divergence  (n,)  distance of each link from the link in the robot file, tr(P0^-1 P) - log det(P0^-1 P) - 4, with
+                      the pseudo-inertias P and P0 (0: equal); NaN if the file does not give the link, or if P or P0 is
+                      singular
     """
 
     parameters: Array
@@ -67,11 +68,12 @@ class PhysicalLinks:
 
 
 def physical_links(model: DynamicsModel) -> PhysicalLinks:
-    """Return the links that have the model's theta_b and are nearest to those of its robot file.
+    """Return the standard parameters of links that have the model's theta_b and are nearest to those of the robot file.
 
-    The distance is the sum of the divergences between distributions of mass (Lee, Wensing, Park 2020), as in the
-    physically consistent fit. All pseudo-inertias of the result are positive definite, and no drive inertia is
-    negative. If the links of the file fulfil this and have theta_b, they are returned unchanged.
+    The distance is the sum of the divergences (differences between two distributions of mass) of all links (Lee,
+    Wensing, Park 2020). The physically consistent fit uses this distance, too. All pseudo-inertias of the result are
+    positive definite, and no drive inertia is negative. If the links of the file fulfil this and have theta_b, they are
+    returned unchanged.
 
     Raises InputError if theta_b is unknown, NoSuchLinks if no such links exist.
     """
@@ -172,8 +174,8 @@ def _solved(cp: Any, problem: Any) -> bool:
 
 
 def moments(link: Array) -> Array:
-    """Return the matrix (4, 4) of the integrals of r r^T, r and 1 over a link's mass, from its standard parameters; kg
-    and m."""
+    """Return a link's 4 x 4 pseudo-inertia in kg and m, from its standard parameters: integrals over the mass of the
+    products of x, y, z and 1."""
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = second_moments(inertia_matrix(link))
     matrix[:3, 3] = matrix[3, :3] = link[1:4]

@@ -1,8 +1,8 @@
-"""The torque errors of an arrangement (a choice of link frames, carriers and recursion), relative to the model's
-torques.
+"""The torque errors of generated code with certain link frames, nonzero link parameters and recursion options, relative
+to the model's torques. These choices together are called an arrangement.
 
-On robots of many scales, some frames or carriers lose digits. An example is a robot on which carriers of 100 kg also
-represent a mass of 1 g at 1 um from a joint axis: the torque of this mass is below their last digit.
+On robots of many scales, some choices lose digits. An example is a robot on which parameters of 100 kg also represent a
+mass of 1 g at 1 um from a joint axis. The torque of this mass is below the last digit of the large parameters.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ WRONG = 1e-8
 
 
 class Accuracy:
-    """Computes the errors of a model's arrangements and of single PROGRAMs. Most arrangements are judged by inverse
-    dynamics, whose operations other functions share.
+    """Computes the errors of generated code for one model: of an arrangement (frames, nonzero parameters, recursion
+    options), or of one PROGRAM (list of operations). Most arrangements are judged by inverse dynamics, whose operations
+    other functions share.
 
-    robot    constants of the traces, with theta_b or with theta_b as an input
-    theta_b  (l,)
+    robot    constants of the model; theta_b is a constant or an input
+    theta_b  (l,) base parameters
     """
 
     def __init__(self, robot: RobotConstants, theta_b: Array) -> None:
@@ -47,19 +48,23 @@ class Accuracy:
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement, recipe: Recipe = inverse_dynamics.RECIPE) -> float:
-        """Return the error of a function in an arrangement. The mass matrix is computed itself, because its entries may
-        be small compared with gravity torques. Other functions are judged by inverse dynamics."""
+        """Return the error of a function in an arrangement (frames, nonzero parameters, recursion options), as
+        `error_of` does.
+
+        For the mass matrix, the error of the matrix is returned, because its entries may be small compared with gravity
+        torques. For all other functions, the error of inverse dynamics in this arrangement is returned.
+        """
         if recipe.polynomials is not Polynomials.MASS:
             recipe = inverse_dynamics.RECIPE
         return self.error_of(recipe, trace_dynamics(recipe, arrangement, self.robot))
 
     def error_of(self, recipe: Recipe, program: Program) -> float:
-        """Return the largest difference between a PROGRAM's outputs and Newton-Euler or composite bodies in the file's
-        link frames.
+        """Return the largest difference between a PROGRAM's outputs and reference values at random states. The
+        reference is the Newton-Euler or composite-body algorithm in the link frames of the robot file.
 
-        The difference is one of torques (accelerations are multiplied by the mass matrix), relative to the joint's
-        largest torque. For the mass matrix, it is relative to the row's largest entry. It is absolute if that value is
-        zero.
+        The difference is one of torques, relative to the joint's largest torque. Differences of accelerations are
+        multiplied by the mass matrix first. For the mass matrix, the difference is relative to the row's largest entry.
+        If the largest torque or entry is zero, the difference is absolute.
         """
         signature, part = recipe.signature, recipe.polynomials
         given = self._states | {"tau": self._torques, "theta_b": self.theta_b}

@@ -1,5 +1,5 @@
 """Which functions psdmc can generate for a model. Some need a positive definite mass matrix, or links whose parameters
-are all known. Code with baked parameters needs a known theta_b."""
+are all known. Code that contains theta_b as constants needs a known theta_b."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ REMEDY = {
 
 
 def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
-    """Raise InputError if a wanted function (None: the default ones) needs something that the model lacks."""
+    """Raise InputError if one of the functions needs something that the model lacks. None: the functions that psdmc
+    generates by default."""
     names = wanted(functions, model.mechanism)
     lacking = _lacking(model, names)
     for name, reason in lacking.items():
@@ -37,7 +38,8 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of all default functions that are possible for the model, and a sentence for each restriction."""
+    """Return the names of all default functions that psdmc can generate for the model, and one sentence for each
+    function left out or restricted."""
     default = default_of(model.mechanism)
     lacking = _lacking(model, default)
     names = tuple(name for name in default if name not in lacking)
@@ -46,9 +48,10 @@ def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
-    """Return a sentence with the functions that need theta_b as an argument, because the model's is unknown.
+    """Return a sentence that lists the functions whose code needs theta_b as an argument, because the model has no
+    theta_b.
 
-    Empty if theta_b is known, or if none of `functions` (None: the default ones) uses it.
+    The tuple is empty if theta_b is known, or if none of `functions` (None: the default ones) depends on theta_b.
     """
     asked = wanted(functions, model.mechanism)
     names = [name for name in asked if name in RECIPES and RECIPES[name].signature.theta]

@@ -1,8 +1,9 @@
-"""An estimate of the operations that an exchange of carriers saves, from the changed branches of a robot's tree alone.
+"""An estimate of the operations that a change of carriers saves, from the changed branches of a robot's tree alone.
+Carriers are the link parameters that are not set to zero in generated code.
 
-In a tree, the cost of a function is nearly a sum over branches. For large robots, the search traces only the branches
-that an exchange changes and the bodies that carry them, before and after the exchange. It traces the whole robot only
-if the exchange makes these branches cheaper. For talos, 9 to 11 of 33 joints are traced.
+In a tree, the cost of a function is nearly a sum over branches. For large robots, the search first traces (records on
+symbols) only the branches that a change affects and the bodies that carry them, before and after the change. It traces
+the whole robot only if these branches become cheaper. For talos, 9 to 11 of 33 joints are traced.
 """
 
 from __future__ import annotations
@@ -36,13 +37,14 @@ class Branches:
     def changed(
         self, recipe: Recipe, before: Arrangement, behind: Arrangement, groups: Sequence[Limbs] = ()
     ) -> tuple[int, ...] | None:
-        """Return the joints of the branches in which two arrangements with the same geometry differ, and the joints
-        that carry them.
+        """Return the joints of the branches in which two arrangements of the code differ, with all joints between these
+        branches and the base. The arrangements have equal geometry, but different nonzero link parameters (carriers).
 
-        None if this is most of the robot, if the robot is small, or if the function cannot be computed for a part of
-        the robot.
+        Return None if these are most of the robot's joints, if the robot is small, or if the function cannot be
+        computed for a part of the robot.
 
-        groups   limbs of which the same joints are kept
+        groups  groups of limbs: if a joint of one limb is in the result, the joints at its place in the other limbs
+                are, too
         """
         frames = before.reframed.frames
         is_told = self.robot.theta_b is not None or len(frames) >= MANY
@@ -57,7 +59,8 @@ class Branches:
         return found if len(found) <= WORTH * len(frames) else None
 
     def part(self, whole: Arrangement, kept: tuple[int, ...]) -> tuple[Arrangement, RobotConstants]:
-        """Return the arrangement restricted to these joints, and the constants of a robot with these joints only."""
+        """Return an arrangement (frames, nonzero parameters, recursion options) for a robot that has only the joints
+        `kept`, and the constants of this robot."""
         number = {joint: i for i, joint in enumerate(kept)}
         links = [divmod(carrier, PARAMETERS_PER_LINK) for carrier in whole.carriers]
         rows = [row for row, (joint, _) in enumerate(links) if joint in number]
@@ -71,8 +74,8 @@ class Branches:
 
 
 def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
-    """Return the limb of each of these joints, and all joints that carry it, in ascending order. For a body that
-    carries several limbs, only the first limb is returned; one limb is enough to use what the body computes."""
+    """Return each given joint, all joints that carry it, and one limb that it carries, as joint numbers in ascending
+    order. One limb is enough to make use of the values that a body computes for its limbs."""
     children: dict[int, list[int]] = {i: [] for i in range(BASE, len(frames))}
     for i, frame in enumerate(frames):
         children[frame.parent].append(i)
@@ -87,7 +90,8 @@ def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
 
 
 def limbs_in(groups: Sequence[Limbs], kept: tuple[int, ...]) -> tuple[Limbs, ...]:
-    """Return the groups of limbs, restricted to the joints in `kept` and renumbered."""
+    """Return the groups of limbs, restricted to the joints in `kept`. Joints are numbered by their position in
+    `kept`."""
     number = {joint: i for i, joint in enumerate(kept)}
     left = (
         tuple(tuple(number[joint] for joint in limb if joint in number) for limb in limbs) for limbs in groups

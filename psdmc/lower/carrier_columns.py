@@ -1,5 +1,5 @@
-"""The regressor columns of all link parameters, and which of them are independent. Independent ones can be carriers,
-that is, represent all parameters in generated code.
+"""The regressor columns of all link parameters. Parameters with independent columns can be carriers: link parameters
+that represent all others in generated code.
 
 Columns that double precision cannot distinguish are treated in extended precision.
 """
@@ -45,8 +45,10 @@ SEED = 20211
 
 
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
-    """Return the possible sets of carriers of a model. `representative` is the matrix from theta_b to standard
-    parameters about the link frames."""
+    """Return the possible sets of carriers of a model: link parameters that represent all others in generated code.
+
+    representative  matrix from theta_b to standard parameters about the link frames
+    """
     n = len(reframed.frames)
     is_sampled = n <= SAMPLED_JOINTS or any_follows(reframed.frames)
     samples = _sampled_columns(reframed) if is_sampled else _torque_rows(reframed)
@@ -73,9 +75,10 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
 
 
 def every_parameter(reframed: Reframed, representative: Array) -> tuple[tuple[int, ...], Array]:
-    """Return all link parameters that theta_b contains, and the (count, l) matrix from theta_b to their values.
+    """Return the indices of all link parameters that theta_b contains, and the (count, l) matrix from theta_b to their
+    values.
 
-    There are more of them than carriers. Each parameter keeps its own value, whatever its size.
+    If code uses all of these parameters, no parameter represents another one, and small values keep their digits.
     """
     lift = _lifted(reframed, representative).astype(np.float64)
     reached = np.flatnonzero(lift.any(axis=1))

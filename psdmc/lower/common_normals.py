@@ -1,5 +1,5 @@
-"""Common normals of two joint axes: their feet (the points where they meet the axes) and directions. For nearly
-parallel axes, other directions take their place."""
+"""Common normals of two joint axes: directions, and feet (the points where a normal meets the axes). Nearly parallel
+axes have no unique normal, and another direction perpendicular to them is used."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ LITTLE = 1e-2
 
 
 def nearly_parallel(a: Array, b: Array) -> bool:
-    """Whether the angle between two unit vectors, or one of them reversed, is less than NEARLY_PARALLEL."""
+    """Return whether two unit vectors are nearly parallel or opposite: the sine of their angle is less than
+    NEARLY_PARALLEL."""
     return float(np.linalg.norm(cross(a, b))) < NEARLY_PARALLEL
 
 
 def foot_towards(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
-    """Return the point of the line (point, axis) that is nearest to the other line; None if the lines are nearly
-    parallel."""
+    """Return the point of a line that is nearest to another line; None if the lines are nearly parallel. A line is
+    given by a point and a unit vector."""
     if nearly_parallel(axis, other_axis):
         return None
     normal = cross(axis, other_axis)
@@ -34,8 +35,9 @@ def foot_towards(point: Array, axis: Array, other_point: Array, other_axis: Arra
 
 
 def common_normal(axis: Array, following: Array, step: Array) -> Array | None:
-    """Return the direction of the common normal of two axes. For nearly parallel axes, it is that of the step from one
-    origin to the next. None if every perpendicular direction would serve."""
+    """Return the unit vector of the common normal of two axes, given by their directions. For nearly parallel axes, it
+    is the part of `step` (from one origin to the next) that is perpendicular to them. Return None if this part is
+    zero."""
     normal = cross(axis, following)
     if nearly_parallel(axis, following):
         normal = perpendicular(step, axis)
@@ -45,8 +47,8 @@ def common_normal(axis: Array, following: Array, step: Array) -> Array | None:
 
 
 def normal_on_side_of(axis: Array, following: Array, step: Array, x: Array) -> Array:
-    """Return the common normal of a body's axis and the axis of a further child, in the sense that is nearest to x. The
-    result is x itself if every perpendicular direction would serve. The body's own x is along the normal to its first
+    """Return the unit vector of the common normal of a body's axis and a child's axis. Of its two directions, the one
+    nearer to x is chosen. Return x itself if the axes coincide. x is the body's x axis, along the normal to its first
     child."""
     own = common_normal(axis, following, step)
     if own is None:
@@ -55,8 +57,8 @@ def normal_on_side_of(axis: Array, following: Array, step: Array, x: Array) -> A
 
 
 def across(direction: Array, axis: Array) -> Array:
-    """Return the part of a unit direction that is perpendicular to an axis; the direction itself if nearly all of it
-    is."""
+    """Return the part of a unit direction that is perpendicular to an axis, scaled to length one. If the part along the
+    axis is only rounding, return the direction unchanged."""
     along = times(axis, direction)
     return direction if abs(along) < EXACT else clean_direction(direction - along * axis)
 

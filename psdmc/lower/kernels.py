@@ -1,4 +1,5 @@
-"""Lowering of a model to kernels, the arithmetic from which C code is printed. Each function gets its cheapest form."""
+"""Lowering of a model to kernels. A kernel is the list of operations of one function, from which C code is printed.
+Each function gets its cheapest form."""
 
 from __future__ import annotations
 
@@ -62,11 +63,12 @@ def lower(
     theta_variants: bool = True,
     costs: Costs = COSTS,
 ) -> dict[str, Kernel]:
-    """Return kernels by name, including `_theta` variants if wanted, in the order of psdmc.functions.
+    """Return the kernel (operations) of each function by name, in the order of psdmc.functions.
 
-    functions  names, or NAME_theta_rows; None: the default ones. If theta_b is unknown, only variants that do not need its
-               value
-    costs      of the target
+    functions       names of functions, also NAME_theta_rows (one theta_b per state); None: the default ones. If theta_b
+                    is unknown, only functions and variants that do not need its value are made
+    theta_variants  whether to make also the variants NAME_theta, with theta_b as an argument
+    costs           costs of operations on the target processor
 
     Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q.
     """
@@ -94,10 +96,11 @@ def lower(
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
-    """Return the names of the wanted functions in the order of psdmc.functions, followed by wanted NAME_theta_rows.
+    """Return the names of the functions that the user asked for, in the order of psdmc.functions. Variants
+    NAME_theta_rows (one theta_b per state) come last.
 
     None and the word 'default' mean the default functions, of this robot if one is given. 'all' means all functions
-    except NAME_theta_rows. A text is one name. Functions that a wanted function calls are added. Raises InputError for
+    except NAME_theta_rows. A text is one name. The functions that these functions call are added. Raises InputError for
     an unknown name.
     """
     default = DEFAULT if robot is None else default_of(robot)
@@ -153,7 +156,7 @@ class _Lowered:
         self._short: list[tuple[Program, Program]] = []
 
     def check(self, recipe: Recipe) -> None:
-        """Raise InputError if the function adds unlike quantities, such as a mass and a length."""
+        """Raise InputError if the recipe's function adds unlike quantities, such as a mass and a length."""
         traced = RECIPES[recipe.packs.function] if recipe.packs else recipe
         if traced.regions is None or self.model.nv <= TRACED:
             check_dimensions(
@@ -163,7 +166,8 @@ class _Lowered:
             )
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
-        """Return the kernel of one function. It is made only once, because another kernel may contain it."""
+        """Return the kernel (operations) of one function. It is computed at the first call only, because another kernel
+        may contain it."""
         key = recipe.name, theta
         if key not in self._kernels:
             self._kernels[key] = (

@@ -1,4 +1,5 @@
-"""Kernels of packed matrices: the part of a matrix function's kernel that computes the wanted entries."""
+"""Kernels (operations) of packed matrices, that is, of vectors with the entries of a matrix that can differ from zero.
+They are parts of the kernels of whole matrices."""
 
 from __future__ import annotations
 
@@ -17,10 +18,11 @@ Kept = Mapping[Slot, Slot]
 
 
 def packed(kernel: Kernel, function: Signature, columns: int, places: Places) -> Kernel:
-    """Return the kernel of `function`, whose only output is a vector of these entries of the other kernel's matrix.
-    Operations that no such entry needs are left out.
+    """Return the kernel (operations) of `function`, whose only output is a vector of matrix entries. It is the kernel
+    of the whole matrix, without operations that these entries do not need.
 
     columns  number of columns of the matrix
+    places   (row, column) of each entry
     """
     (matrix,), (values,) = kernel.function.outputs, function.outputs
     kept = {

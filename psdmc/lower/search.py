@@ -1,8 +1,9 @@
-"""The search for the arrangement of a model (frames, parameters, recursion) whose PROGRAM is cheapest.
+"""The search for the cheapest code of a model's functions. It chooses link frames, nonzero parameters and options of
+the recursion; these choices together are an arrangement.
 
-It is a coordinate descent over the positions of frames on their axes, the choices in the recursions, the unit of
-length, and the parameters that represent the model. The search is deterministic: candidates come in a fixed order, only
-a strictly lower cost is taken, and the budget is a number of traced programs, not a time.
+The search changes one choice at a time: origins of frames on the axes, options of the recursion, unit of length, and
+nonzero parameters. The result is deterministic. Candidates come in a fixed order, and only a strictly lower cost is
+taken. The budget is a number of traced PROGRAMs, not a time.
 """
 
 from __future__ import annotations
@@ -62,13 +63,14 @@ own."""
 
 
 def distinct(recipe: Recipe, choices: Sequence[Choices]) -> tuple[Choices, ...]:
-    """Return the choices that make a difference to a function: of equivalent ones, only the first."""
+    """Return the options of the recursion that make a difference to a function: of equivalent ones, only the first."""
     kinds = {tuple(getattr(each, field) for field in recipe.matters): each for each in reversed(choices)}
     return tuple(each for each in choices if each in kinds.values())
 
 
 class Search:
-    """The search for the arrangements of one model's functions; `geometry` is shared between functions and searches."""
+    """The search for the arrangements of one model's functions, that is, for frames, nonzero parameters and recursion.
+    `geometry` (the possible frames) is shared between functions and searches."""
 
     def __init__(
         self,
@@ -96,15 +98,15 @@ class Search:
 
     @property
     def has_many_joints(self) -> bool:
-        """Whether the robot has so many joints that the search tries fewer candidates."""
+        """Return whether the robot has so many joints that the search tries fewer candidates."""
         return len(self.robot.chain) > MANY_JOINTS
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
-        """Return the cheapest arrangement found for one function. `start` is the arrangement of another function, whose
-        geometry is kept.
+        """Return the cheapest arrangement (frames, nonzero parameters, recursion) found for one function. If `start` is
+        given, its frames are kept.
 
-        If the cheapest arrangement is not accurate enough, the search is repeated among those that are. Raises
-        InternalError if all errors are larger than rounding explains.
+        If the torques of the cheapest arrangement are not accurate enough, the search is repeated among accurate
+        arrangements. Raises InternalError if all errors are larger than rounding explains.
         """
         found = self._descended(recipe, scoring, start)
         accuracy = self.accuracy
@@ -194,16 +196,18 @@ class Search:
         return best
 
     def uncarried(self, reframed: Reframed) -> Arrangement:
-        """Return the arrangement in which no parameter represents another one.
+        """Return the arrangement with these frames in which no link parameter represents another one.
 
-        A choice of carriers is based on the columns of all joints' torques together. On robots of many scales, a small
-        joint's share of these columns is so small that its digits are lost. This arrangement keeps them.
+        Carriers (parameters that represent others) are chosen by the columns of all joints' torques together. On robots
+        of many scales, a small joint's part of these columns is so small that its digits are lost. The returned
+        arrangement keeps these digits.
         """
         carriers, transfer = every_parameter(reframed, self.robot.representative)
         return Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0], is_basis=False)
 
     def keeps_digits(self, reframed: Reframed) -> bool:
-        """Whether torques computed in these frames are accurate enough; True if no base parameters are known."""
+        """Return whether torques computed in these joint frames are accurate enough; True if no base parameters are
+        known."""
         return self.accuracy is None or self.accuracy.error(self.uncarried(reframed)) <= LIMIT
 
     def _admits(self, accurate: Arrangement | None, recipe: Recipe) -> Callable[[Arrangement], bool]:
@@ -214,8 +218,8 @@ class Search:
         return lambda arrangement: accuracy.error(arrangement, recipe) <= limit
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
-        """Return the cost of a function's PROGRAM in an arrangement. The function is traced once, and the cost is
-        cached."""
+        """Return the numbers of operations of a function in an arrangement (frames, nonzero parameters, recursion). The
+        result is computed once and cached."""
         key = self._key(recipe, a)
         if key not in self._costs:
             self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
@@ -242,17 +246,17 @@ class Search:
         return other if costs[1] < costs[0] else start
 
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
-        """Return the PROGRAM of a function in an arrangement that was found for another function or target. Only the
-        choices within the recursion are made again."""
+        """Return the PROGRAM (list of operations) of a function. Frames and nonzero parameters are those that were
+        found for another function or target processor; only the options of the recursion are chosen again."""
         return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """Yield the PROGRAMs from which `rearranged` chooses: the cheapest one for one state, and the cheapest one for
-        lanes.
+        """Yield the PROGRAMs (lists of operations) from which `rearranged` chooses. They are the cheapest one for one
+        state per call, and the cheapest one for one state per SIMD lane.
 
-        For a robot with more than MANY_JOINTS joints, this is the latter alone. All other choices are only counted.
-        Those most similar to the found arrangement come first, until the counted PROGRAMs have OPERATIONS operations
-        together.
+        For a robot with more than MANY_JOINTS joints, only the second is yielded. All candidates are counted, and only
+        the best become PROGRAMs. The candidates most similar to the given arrangement (frames, parameters, options)
+        come first. Counting ends when the counted candidates have OPERATIONS operations together.
         """
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}

@@ -1,7 +1,8 @@
 """The methods of a model for the functions that compiled robots have, such as forward_dynamics, computed in NumPy.
 
-Their code (psdmc.model_functions) imports the model, so the model cannot import it. `psdmc` registers it here when it
-is imported. Type checkers read the methods from answers.pyi, which `python -m psdmc.toolchain.stubs` writes.
+The module psdmc.model_functions has the code of these functions. It imports the model, so the model cannot import it.
+The package `psdmc` registers it here instead. Type checkers read the methods from answers.pyi, which `python -m
+psdmc.toolchain.stubs` writes.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple
 
 
 class Provider(NamedTuple):
-    """The source of a model's functions.
+    """The object from which models get functions such as forward_dynamics.
 
     names  returns the names of all functions
     bound  (model, name) -> the function of that model
@@ -25,8 +26,8 @@ _PROVIDERS: list[Callable[[], Provider]] = []
 
 
 def provide(provider: Callable[[], Provider]) -> None:
-    """Register the function that returns the source of models' functions. It is called when a model is first asked for
-    one."""
+    """Register the provider (a function without arguments that returns a Provider). Models call it when a function such
+    as forward_dynamics is first used."""
     _PROVIDERS[:] = [provider]
 
 

@@ -44,8 +44,8 @@ class BrokenArchiveError(ValueError):
 
 
 def opened(data: bytes) -> zipfile.ZipFile:
-    """Open the archive in a file's bytes. Raises ValueError if they are no archive, and BrokenArchiveError if it is
-    damaged."""
+    """Return the archive in the bytes of a file, ready for reading. Raises ValueError if the bytes are no archive, and
+    BrokenArchiveError if the archive is damaged."""
     if not data.startswith(BEGINS):
         raise ValueError("no zip archive")
     try:

@@ -1,7 +1,7 @@
-"""Conversion of calibration results that psdmc 0.1 and 0.2 wrote, to the first schema of Calibrated.
+"""Conversion of calibration results that psdmc 0.1 and 0.2 wrote, to the first numbered format of Calibrated.
 
-These versions wrote plain values without a schema: sentences in place of codes, and logs, load and versions among the
-facts.
+Results of these versions have no format number. They contain sentences in place of codes, and logs, load and versions
+among the facts.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ CODES = {
 
 
 def upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
-    """Convert a result that psdmc 0.1 or 0.2 wrote to the first schema. Raises ValueError if it is no such result."""
+    """Convert a result that psdmc 0.1 or 0.2 wrote to the first numbered format. Raises ValueError if it is no such
+    result."""
     facts = dict(json.record(old.get("facts", {}), "the calibration's facts"))
     logs = [
         {"date": "", "use": use, **json.record(row, "a log"), **({"use": use} if use != "fit" else {})}

@@ -53,7 +53,8 @@ FIGURES = ("r2", "rmse", "gain", "gain_std", "friction_power", "friction_power_s
 
 
 def as_json(found: Calibrated) -> dict[str, Any]:
-    """Return plain values for a model file, which `from_json` reads. Numbers that are not finite become null."""
+    """Return a calibration result as plain JSON values for a model file, from which `from_json` reads it. Numbers that
+    are not finite become null."""
     content = {
         "schema": SCHEMA,
         "robot": found.robot,
@@ -85,7 +86,7 @@ def packed(matrix: Array) -> list[float]:
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to JSON's types: tuples and arrays become lists, and numbers that JSON lacks become null."""
+    """Return a value converted to JSON's types: tuples and arrays become lists, and NaN and infinity become null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -132,8 +133,8 @@ def _verdict(found: Verdict) -> dict[str, Any]:
 
 
 def document(found: Calibrated) -> dict[str, Any]:
-    """Return the JSON of `show --json` and of reports: `as_json` with sentences in place of codes, and with values that
-    follow from the others."""
+    """Return the calibration result as `psdmc show --json` and reports print it: as `as_json` does, but with sentences
+    in place of codes. Values that follow from other values are added."""
     kept = as_json(found)
     kept.pop("schema")
     verdict, grounds = found.verdict, kept.pop("verdict")
@@ -189,7 +190,8 @@ def _log(log: LogUsed) -> dict[str, Any]:
 
 
 def from_json(value: object) -> Calibrated:
-    """Read what `as_json` returned, or what psdmc 0.1 and 0.2 wrote. Raises ValueError that says what is wrong."""
+    """Return the calibration result from JSON values that `as_json` returned, or that psdmc 0.1 or 0.2 wrote. Raises
+    ValueError that says what is wrong."""
     content = json.record(value, "the calibration")
     if "schema" in content:
         json.whole(content["schema"], "the calibration's schema", 1, SCHEMA)

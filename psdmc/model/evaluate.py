@@ -27,8 +27,8 @@ BLOCK_BYTES = 2**18
 
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
-    """Return the broadcast batch shape, and each vector as (states, nv) float64, q as (states, nq). Raises InputError
-    if a shape does not fit, or if values are no real numbers."""
+    """Return the batch shape of the given state vectors q, qd and so on, and each vector as (states, nq) or (states,
+    nv) float64. Raises InputError if a shape does not fit, or if values are no real numbers."""
     names = {"nq": chain.q_names, "nv": chain.v_names}
     axes = {name: ("nq",) if name == "q" else ("nv",) for name in vectors}
     arrays = {name: real_array(name, value, axes=axes[name], names=names) for name, value in vectors.items()}
@@ -68,8 +68,8 @@ class _Monomials:
         self.factors = tuple(_factors(exponents[rows.rates]))
 
     def values(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Compute the values of all monomials, (p, states), from (states, n) arrays. Factors are multiplied in the
-        order of E's rows."""
+        """Compute the values of all p monomials, (p, states), from q, qd and qdd (states, n). The factors of a monomial
+        are multiplied in the order of E's rows."""
         placed = np.repeat(self.strength[:, None], q.shape[0], axis=1)
         for powers, row in zip(self.parts, np.concatenate([q.T, sine(q).T, cosine(q).T]), strict=True):
             for power in (1, 2):
@@ -112,13 +112,14 @@ def _factors(exponents: NDArray[np.uint8]) -> Iterator[NDArray[np.intp]]:
 
 
 def torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[Array]) -> Array:
-    """Compute tau (states, n), N m or N, from base parameters (l,) and q, qd, qdd (states, n)."""
+    """Compute joint torques tau (states, n), N m or N, from base parameters (l,) and q, qd, qdd (states, n). There are
+    n joints."""
     weights = _weights(expansion, theta)
     return _by_chunks(expansion, chain, arrays, lambda y: (weights @ y).T)
 
 
 def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Array:
-    """Compute the regressor Y (states, n, l), with tau = Y theta_b, at q, qd, qdd (states, n)."""
+    """Compute the regressor Y (states, n, l), with the torques tau = Y theta_b, at q, qd, qdd (states, n)."""
     transposed = [matrix.T.tocsr() for matrix in expansion.P]
 
     def rows(y: Array) -> Array:
@@ -128,7 +129,8 @@ def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Ar
 
 
 def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
-    """Compute M (states, n, n) at q (states, n). Column j is the sum of the terms with qdd_j, at qdd_j = 1."""
+    """Compute the mass matrix M (states, n, n) at q (states, n), for n joints. Column j is the sum of the torques'
+    terms with qdd_j, at qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)
     columns = [np.flatnonzero(row) for row in expansion.E[RowBlocks.of(n).qdd]]
     parts = [weights[:, own] for own in columns]

@@ -19,7 +19,7 @@ _FRAMES = {"urdf": "URDF", "standard": "standard DH", "modified": "modified DH"}
 
 
 class Model(ModelParts, Protocol):
-    """The attributes of a model that the summary shows."""
+    """The attributes of a model that the functions `text` and `html` show."""
 
     @property
     def p(self) -> int | None: ...
@@ -61,7 +61,7 @@ def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def joints_text(joints: Sequence[Joint]) -> str:
-    """Return names and types of the first joints, and how many more there are."""
+    """Return text with the names and types of the first joints, and with the number of further joints."""
     named = [f"{shown(joint.name)} {joint.type.word}" for joint in joints[:MOST_JOINTS]]
     more = len(joints) - len(named)
     return ", ".join(named) + (f" and {more} more" if more else "")

@@ -1,4 +1,5 @@
-"""The reasons of a calibration's verdict: codes with their figures, and the table that translates codes to sentences."""
+"""The reasons of a calibration's verdict: codes with their figures, and the table that translates each code to a
+sentence."""
 
 from __future__ import annotations
 
@@ -19,8 +20,8 @@ OrInf = float
 class Ground:
     """One reason of a calibration's verdict.
 
-    code    a key of WORDS, by which programs identify the reason
-    values  plain figures that the sentence needs; NaN if one does not exist
+    code    a key of the table WORDS, by which programs identify the reason
+    values  figures for the sentence of this code, by name; NaN if a figure does not exist
     """
 
     code: str
@@ -28,7 +29,8 @@ class Ground:
 
     @property
     def words(self) -> str:
-        """The reason as a sentence. Raises KeyError, TypeError or ValueError if the values are not those of the code."""
+        """Return the reason as a sentence. Raises KeyError, TypeError or ValueError if the figures are not those of the
+        code."""
         return WORDS[self.code](self.values)
 
 
@@ -50,9 +52,11 @@ def _each(values: Values, form: str, first: int | None = None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Seconds by which the torque of logs comes after their motion; std is infinite if the delay may be still longer.
+    """The time in seconds by which the measured torque in a log comes after the motion.
 
-    shown  whether the logs show that there is a delay
+    value  the delay
+    std    standard deviation; infinite if the delay may be still longer than could be tested
+    shown  whether the log shows that there is a delay
     """
 
     log: str
@@ -62,7 +66,7 @@ class Delay:
 
     @property
     def size(self) -> str:
-        """The delay in seconds without its sign, to two digits of the std."""
+        """Return the delay in seconds without its sign, as text, with two digits of the standard deviation."""
         if not math.isfinite(self.std):
             return f"{abs(self.value):.3g}"
         return f"{abs(self.value):.{self._digits}f}"
@@ -90,7 +94,8 @@ def _late(values: Values) -> str:
 
 
 def at_level(joint: str, level: float, unit: str, share: float) -> str:
-    """Describe a joint whose effort stays at one level in a share of its moving rows; the unit may be unknown."""
+    """Return words for a joint whose effort (torque or current) stays at one level in a share of the rows in which it
+    moves. The unit may be unknown (empty)."""
     return f"{joint} at {f'{level:.4g} {unit}'.rstrip()} in {share:.0%}"
 
 
@@ -102,7 +107,8 @@ def _at_levels(values: Values) -> str:
 
 
 def cycles(order: Sequence[int]) -> list[list[int]]:
-    """Return the cycles of a permutation that are longer than one."""
+    """Return the cycles of a permutation that contain more than one element. Element k is replaced by element
+    order[k]."""
     seen: set[int] = set()
     found = []
     for start in range(len(order)):
@@ -118,7 +124,7 @@ def cycles(order: Sequence[int]) -> list[list[int]]:
 
 
 def exchanges(order: Sequence[int]) -> int:
-    """Return the number of pair exchanges that a permutation consists of."""
+    """Return the smallest number of exchanges of two elements that make up a permutation."""
     return sum(len(cycle) - 1 for cycle in cycles(order))
 
 
@@ -129,9 +135,10 @@ def in_words(
     effort_order: Sequence[int],
     effort_signs: Sequence[int],
 ) -> str:
-    """Return a sentence for the hypothesis that columns of a log are swapped or reversed.
+    """Return words for the suspicion that columns of a log are swapped or reversed.
 
-    Joint k's position is then signs[k] times column order[k] of the log, and its effort likewise.
+    Joint k's position is then signs[k] times column order[k] of the log, and its effort is effort_signs[k] times column
+    effort_order[k].
     """
     parts = []
     if order == effort_order:

@@ -1,4 +1,5 @@
-"""The equations of a model as LaTeX. They contain psdmc's words and numbers only, and no name of a robot file."""
+"""The equations of a model as LaTeX. They contain only symbols that psdmc chooses and numbers, and no name from a robot
+file."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ _LETTERS = re.compile(r"(I|m)?([a-z]*)")
 
 
 def equations_latex(parameters: Sequence[BaseParameter]) -> str:
-    """Return an `aligned` environment (amsmath) with a line for each base parameter: its letter, its equation, its
+    """Return an `aligned` environment (amsmath) with a line for each base parameter: its symbol, its equation and its
     value.
 
     Entries of theta_b are numbered from 0, as in C and Python; joints are numbered from 1.

@@ -1,4 +1,4 @@
-"""Reading of model files. A file may also be damaged, or forged, or no model file at all."""
+"""Reading of model files. The reader expects that a file can be damaged, forged, or no model file."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ ROBOT_FILES = (".urdf", ".toml", ".xml", ".xacro", ".mjcf", ".sdf")
 
 
 def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
-    """Return the given model, or the one in the model file at the given path. Raises InputError for a robot file, and
-    for anything else that is no model."""
+    """Return the given model, or read the model file at the given path. Raises InputError if the argument is the path
+    of a robot file, or of any other file without a model."""
     if isinstance(given, DynamicsModel):
         return given
     if not isinstance(given, str | Path):
@@ -72,7 +72,8 @@ def load(path: str | Path) -> DynamicsModel:
 
 
 def load_bytes(data: bytes, source: Path) -> DynamicsModel:
-    """Return the model in a file's content. Raises InputError, which names the file, as `load` does."""
+    """Return the model from the bytes of a model file. Raises InputError with the file's name, in the cases in which
+    `load` does."""
     try:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):

@@ -23,19 +23,19 @@ BETWEEN_TERMS = re.compile(r" (?=[-+] )")
 
 
 class BaseParameters(tuple[BaseParameter, ...]):
-    """A tuple of the entries of theta_b, which prints itself as a table."""
+    """A tuple with the equation, unit and value of each entry of theta_b. Printed, it is a table."""
 
     __slots__ = ()
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Return a label for each base parameter with its number from 0 and equation, such as 'theta_b[7] Izz2 + a2
-        mx2', cut to LABEL characters."""
+        """Return a label for each base parameter, such as 'theta_b[7] Izz2 + a2 mx2', with its index and equation.
+        Labels are cut to LABEL characters."""
         return tuple(f"theta_b[{k}] {_first_terms(parameter.equation)}" for k, parameter in enumerate(self))
 
     def plain(self) -> list[dict[str, Any]]:
-        """Return values for JSON: number from 0, label, whole equation, unit and value (None if unknown) of each base
-        parameter."""
+        """Return a list with one JSON object per base parameter: number from 0, label, whole equation, unit and value
+        (None if unknown)."""
         named = enumerate(zip(self.labels, self, strict=True))
         return [
             {"index": k, "name": name, "equation": each.equation, "unit": each.unit, "value": each.value}
@@ -43,7 +43,8 @@ class BaseParameters(tuple[BaseParameter, ...]):
         ]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a pandas data frame: index theta_b (0 to l - 1), columns equation, value (NaN if unknown), unit.
+        """Return a pandas data frame with one row per base parameter: equation, value (NaN if unknown) and unit. The
+        index, theta_b, runs from 0 to l - 1.
 
         Raises ToolchainError if pandas is not installed.
         """

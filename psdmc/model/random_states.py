@@ -16,7 +16,7 @@ RANGES = (np.pi, 3.0, 5.0)
 
 
 def random_states(rng: np.random.Generator, *shape: int) -> tuple[Array, Array, Array]:
-    """Return three random arrays of this shape: q, qd and qdd."""
+    """Return three random arrays of the given shape: joint positions q, rates qd and accelerations qdd."""
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, shape) for limit in RANGES)
     return q, qd, qdd
 
@@ -31,5 +31,6 @@ def states_of(robot: Mechanism, rng: np.random.Generator, count: int) -> tuple[A
 
 
 def on_joints(robot: Mechanism, q: Array) -> Array:
-    """Return (k, nq) the nearest positions that the joints can have; for example, quaternions get length one."""
+    """Return, for each of k vectors q, the nearest positions that the joints can have, (k, nq). For example,
+    quaternions get length one."""
     return normalized(frames_of(robot), q.T).T

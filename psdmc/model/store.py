@@ -1,11 +1,12 @@
-"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, with the same bytes for the same model. Arrays
-are not compressed, because compressed bytes differ between versions of zlib.
+"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, with equal bytes for equal models. Arrays are
+not compressed, because compressed bytes differ between versions of zlib.
 
 Arrays: E (5n, p); theta_b (l,), all NaN if unknown; P as P_joint, P_row, P_col, P_value, with one entry of P each,
 joint by joint and row by row; B (l, 11n).
 
-The manifest is a JSON text. It contains format, schema, what the arrays hold, robot, certificate, provenance,
-calibration if there is one (calibrated_json), psdmc version, and the SHA-256 of all of that.
+The manifest is a JSON text. It contains format, schema, what the arrays hold, robot, certificate, provenance and psdmc
+version. If the model is calibrated, it also contains the calibration (calibrated_json). At the end is the SHA-256 of
+the arrays and of the rest of the manifest.
 """
 
 from __future__ import annotations
@@ -126,7 +127,8 @@ def _manifest(model: Model) -> dict[str, Any]:
 
 
 def hash_of(arrays: Arrays, manifest: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a file's arrays and manifest, without the manifest's own content_hash."""
+    """Return the SHA-256 of a model file's arrays and manifest (a JSON text), without the entry content_hash of the
+    manifest."""
     digest = hashlib.sha256()
     plain = {key: value for key, value in manifest.items() if key != "content_hash"}
     digest.update(json.dumps(plain, sort_keys=True, allow_nan=False).encode())

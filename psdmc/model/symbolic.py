@@ -25,11 +25,13 @@ MOST_MONOMIALS = 2000
 def torque_expression(
     robot: Mechanism, expansion: Expansion, joint: int | str, theta_b: Array | None
 ) -> sympy.Expr:
-    """Return tau of one joint (by number from 0, or by name) as a SymPy expression: the sum of its monomials times
-    combinations of theta_b.
+    """Return the torque of one joint as a SymPy expression: the sum of monomials times combinations of theta_b.
 
-    The symbols are real: q1, qd1, qdd1 and so on, with joints numbered from 1 as in the base parameters' equations; and
-    theta_b0 and so on, numbered as the entries of theta_b. If theta_b (l,) is given, its numbers replace the latter.
+    joint    number from 0, or name
+    theta_b  (l,) numbers that replace the symbols theta_b0, theta_b1 and so on; None: the symbols stay
+
+    The symbols q1, qd1, qdd1 and so on are real. In them, joints are numbered from 1, as in the equations of base
+    parameters. Symbols theta_b0 and so on are numbered as the entries of theta_b.
 
     Raises InputError if there is no such joint, or if the torque has more than MOST_MONOMIALS monomials. Raises
     ToolchainError if SymPy is not installed.

@@ -1,5 +1,5 @@
-"""The angles of a PROGRAM (a list of scalar operations): which sines and cosines can be computed together, and what
-must be computed before."""
+"""The angles (arguments of sines and cosines) of a PROGRAM, a list of scalar operations. They are grouped by which can
+be computed together, and what must be computed before."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ TRIGONOMETRIC = frozenset((Op.SIN, Op.COS))
 
 
 def angle_groups(program: Program) -> list[list[int]]:
-    """Return the angles in groups by the number of nested sines on which they depend. Each group depends on earlier
-    groups only."""
+    """Return the angles (arguments of sines and cosines) in groups. The angles of a group can be computed together,
+    because they depend on sines and cosines of earlier groups only."""
     first = next((i for i, (op, _, _, _) in enumerate(program.body) if op in TRIGONOMETRIC), None)
     if first is None:  # as in most parts of a long PROGRAM
         return []
@@ -26,7 +26,7 @@ def angle_groups(program: Program) -> list[list[int]]:
 
 
 def cone(program: Program, roots: list[int]) -> list[int]:
-    """Return all values on which the roots depend, including the roots, in the PROGRAM's order."""
+    """Return the given values `roots` and all values on which they depend, in the PROGRAM's order."""
     needed = [False] * len(program)
     for root in roots:
         needed[root] = True
@@ -38,8 +38,12 @@ def cone(program: Program, roots: list[int]) -> list[int]:
 
 
 def angles_first(program: Program) -> list[list[int]]:
-    """Return all values once, each after its arguments: one list per group of angles, and one for the rest. The list of
-    a group contains what its angles are computed from, then their sines and cosines."""
+    """Return all values of the PROGRAM once, each after its arguments. There is one list per group of angles (see
+    `angle_groups`), and one for the rest.
+
+    The list of a group contains the values from which the angles are computed, then the sines and cosines of the
+    angles.
+    """
     taken: dict[int, list[int]] = {}
     for i, (op, args, _, _) in enumerate(program.body):
         if op in TRIGONOMETRIC:

@@ -1,5 +1,5 @@
-"""A tracer whose values have dimensions. It stops at the first operation with arguments that do not go together, such
-as the sum of a mass and a length."""
+"""A tracer (recorder of operations on symbols) whose values have physical dimensions. It raises an error at the first
+operation with unlike arguments, such as the sum of a mass and a length."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ _append = list.append
 
 
 class UnlikeArguments(Exception):
-    """Raised for an operation with arguments of unlike dimensions. It has the operation and the units of the arguments."""
+    """This error says that an operation has arguments of unlike dimensions. The message has the operation and the units
+    of the arguments."""
 
 
 class DimensionedTracer(Tracer):
-    """A tracer that checks the dimensions of each recorded step. Symbols compute in place and append steps to `steps`,
-    which performs the check."""
+    """A tracer (recorder of operations on symbols) that checks the physical dimensions of each operation. Symbols
+    append each operation to the list `steps`, and this list makes the check."""
 
     __slots__ = ("_own",)
 

@@ -1,7 +1,7 @@
-"""A function for one state, in which equal limbs (such as legs) run in the lanes of a vector.
+"""A function for one state, in which equal limbs (such as legs) run in the SIMD lanes of a vector.
 
-The core is everything that is not in a limb. The operations of limbs are written once, as PROGRAMs of scalars, each
-scalar belonging to one limb. They read the limb's inputs and constants, and values of the core, which are the same for
+The core is everything that is not in a limb. The operations of equal limbs are written once, as PROGRAMs (lists of
+scalar operations) of one limb. They read the limb's inputs and constants, and values of the core, which are equal for
 all limbs. The core reads sums over the limbs. Stages follow one another; each is computed by the core or by one group
 of limbs.
 """
@@ -29,10 +29,10 @@ class LimbGroup:
 
     number     number of the group, which is in the names of its vectors
     count      number of limbs
-    inputs     slots that its stages read, and those of the function's inputs, limb by limb
-    constants  rows of `count` numbers, one for each entry of its vector of constants
-    outputs    slots that its stages store, and those of the function's outputs, limb by limb; one slot of a limb may belong
-               to several slots of outputs
+    inputs     input entries of one limb, each with the function's input entries that belong to it, limb by limb
+    constants  for each constant of one limb, `count` numbers, limb by limb
+    outputs    output entries of one limb, each with the function's output entries that belong to it, limb by limb. An
+               output entry of one limb may occur several times
     """
 
     number: int
@@ -43,7 +43,7 @@ class LimbGroup:
 
     @property
     def name(self) -> str:
-        """The beginning of the names of the group's vectors. Names that belong to a number of limbs begin differently."""
+        """Return the first part of the names of the group's vectors. It contains the number of the group."""
         return group_name(self.number)
 
     @property
@@ -53,7 +53,7 @@ class LimbGroup:
 
     @property
     def partial(self) -> str:
-        """Name of the vector of values that are summed over the limbs."""
+        """Return the name of the vector of values that are summed over the limbs."""
         return f"{self.name}_partial"
 
     @property
@@ -63,7 +63,7 @@ class LimbGroup:
 
     @property
     def kept(self) -> str:
-        """Name of the vector of values that later stages of the group read."""
+        """Return the name of the vector in which the group keeps values for its later stages."""
         return f"{self.name}_kept"
 
     @property
@@ -72,14 +72,14 @@ class LimbGroup:
         return f"{self.name}_output"
 
     def input_of(self, vector: str) -> str:
-        """Return the group's name for an input of the function."""
+        """Return the name of the vector with a limb's entries of the function's input `vector`."""
         return f"{self.name}_{vector}"
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A part of a function with limbs: a PROGRAM and the number of the group whose limbs compute it; None: the core
-    does."""
+    """A part of a function with limbs: a PROGRAM (list of operations), and the number of the group whose limbs compute
+    it. None: the core, everything outside limbs, computes it."""
 
     group: int | None
     program: Program
@@ -87,7 +87,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class LimbProgram:
-    """A function as stages of core and limbs, in their order.
+    """A function as stages, in their order. A group of equal limbs, or the core outside the limbs, computes each stage.
 
     least     the smallest number of lanes with which this is cheaper than the function's straight-line code
     products  matrix products after the stages; None if there are none
@@ -103,7 +103,8 @@ class LimbProgram:
 
 
 def unpacked(limbs: LimbProgram) -> Program:
-    """Return the same function as one PROGRAM of the function's own inputs and outputs, with each limb written out."""
+    """Return the function without lanes, as one PROGRAM (list of operations) with the inputs and outputs of the
+    function. The operations of each limb are written out."""
     tracer = Tracer()
     core: dict[Slot, Value] = {}
     own: dict[tuple[int, int], dict[Slot, Value]] = {

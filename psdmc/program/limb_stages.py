@@ -1,7 +1,8 @@
-"""Division of a PROGRAM of core and limbs into stages, each of which is computed by the core or by one group of limbs.
+"""Division of a PROGRAM (list of operations) with equal limbs into stages. Each stage is computed by one group of
+limbs, or by the core (everything outside limbs).
 
-First come the core's values that do not depend on limbs, then what the limbs compute, then what the core computes from
-sums over limbs, and so on.
+First come the core's values that do not depend on limbs, then the values of the limbs, then the core's values that
+depend on sums over limbs, and so on.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ THE_CORE = -1
 
 
 def staged(program: Program, groups: Sequence[LimbGroup]) -> tuple[Stage, ...]:
-    """Return the stages of a PROGRAM of core and limbs. The PROGRAM reads inputs, constants and sums of groups in
-    addition to the function's inputs. It stores partial sums and outputs of groups in addition to the function's
-    outputs.
+    """Return the stages of a PROGRAM (list of operations) with equal limbs. One group of limbs, or the core outside the
+    limbs, computes each stage.
+
+    In addition to the function's inputs, the PROGRAM reads inputs, constants and sums of the groups. In addition to the
+    function's outputs, it stores outputs of the groups, and values that are to be summed.
 
     Keeps: output values, bit for bit; instructions, except that several stages may repeat constants and loads. Raises
-    InternalError if values of limbs of two groups are combined, or a limb's value is stored as the core's.
+    InternalError if an operation combines values of limbs of two groups, or if a limb's value is an output of the core.
     """
     return _Split(program, groups).stages()
 

@@ -1,7 +1,8 @@
-"""Sums over limbs, in a trace that records one limb of each group for all of them; and which values differ between
-limbs.
+"""Sums over equal limbs in a trace (recorded operations) that contains one limb of each group; and which values differ
+between limbs.
 
-A sum is recorded as an input, as `limb_stages` needs it. Only the data here say which value it is the sum of.
+A sum is recorded as an input of the trace, as `limb_stages` needs it. Only the object LimbSums knows which value is
+summed.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ CORE = -1
 
 
 class LimbSums:
-    """The sums over limbs in one trace. Creating the object registers it with the trace's tracer.
+    """The sums over limbs in one trace (recorded operations). Creating the object registers it with the trace's tracer.
 
-    partials  for each group, index of a value -> number of its sum
-    summed    index of a sum -> index of the value that is summed
+    partials  for each group, index of a value in the trace -> number of the sum over the limbs
+    summed    index of a sum in the trace -> index of the value that is summed
     """
 
     def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
@@ -35,12 +36,16 @@ class LimbSums:
         tracer.limb_sums = self
 
     def add_input(self, vector: str, group: int) -> None:
-        """Declare that the entries of an input vector differ between the limbs of a group."""
+        """Declare that the entries of an input vector of the trace (recorded operations) differ between the limbs of a
+        group."""
         self._owners[vector] = group
 
     def group_of(self, index: int) -> int:
-        """Return the number of the group between whose limbs a value differs; CORE if the value is the same for all
-        limbs."""
+        """Return the number of the group between whose limbs a value differs. Return CORE if the value is equal for all
+        limbs.
+
+        index  index of the value in the trace (recorded operations)
+        """
         groups, steps = self._groups, self.tracer.steps
         for k in range(len(groups), index + 1):
             op, a, b = steps[k]
@@ -53,7 +58,7 @@ class LimbSums:
         return groups[index]
 
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
-        """Return the sum over a group's limbs of a scalar that stands for one value per limb."""
+        """Return the sum of a value over the limbs of a group. The given scalar has one value per limb."""
         if isinstance(value, Lanes):
             return math.fsum(value.values)
         if not isinstance(value, Symbol) or self.group_of(value.index) != group:
@@ -65,7 +70,8 @@ class LimbSums:
         return -found if value.negative else found
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Return new inputs in place of these values. An input differs between limbs if its value does."""
+        """Return new inputs of the trace (recorded operations) that take the place of the given values. A new input
+        differs between limbs if the value does."""
         return [self._stand_in(vector, k, value) for k, value in enumerate(values)]
 
     def _stand_in(self, vector: str, number: int, value: Symbol | Constant) -> Symbol:

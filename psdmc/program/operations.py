@@ -1,7 +1,7 @@
-"""The operations of a PROGRAM, as a table with one entry for each.
+"""The operations of a PROGRAM (list of scalar operations), as a table with one entry for each.
 
 The code that traces, interprets, folds, differentiates, counts, checks, prints and reads PROGRAMs uses this table. Each
-back end has a table from `Op` to its language, and a test checks that it is complete.
+back end (printer for one language) has a table from `Op` to its language, and a test checks that it is complete.
 
 | comparison        | with NaN                              | zeros                                                   |
 |-------------------|---------------------------------------|---------------------------------------------------------|
@@ -9,8 +9,8 @@ back end has a table from `Op` to its language, and a test checks that it is com
 | min a b, max a b  | NaN, whichever of the two is NaN      | of two zeros the second; passes may swap arguments      |
 | select a b x y    | y: no comparison with NaN is true     | y: -0.0 is not less than 0.0                            |
 
-The derivative of a comparison is that of the argument that it returns. At a tie, min and max have the derivative of the
-second argument, and abs has the derivative 1.
+The derivative of a comparison is that of the argument that the comparison returns. If a and b are equal, min and max
+have the derivative of the second argument. At zero, abs has the derivative 1.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ Scalar = Any
 
 
 class Unit(StrEnum):
-    """The kinds of operations for which a target gives latencies and weights. The words are names of their fields
-    (psdmc/target/costs.py).
+    """The kinds of operations for which a target processor has latencies and costs. The texts are names of fields in
+    psdmc/target/costs.py.
 
-    CHOICE  a comparison and the choice by its result, without a branch
+    CHOICE  a comparison that selects one of two values, without a branch
     CALL    an elementary function of the C library, one real at a time
     """
 
@@ -52,15 +52,17 @@ class Unit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """The properties of one operation of PROGRAMs.
+    """The properties of one operation of PROGRAMs (lists of scalar operations).
 
     arity        number of arguments
     unit         the kind as which its cost is counted
-    numbers      its meaning on floats and arrays; on symbols, too, if `written` is set
-    partials     derivative by each argument, from its value and its arguments
-    dimension    dimension of its value, from those of its arguments; raises Unlike if they do not go together
-    ulp          largest error, in units in the last place, of a double in `numbers` and in generated C; 0.5: rounded once
-    written      whether symbols have it as an operator, and simplify it as they record it
+    numbers      function that computes its value for floats and arrays; also for symbols, if `written` is set
+    partials     function that returns the derivative by each argument, from the value and the arguments
+    dimension    function that returns the physical dimension of the value from those of the arguments; raises Unlike if
+                 the operation does not admit them
+    ulp          largest error of a double in `numbers` and in generated C, in units in the last place; 0.5: rounded
+                 once
+    written      whether symbols have it as a Python operator such as +, and simplify it as they record it
     commutative  whether its arguments may be swapped
     parity       effect of the first argument's sign: 'odd' changes the result's sign, 'even' does not change the result
     """
@@ -110,7 +112,8 @@ def _power_partials(value: Scalar, base: Scalar, exponent: Scalar) -> tuple[Scal
 
 
 class Op(StrEnum):
-    """The operations of a PROGRAM's instructions. Their values are the words of PROGRAMs as text.
+    """The operations in PROGRAMs (lists of scalar operations). Their values are the words for them in PROGRAMs that are
+    written as text.
 
     Called with arguments, an operation computes its value: `Op.TANH(x)`, of floats, arrays or symbols.
     """
@@ -215,7 +218,8 @@ class Op(StrEnum):
         return self.numbers(*arguments)
 
     def of_numbers(self, values: Sequence[float]) -> float | None:
-        """Return the operation's value for numbers; None if it is not finite and so cannot be a constant."""
+        """Return the operation's value for numbers as arguments. Return None if the value is not finite, because such a
+        value cannot be a constant of a PROGRAM."""
         with np.errstate(all="ignore"):
             value = float(self.numbers(*map(np.float64, values)))
         return value if math.isfinite(value) else None

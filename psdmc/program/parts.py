@@ -1,7 +1,7 @@
-"""Division of a long PROGRAM into parts that are compiled one by one, because compile time grows faster than the length
-of straight-line code.
+"""Division of a long PROGRAM (list of operations) into parts that are compiled one by one. Compile time grows faster
+than the length of straight-line code.
 
-Each part is a PROGRAM. It stores values that later parts read in vectors that pass from part to part.
+Each part is a PROGRAM. Values that later parts need are stored in vectors, which these parts read.
 """
 
 from __future__ import annotations
@@ -21,7 +21,11 @@ LEEWAY = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The parts of a divided PROGRAM in their order, and the vectors between them with their lengths."""
+    """The parts of a divided PROGRAM (list of operations) in their order, and the vectors that pass values from part to
+    part.
+
+    kept  length of each of these vectors, by name
+    """
 
     programs: tuple[Program, ...]
     kept: Mapping[str, int]
@@ -30,14 +34,14 @@ class Parts:
 def in_parts(
     program: Program, kept_in: Sequence[str], groups: Sequence[Collection[Slot]], late: bool, longest: int
 ) -> Parts:
-    """Divide the PROGRAM into parts of about `longest` operations and stores.
+    """Divide the PROGRAM into parts of about `longest` operations and stores each.
 
-    kept_in  for each value, the vector that takes it if a later part reads it
-    groups   outputs that one part must store together; an output that is in none of them is stored alone
-    late     the last part stores all outputs; otherwise each part stores the outputs that it completes
+    kept_in  for each value, the name of the vector that takes it if a later part reads it
+    groups   groups of output entries that one part must store together; every other entry is stored separately
+    late     True: the last part stores all outputs; False: each part stores the outputs whose values it completes
 
     Keeps: output values, bit for bit. All inputs are read before the first output is stored, in an earlier part or in
-    the same one.
+    the part that stores it.
     """
     return _Cut(program, kept_in, groups, late, longest).parts()
 

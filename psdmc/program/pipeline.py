@@ -1,4 +1,5 @@
-"""The passes that improve a PROGRAM, in their order, with the checker after each of them."""
+"""Runs the passes that improve a PROGRAM (list of operations to generate). After each pass, a checker tests whether the
+PROGRAM still follows the rules."""
 
 from __future__ import annotations
 
@@ -39,8 +40,8 @@ registers do."""
 
 
 def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
-    """Return the last passes for code that computes one state. The time of such code depends on its longest chain of
-    dependent operations. The passes shorten this chain, by the target's latencies."""
+    """Return the last passes of the code generator for code that computes one state. The time of such code depends on
+    its longest chain of dependent operations. The passes shorten this chain, by the target's latencies."""
 
     @wraps(fuse_sums)
     def fuse(program: Program) -> Program:
@@ -58,8 +59,8 @@ one saves less than a thousandth of a humanoid's Coriolis matrix."""
 
 
 def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> Program:
-    """Return a PROGRAM with the same outputs up to rounding, with fewer operations, in the order that suits the target.
-    With `lanes`, the order suits one state per SIMD lane.
+    """Return a PROGRAM (list of operations to generate) that computes equal outputs, up to rounding, with fewer
+    operations. The order of operations suits the target: one state per call or, with `lanes`, one state per SIMD lane.
 
     Raises InternalError, naming the pass, if a pass breaks a rule for PROGRAMs.
     """
@@ -67,10 +68,12 @@ def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> 
 
 
 def shortened(program: Program, of_large: bool = False) -> Program:
-    """Return a PROGRAM with the same outputs in fewer operations, before its instructions are put in order.
+    """Return a PROGRAM (list of operations to generate) that computes equal outputs with fewer operations. The order of
+    instructions is chosen later, by `ordered`.
 
-    For a long PROGRAM, rounds end with the first one that saves no more than LITTLE. With `of_large`, for a robot of
-    many joints, a PROGRAM is long from LONG_OF_LARGE operations on.
+    The passes are applied in rounds, until a round saves nothing. For a long PROGRAM, they end after a round that saves
+    at most the share LITTLE of the operations. A PROGRAM is long from LONG operations on. With `of_large` (a robot of
+    many joints), it is long from LONG_OF_LARGE operations on.
     """
     operations, long = _operations(program), LONG_OF_LARGE if of_large else LONG
     for _ in range(LONGEST):
@@ -85,10 +88,11 @@ def shortened(program: Program, of_large: bool = False) -> Program:
 
 
 def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
-    """Return a shortened PROGRAM in two orders: for one state per call, and for one state per SIMD lane.
+    """Return a PROGRAM (list of operations to generate) in two orders. The first suits one state per call, the second
+    one state per lane of a SIMD vector.
 
-    The orders are the same if the target has no lanes, or if one order serves both. If spilled values also delay the
-    code for one state, this code takes the order that spills less.
+    Both orders are equal if the target has no lanes, or if one order serves both. Spilled values are values that do not
+    fit in registers. If they delay the code for one state, this code takes the order with fewer spilled values.
     """
     last = _applied(LAST, short)
     for_lanes = _applied(LAST_FOR_LANES, last)

@@ -1,5 +1,5 @@
-"""PROGRAM: a list of scalar operations without branches or loops, in which each value is assigned once. All generated
-code is made from PROGRAMs."""
+"""PROGRAM: a list of scalar operations without branches or loops, in which each value is assigned once. C code is
+printed from PROGRAMs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _COMMUTATIVE = frozenset(op for op in Op if op.operation.commutative)
 
 
 class Slot(NamedTuple):
-    """One entry of a named vector: an input to load or an output to store."""
+    """The place of one number in a named array of a function: the array's name, and the index of the entry. An input is
+    loaded from a slot, an output is stored into a slot."""
 
     vector: str
     index: int  # type: ignore[assignment]  # a tuple's method, which nothing here calls
@@ -27,8 +28,11 @@ class Slot(NamedTuple):
 
 
 class Instr(NamedTuple):
-    """One instruction of a PROGRAM. `args` are the indices of earlier instructions, `slot` is for loads, `value` for
-    constants."""
+    """One instruction of a PROGRAM (list of operations to generate): the operation and what it works on.
+
+    `args` are the indices of the earlier instructions whose results it takes. `slot` is the input that a load reads,
+    `value` the number of a constant.
+    """
 
     op: Op
     args: tuple[int, ...] = ()
@@ -36,7 +40,8 @@ class Instr(NamedTuple):
     value: float | None = None
 
     def renumbered(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
-        """Return the same instruction with renumbered arguments; the instruction itself if no number changes."""
+        """Return the instruction with the indices of its arguments replaced by those in `new_index`. If no index
+        changes, return the unchanged instruction."""
         op, args, _, _ = self
         if len(args) == 2:
             moved: tuple[int, ...] = (new_index[args[0]], new_index[args[1]])
@@ -47,8 +52,8 @@ class Instr(NamedTuple):
         return self if moved == args else tuple.__new__(Instr, (op, moved, None, None))
 
     def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
-        """Return the same instruction with renumbered arguments, commutative ones in ascending order; the instruction
-        itself if nothing changes."""
+        """Return the instruction with the indices of its arguments replaced by those in `new_index`. The two indices of
+        a commutative operation, such as a sum, are put in ascending order."""
         op, args, _, _ = self
         if len(args) != 2:
             return self.renumbered(new_index)
@@ -60,16 +65,17 @@ class Instr(NamedTuple):
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:
-    """Return Instr(op, args) in a third of the time. Speed matters because passes make some hundred thousand
-    instructions."""
+    """Return an instruction with this operation and these arguments, three times as fast as Instr(op, args). Speed
+    matters because passes make some hundred thousand instructions."""
     return tuple.__new__(Instr, (op, args, None, None))
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A list of instructions, in which every argument precedes its use, with the values that are stored.
+    """PROGRAM: a list of instructions, in which every argument precedes its use, and the places where results are
+    stored.
 
-    body     instruction i defines value i
+    body     the instructions; the result of instruction i is called value i
     outputs  (slot, index of the value stored there), in order of storing
     """
 
@@ -80,8 +86,8 @@ class Program:
     )
 
     def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Two arrays (k,): the arguments of all instructions in their order, and the instruction to which each belongs.
-        They are computed once."""
+        """Return two arrays (k,) for the k arguments of all instructions. The first has the index of each argument's
+        value, the second that of the instruction that takes it. They are computed at the first call."""
         if not self._arguments:
             given = [args for _, args, _, _ in self.body]
             counts = np.fromiter(map(len, given), np.intp, len(given))
@@ -90,11 +96,12 @@ class Program:
         return self._arguments[0]
 
     def inputs(self) -> tuple[Slot, ...]:
-        """Return the slots that are read, without duplicates, in order of vector name and index."""
+        """Return the inputs that the PROGRAM (list of operations to generate) reads, once each, sorted by vector name
+        and index."""
         return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
 
     def uses(self) -> list[int]:
-        """How often each value is used as an argument or an output."""
+        """Return for each instruction how often its result is an argument of another instruction or an output."""
         count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
         for _, index in self.outputs:
             count[index] += 1

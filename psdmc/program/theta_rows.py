@@ -1,7 +1,8 @@
-"""Variants of functions that read one theta_b per state, for batches of robots with different parameters.
+"""Makes variants of functions that read other base parameters theta_b for each state, for batches of robots with
+different parameters.
 
-Their arithmetic is that of the variant with one theta_b for all states. `thetas` is an input like q, and has the same
-layout in rows and lanes. Nothing that is computed from it is shared between states.
+The arithmetic of a variant is that of the function with one theta_b for all states. The variant reads theta_b from the
+input `thetas`, which is laid out like q. The code repeats all arithmetic on theta_b for each state.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ def by_rows(function: Signature) -> Signature:
 
 
 def kernel_by_rows(kernel: Kernel) -> Kernel:
-    """Return the variant of a kernel that reads one theta_b per state.
+    """Return the variant of a kernel (one generated function with its lists of operations) that reads one theta_b per
+    state.
 
-    Keeps: output values, bit for bit; the PROGRAMs' order.
+    Keeps: output values, bit for bit; the order of operations.
     """
     single = _renamed(kernel.single)
     return replace(

@@ -1,9 +1,11 @@
-"""Products with the inverse of a matrix of limbs on a core (dynamics/arrow.py), computed after a function's limb
-stages.
+"""Computes the last matrix products of functions with the inverse of a mass matrix, for robots with limbs. Limbs are
+equal branches, such as legs, on a core (the other joints).
 
-An entry of an output in the row of one limb and the column of another belongs to both limbs, so stages cannot compute
-it. It is a product of the limb's factor T with rows of the core. These rows are in memory after the stages, with all
-columns next to each other.
+The code for limbs runs in stages, one limb after the other. An entry of the output in the row of one limb and the
+column of another depends on both, so no stage can compute it.
+
+The entry is a product of the limb's factor T with rows of the core (dynamics/arrow.py). After the stages, these rows
+are in memory.
 """
 
 from __future__ import annotations
@@ -24,10 +26,11 @@ INVERSE = "core_inverse"
 
 @dataclass(frozen=True, slots=True)
 class Thin:
-    """An output of a function that a trace with limbs computes as factors of a matrix product.
+    """An output matrix that the code for a robot with limbs (equal branches, such as legs) computes as a product of
+    factors.
 
-    name   of the output
-    known  number of its first columns that the trace computes directly if a floating base carries the whole robot
+    name   name of the output
+    known  number of its first columns that are computed without the factors, if a floating base carries the whole robot
     """
 
     name: str
@@ -36,11 +39,12 @@ class Thin:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """The factor T of one group of limbs in matrix products (ThinProducts).
+    """The place of the factor T of one group of limbs (equal branches, such as legs). T relates the limbs' rows to rows
+    of the core (the other joints); ThinProducts explains the product.
 
-    vector    name of the vector of T: for each row of each limb an entry per carrier
-    rows      the rows of the outputs that belong to the group, limb by limb
-    carriers  numbers of the core's rows to which T's columns belong
+    vector    name of the vector of T: one row after the other, with an entry for each carrier
+    rows      rows of the output matrix that belong to the group, limb by limb
+    carriers  for each column of T, the row of the core that belongs to it, counted within the core from 0
     """
 
     vector: str
@@ -55,12 +59,15 @@ class Shares:
 
 @dataclass(frozen=True, slots=True)
 class ThinProducts:
-    """Outputs n x n that are x = - V E in the rows of the core, and Y - T x in the rows of a limb. Stages compute V, T
-    and E, and store Y in the outputs.
+    """Outputs (n, n) that are products of factors, for a robot with limbs (equal branches, such as legs) on a core.
+
+    The rows x of the core (the other joints) are x = -V E. The rows of a limb are Y - T x. Here V is the core's block
+    of the inverse mass matrix, E the right side, T the factor of the limb. The code for limbs computes V, T and E, and
+    stores Y in the outputs first.
 
     outputs  names of the outputs
-    known    for each output, how many of its first columns stages store themselves
-    n        number of rows and columns
+    known    for each output, the number of first columns that are stored without the products
+    n        number of rows and of columns, which is the number of joint rates
     core     rows of the core
     groups   the factor T of each group of limbs
     """
@@ -73,24 +80,25 @@ class ThinProducts:
 
     @staticmethod
     def right(output: str) -> str:
-        """Return the name of the vector of E: the core's rows, one after the other."""
+        """Return the name of the vector of the factor E of an output: the rows of the core, one after the other."""
         return f"{output}_core"
 
     @property
     def sizes(self) -> dict[str, int]:
-        """The vectors of V, T and E with their lengths."""
+        """Return the vectors of the factors V, T and E: name -> length."""
         wide = len(self.core)
         found = {INVERSE: wide**2} | {group.vector: group.size for group in self.groups}
         return found | {self.right(output): wide * self.n for output in self.outputs}
 
     @property
     def narrowest(self) -> int:
-        """The least number of columns that these products compute in an output."""
+        """Return the smallest number of columns that the products compute in any of the outputs."""
         return self.n - max(self.known)
 
     @property
     def written(self) -> set[Slot]:
-        """The slots that stages need not store: the outputs' rows of the core, and entries of E that are not read."""
+        """Return the entries that the code for limbs does not store. These are the outputs' rows of the core, which the
+        products compute, and entries of E that the products do not read."""
         wide, n = len(self.core), self.n
         found: set[Slot] = set()
         for output, known in zip(self.outputs, self.known, strict=True):
@@ -100,15 +108,16 @@ class ThinProducts:
 
     @property
     def cost(self) -> Cost:
-        """The operations on AT_ONCE columns: a multiply-add for each entry of V and T except the first of each row of
-        V."""
+        """Return the cost of the products. C code computes AT_ONCE columns together, and one operation on them counts
+        once. Each entry of V and T costs a multiply-add, the first of each row of V a multiplication."""
         blocks = sum(-(-(self.n - known) // AT_ONCE) for known in self.known)
         mul = blocks * (len(self.core) ** 2 + sum(group.size for group in self.groups))
         add = mul - blocks * len(self.core)
         return Cost(mul, add, div=0, neg=0, sincos=0, fused=add)
 
     def place(self, slot: Slot, factors: str) -> Slot:
-        """Return the slot in which an entry of a trace's outputs is stored. `factors` is the trace's name for V and T."""
+        """Return the place (slot) in memory of an entry that the recorded arithmetic computes. `factors` is the name of
+        the quantity that contains V and T."""
         row, column = divmod(slot.index, self.n)
         known = dict(zip(self.outputs, self.known, strict=True)).get(slot.vector, self.n)
         if row in self.core and column >= known:
@@ -122,8 +131,8 @@ class ThinProducts:
         return Slot(group.vector, group.rows.index(row) * len(group.carriers) + group.carriers.index(number))
 
     def multiplied(self, stored: Mapping[Slot, Any]) -> Iterator[tuple[Slot, Any]]:
-        """Compute the outputs, entry by entry, from all that stages have stored. Slots that they have not stored are
-        zero."""
+        """Yield each entry of the outputs that the products compute, as (slot, value). `stored` are the factors V, T, E
+        and Y; entries that are missing count as zero."""
         n, wide = self.n, len(self.core)
         for output, known in zip(self.outputs, self.known, strict=True):
             for column in range(known, n):

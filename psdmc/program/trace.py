@@ -1,11 +1,12 @@
-"""Symbols that record each operation on them as a PROGRAM, and simplify it at the same time.
+"""Symbols stand for numbers and record every operation on them in a PROGRAM (list of operations to generate).
+Operations are simplified at the same time.
 
-Equal expressions are recorded once: values are hash-consed, and commutative arguments sorted. A sign is stored with the
-symbol and costs no operation. a - b and b - a, or x * y and x * -y, are therefore one instruction. Exact zeros and ones
-disappear; constants fold and merge along products (which reorders floating point).
+Equal operations are recorded once; the order of commutative arguments does not matter. A sign is stored with the symbol
+and costs no operation. So a - b and b - a, or x * y and x * -y, are one instruction. Exact zeros and ones disappear.
+Constants along a product are multiplied into one, which reorders floating point.
 
-A search traces some hundred programs. To be fast, the arithmetic of symbols is written out without calls, on plain
-tuples, which become instructions only in `finish`.
+A search for the best arrangement records some hundred PROGRAMs. For speed, the arithmetic of symbols works on plain
+tuples without function calls. `finish` turns the tuples into instructions.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _LOAD, _CONST = Op.LOAD, Op.CONST
 
 
 def arguments_of(step: Step) -> tuple[int, ...]:
-    """Return the indices of the values that are the arguments of a step."""
+    """Return the indices of the values that a recorded operation takes as arguments."""
     op, a, b = step
     if b is not None:
         return (a, b)
@@ -45,33 +46,39 @@ Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
 
 
 def group_name(group: int) -> str:
-    """Return the beginning of the names of a limb group's vectors."""
+    """Return the prefix, such as 'group0', of the names of all vectors of a limb group (equal branches, such as
+    legs)."""
     return f"group{group}"
 
 
 def constants_of(group: int) -> str:
-    """Return the name of the vector with the constants of a group of limbs."""
+    """Return the name of the vector that holds the constants that differ between the limbs of a group. Limbs are equal
+    branches, such as legs."""
     return f"{group_name(group)}_constants"
 
 
 class SumsOverLimbs(Protocol):
-    """The interface through which a tracer uses its sums over limbs (limb_sums.py)."""
+    """The interface by which a Tracer (recorder of operations) sums values over limbs, which are equal branches such as
+    legs. The class that implements it is in limb_sums.py."""
 
     summed: dict[int, int]
 
     def group_of(self, index: int) -> int:
-        """Return the number of the group between whose limbs a value differs; -1 if the value is the same for all
-        limbs."""
+        """Return the number of the limb group (equal branches, such as legs) on whose limb a value depends. Return -1
+        if the value does not depend on a limb."""
 
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
-        """Return the sum over a group's limbs of a scalar that stands for one value per limb."""
+        """Return the sum of a value over all limbs of a group. The arithmetic of a limb is recorded once, so one symbol
+        stands for the value of every limb."""
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Return new inputs in place of these values. An input differs between limbs if its value does."""
+        """Return new input symbols that stand for these values. An input differs between limbs (equal branches) if its
+        value does."""
 
 
 class Tracer:
-    """Records steps; `symbols` makes inputs, and `finish` makes the PROGRAM."""
+    """Records operations on symbols. `symbols` makes inputs, and `finish` makes the PROGRAM (list of operations to
+    generate)."""
 
     __slots__ = ("_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
@@ -88,7 +95,8 @@ class Tracer:
         return [self.symbol(Slot(vector, i)) for i in range(count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Return new inputs in place of these values, until the values are substituted (replay.py)."""
+        """Return new input symbols that stand for these values. Later, `substituted` (replay.py) puts the values in
+        their place."""
         if self.limb_sums is None:
             return self.symbols(vector, len(values))
         return self.limb_sums.stand_ins(vector, values)
@@ -98,7 +106,8 @@ class Tracer:
         return Symbol(self, self.record((_LOAD, slot, None)))
 
     def record(self, step: Step) -> int:
-        """Return the index of a step's value. The step is recorded, unless an equal one was recorded before."""
+        """Return the index of the value that an operation computes. The operation is recorded if no equal operation has
+        been."""
         index = self.known.get(step)
         if index is None:
             index = self.known[step] = len(self.steps)
@@ -106,7 +115,7 @@ class Tracer:
         return index
 
     def constant(self, value: Constant) -> Symbol:
-        """Return a symbol for a constant; the sign is stored in the symbol."""
+        """Return a symbol for a constant. The recorded constant is positive; the symbol stores the sign."""
         if isinstance(value, Lanes):
             return self._lanes(value)
         # A Python number even where it is NumPy's: signs are compared by identity, which fails for its booleans.
@@ -136,14 +145,15 @@ class Tracer:
         return index
 
     def arguments(self, index: int) -> tuple[int, ...]:
-        """Return the indices of a value's arguments; for a sum over limbs, the index of the summed value."""
+        """Return the indices of the arguments of the value with this index. A sum over limbs (equal branches) has one
+        argument: the value that is summed."""
         if self.limb_sums is not None and index in self.limb_sums.summed:
             return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
 
     def finish(self, outputs: Outputs) -> Program:
-        """Return the PROGRAM that stores the given values. Steps that no output needs are left out. A negative value
-        costs a negation."""
+        """Return the PROGRAM (list of operations to generate) that stores these values as outputs. Operations that no
+        output needs are left out. If the symbol of an output has a minus sign, a negation is added."""
         stored = self.stored(outputs)
         steps = self.steps
         needed = [False] * len(steps)
@@ -165,7 +175,8 @@ class Tracer:
         return Program(tuple(body), tuple((slot, places[i]) for slot, i in stored))
 
     def cost(self, outputs: Outputs) -> Cost:
-        """Return the cost of the PROGRAM that `finish` would return, without making it. Searches only compare costs."""
+        """Return the number of operations of each kind in the PROGRAM that `finish` would return. It is faster than
+        `finish`, for searches that only compare costs."""
         stored = self.stored(outputs)
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
@@ -200,7 +211,8 @@ class Tracer:
         return counted(others, mul, len(sums), len(angles), fused)
 
     def stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
-        """Return the outputs with the indices of their values. Constants and negative values are recorded."""
+        """Return for each output its place (slot) and the index of its value. Outputs that are constants or have a
+        minus sign are recorded as operations first."""
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
             if isinstance(value, Lanes):
@@ -212,8 +224,8 @@ class Tracer:
         return stored
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """Record an operation for which symbols have no operator, and return its value. If all arguments are numbers,
-        the result is a constant, if it is finite."""
+        """Record an operation, such as a square root, for which Python has no operator, and return a symbol for its
+        result. If all arguments are numbers and the result is finite, the result is a constant."""
         given = [each if isinstance(each, Symbol) else self.constant(each) for each in arguments]
         known = [value for each in given if isinstance(value := each.constant_value(), float)]
         if len(known) == len(given):
@@ -313,16 +325,17 @@ class Symbol:
         return Symbol(self.tracer, sine, self.negative), Symbol(self.tracer, cosine)
 
     def root(self) -> Symbol:
-        """Return the square root; for a constant, a constant."""
+        """Return the square root of this symbol. If the symbol is a constant, the root is a constant, too."""
         return self.tracer.operated(Op.SQRT, (self,))
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """Return the value of an operation on symbols and constants; this symbol is one of its arguments."""
+        """Return the result of an operation, such as a minimum, on symbols and numbers. This symbol is one of the
+        arguments."""
         return self.tracer.operated(op, arguments)
 
     @property
     def slot(self) -> Slot | None:
-        """The input slot if this symbol is an input; None if it is computed."""
+        """Return the place (slot) that this symbol is loaded from if it is an input; None if it is computed."""
         op, slot, _ = self.tracer.steps[self.index]
         return slot if op is _LOAD and not self.negative else None
 

@@ -1,9 +1,8 @@
-"""Rotated pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Each is the derivative of the other by
-the angle, up to sign.
+"""Finds rotated pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Here c and s are the cosine and the
+sine of an angle. The derivative of y0 by the angle is y1, and that of y1 is -y0.
 
-The derivative, by an angle, of a sum of two products with the angle's sine and cosine is another such sum. If a vector
-is rotated, this other sum is recorded already. The derivative then uses it instead of differentiating sine and cosine.
-This takes one product instead of two products and one sum.
+If a vector is rotated, both values of such a pair are recorded. The derivative by the angle then uses the other value
+and needs no derivatives of sine and cosine. This takes one product instead of two products and one sum.
 """
 
 from __future__ import annotations
@@ -21,19 +20,18 @@ _SUMS = (Op.ADD, Op.SUB)
 
 
 class Part(NamedTuple):
-    """A value on which a rotated value depends linearly: its index, and the sine or cosine, with sign, by which it is
-    multiplied."""
+    """One term of a rotated value y = c x0 + s x1: the index of x0 or x1, and its factor, a signed sine or cosine."""
 
     value: int
     factor: Symbol
 
 
 class Turned(NamedTuple):
-    """One value of a rotated pair, as a function of the angle and of the rotated values.
+    """One value y = c x0 + s x1 of a rotated pair, with the cosine c and the sine s of an angle.
 
     angle  index of the angle
-    slope  the recorded derivative by the angle
-    parts  the rotated values
+    slope  symbol of the derivative of y by the angle, which is the other value of the pair
+    parts  the terms c x0 and s x1
     """
 
     angle: int
@@ -50,9 +48,9 @@ class _Product(NamedTuple):
 
 
 class TurnedPairs:
-    """Finds rotated pairs among a tracer's values.
+    """Finds pairs y0 = c x0 + s x1 and y1 = c x1 - s x0 among the values that a tracer has recorded.
 
-    needed  for each value whether it is used anyway; other values are not worth computing
+    needed  for each recorded value, whether the code computes it anyway; a pair is used only if both values are
     """
 
     def __init__(self, tracer: Tracer, needed: Sequence[bool]) -> None:
@@ -60,8 +58,8 @@ class TurnedPairs:
         self._uses = _uses(tracer, needed)
 
     def of(self, index: int) -> Turned | None:
-        """Return the rotated pair to which value `index` belongs. None if there is none, or if its derivative is not
-        recorded."""
+        """Return the rotated value (see Turned) with this index. Return None if the value is not of the form c x0 + s
+        x1, or if its derivative by the angle is not recorded."""
         op, a, b = self._tracer.steps[index]
         if op is Op.MUL:
             for product in self._products(index):

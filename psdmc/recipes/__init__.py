@@ -1,1 +1,2 @@
-"""The parts from which generated functions are made; the functions themselves are in psdmc/functions."""
+"""The parts of which recipes for generated functions consist. A recipe says how one function is computed and tested;
+the recipes are in psdmc/functions."""

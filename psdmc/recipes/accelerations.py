@@ -1,4 +1,4 @@
-"""Forward dynamics, recorded on symbols for all functions that need it."""
+"""Records forward dynamics (accelerations from torques) as code, for all generated functions that need it."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ MASS_MATRIX = SymmetricMatrix(
 
 
 def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Arrow]:
-    """Return n accelerations M^-1 (tau - h), and the factors of M.
+    """Return the n joint accelerations M^-1 (tau - h), where M is the mass matrix and h the torque at zero
+    acceleration. Return the factors of M, too.
 
-    The mass matrix is factorized before the bias h is computed. Its divisions depend on each other, and the processor
-    can compute the recursion for h meanwhile.
+    M is factorized before h is computed. The divisions of the factorization must wait for each other, and the processor
+    computes h meanwhile.
     """
     factors = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
@@ -38,8 +39,11 @@ def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], 
 def accelerations_and_pivots(
     g: Ingredients, tau: Sequence[Scalar]
 ) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
-    """Return nv accelerations M^-1 (tau - h) and the nv pivots of M, by a factorized mass matrix or by articulated
-    bodies, as `choices` says."""
+    """Return the nv joint accelerations M^-1 (tau - h), and the nv pivots (divisors in the factorization) of the mass
+    matrix M. Here h is the torque at zero acceleration.
+
+    `choices` selects the algorithm: factorization of M, or articulated bodies.
+    """
     if not g.choices.articulated:
         found, factors = accelerations(g, tau)
         return found, factors.pivots

@@ -1,4 +1,4 @@
-"""Functions whose output is a vector of those entries of a matrix that can differ from zero."""
+"""Functions that return only those entries of a matrix that can differ from zero, as a vector."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ VALUES = Quantity(
 
 
 def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packing) -> Recipe:
-    """Return the recipe of a function that packs the output of `dense`, a function with one matrix as its output."""
+    """Return the recipe of a function that returns the nonzero entries of a matrix as a vector. The function `dense`
+    computes the whole matrix."""
     function, (matrix,) = dense.signature, dense.signature.outputs
 
     def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -51,7 +52,8 @@ def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packi
 
 
 def unpacked(packing: Packing, dense: Recipe, robot: RobotOnArrays, values: Array) -> Arrays:
-    """Return the matrix output of `dense` from the values (k, nonzeros) of the function that packs it."""
+    """Return the whole matrices that `dense` would return, from the vectors (k, nonzeros) of their nonzero entries, for
+    k states."""
     (matrix,) = dense.signature.outputs
     lengths = {"nv": robot.nv, "l": robot.lift.shape[1]}
     found = np.zeros((len(values), *(lengths[axis] for axis in matrix.axes)))

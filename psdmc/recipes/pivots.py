@@ -1,4 +1,5 @@
-"""Tests for matrices that are singular at some states, from their pivots and inverses."""
+"""Tests whether matrices in generated code are singular at a state, from pivots (divisors of a factorization) and from
+their inverses."""
 
 from __future__ import annotations
 
@@ -17,9 +18,9 @@ def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar
     """Return the inverse of a symmetric matrix, and a sign: 1 if the matrix is positive definite, else -1. A matrix
     that is singular within rounding has the sign -1, too.
 
-    Rounding gives a singular matrix pivots of any sign, but its inverse is large, in whatever order it is eliminated.
-    The comparison x < x + 1 is false if x is so large that the 1 is lost in rounding. All comparisons with NaN are
-    false.
+    By rounding, the pivots (divisors of the factorization) of a singular matrix can have any sign. So the test also
+    uses the size of the inverse. The comparison x < x + 1 is false if x is so large that the 1 is lost in rounding. All
+    comparisons with NaN are false.
     """
     factors = factorize(rows)
     found, sign = inverse(factors), 1.0
@@ -29,9 +30,10 @@ def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar
 
 
 def regular(sign: Scalar, pivot: Scalar, entry: Scalar, inverse_entry: Scalar) -> Scalar:
-    """Return the given sign, or -1 if the pivot is not positive or the matrix is singular within rounding.
+    """Return `sign` unchanged if a matrix passes the test of one row, else -1. The test fails if the pivot (divisor of
+    the factorization) is not positive, or if the matrix is singular within rounding.
 
-    The test uses one entry of the matrix's diagonal and the same entry of the inverse's diagonal.
+    `entry` is the diagonal entry of the matrix, `inverse_entry` that of the inverse.
     """
     x = LOST * (entry * inverse_entry)
     return Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)

@@ -1,5 +1,5 @@
-"""The recipe of a generated function. It says how the function is computed and with what it is compared. Each file of
-psdmc/functions contains one."""
+"""The class Recipe, which says how a generated function is computed and with what it is compared. Each file of
+psdmc/functions contains one recipe."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Arrays = dict[str, Array]
 
 
 class ByTheta(NamedTuple):
-    """Base parameters as l symbols, and the bodies and drive inertias that depend on them."""
+    """The base parameters theta_b as l symbols, and the bodies and the drive inertias computed from these symbols."""
 
     theta_b: list[Any]
     bodies: tuple[Body, ...]
@@ -39,30 +39,34 @@ class ByTheta(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ingredients:
-    """Everything from which a function is recorded: symbols for its inputs, and one robot's constants.
+    """Everything from which the code of a function is recorded: symbols for the function's inputs, and the constants of
+    one robot.
 
-    Each is a quantity with a dimension and a value in units that lowering chooses (lower/units.py). A sum of unlike
-    quantities is an error.
+    Each symbol and constant is a quantity with a dimension and a value in units that lowering chooses (lower/units.py).
+    A sum of unlike quantities is an error.
 
     frames             n joint frames
     base_acceleration  minus gravity, along the base's axes (see base_axes)
-    bodies             n bodies about the joint frames, from theta_b. They have the torques of the real ones, but not
-                       their masses. Empty for functions without theta_b
-    drives             n drive inertias, from theta_b; empty likewise
-    choices            the arrangement of the recursions
-    base_axes          the axes in which the first frame is given, as columns in the base frame
-    base_origin        the origin from which the first frame is given, in the base frame
-    link_frames        n, the file's link frames in the joint frames
+    bodies             n bodies about the joint frames, computed from theta_b. They give the torques of the real bodies,
+                       but have other masses. Empty for functions that do not use theta_b
+    drives             n inertias of the joints' drives, computed from theta_b. Empty for functions that do not use
+                       theta_b
+    choices            which of several equal ways each recursion along the robot is computed in
+    base_axes          axes in which the placement of the first joint is given: columns, in the base frame
+    base_origin        origin from which the placement of the first joint is given, in the base frame
+    link_frames        placements of the n link frames of the robot file in the joint frames
     named              the named frames, placed in the joint frames
     tip                the tip frame, in the joint frame of tip_body
     tip_body           the body to which the tip frame is fixed
-    lift               (11 n, l) theta_b to standard parameters about the link frames
-    link_bodies        returns the links' real n bodies about the joint frames; NaN if unknown
-    si                 returns a constant from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'). A number without unit
-                       needs no si
+    lift               (11 n, l) matrix that gives standard parameters about the link frames from theta_b
+    link_bodies        returns the n bodies with the robot file's standard parameters, about the joint frames; NaN if
+                       unknown
+    si                 returns a constant from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'). A number without
+                       unit needs no si
     inputs             the function's inputs by name
-    by_theta           returns theta_b as symbols, also if it is compiled in, for derivatives by it. The derivatives of
-                       quantities that are linear in theta_b, such as torques, do not depend on its values
+    by_theta           returns theta_b as symbols, for derivatives by theta_b. The function can be called even if the
+                       code contains fixed values of theta_b: torques are linear in theta_b, so derivatives do not
+                       depend on the values
     """
 
     frames: tuple[Frame, ...]
@@ -84,7 +88,8 @@ class Ingredients:
 
     @property
     def root(self) -> tuple[Matrix, Vector]:
-        """The axes and the origin, in the base frame, in which the first frame is given."""
+        """Return the axes and the origin, in the base frame, relative to which the placement of the first joint is
+        given."""
         return self.base_axes, self.base_origin
 
     @property
@@ -94,7 +99,8 @@ class Ingredients:
 
 
 class Polynomials(StrEnum):
-    """Which part of the torques' polynomials (in E, P and theta_b) a function computes. The expanded lowering uses it."""
+    """The terms of the joint torques that a function computes in the expanded form of code. There the torques are sums
+    of products of theta_b, constants, and functions of q, qd and qdd."""
 
     TORQUE = "all terms"
     MASS = "terms of qdd"
@@ -105,7 +111,7 @@ class Polynomials(StrEnum):
 
 
 class Needs(StrEnum):
-    """What a model must have for a function, in addition to theta_b."""
+    """A property of a model, besides known base parameters, that a generated function needs."""
 
     POSITIVE_MASS = "a positive definite mass matrix"
     STANDARD = "standard parameters of its links"
@@ -113,11 +119,12 @@ class Needs(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """The entries of a matrix that a function with packed output stores.
+    """The entries of a matrix that a function with packed output (a vector of nonzero entries) stores.
 
     function     name of the function whose only output is the whole matrix
-    places       returns their (row, column), from the robot and the lift of its base parameters
-    is_triangle  whether they are a symmetric matrix's lower triangle
+    places       returns the entries' rows and columns, from the robot and the matrix that gives standard parameters
+                 from base parameters
+    is_triangle  whether the entries are the lower triangle of a symmetric matrix
     """
 
     function: str
@@ -127,33 +134,37 @@ class Packing:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """One generated function.
+    """Everything about one generated function: name, arguments, computation, and comparison with Pinocchio.
 
-    signature    its name, inputs and outputs
-    title        its name in prose
-    trace        records its arithmetic on symbols, with the algorithms of psdmc.dynamics
-    reference    the same in NumPy on the MODEL's own frames and bodies, without lowering: (robot, given) to the values of
-                 all outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
-    against      name of Pinocchio's function with which it is compared
-    pinocchio    the values of Pinocchio's function: (model on arrays, given)
+    signature    the function's name, inputs and outputs
+    title        the function's name in documents
+    trace        records the function's arithmetic on symbols, with the algorithms of psdmc.dynamics
+    reference    computes all outputs in NumPy from the model's frames and bodies, without generated code: takes (robot,
+                 given). `given` holds q, qd, qdd, tau and other inputs for many states; tau are the torques of q, qd
+                 and qdd
+    against      name of Pinocchio's function with which the results are compared
+    pinocchio    computes the results with Pinocchio: takes (robot, given)
     starts       name of the function whose search chooses the positions of frames and the unit of length
-    shares       name of the function whose whole arrangement is used; only the choices of recursion are made again
-    matters      fields of Choices that make a difference to it
-    polynomials  which part of the torques' polynomials it is; None: it has no expanded lowering
-    times_theta  whether its outputs times theta_b are torques and are compared as such: `pinocchio` returns these torques
-    gradient     name of its output that is the gradient, by theta_b, of a number linear in theta_b. Multiplied by
-                 theta_b, the gradient is compared with that number, which `pinocchio` returns
-    beside       name of a function if outputs are differences of that function's values: errors are relative to those
+    shares       name of a function whose search results are used, too; only the choices among recursions are made again
+    matters      fields of Choices that change the function's code
+    polynomials  which terms of the torques' polynomials the function computes; None: the function has no expanded form
+                 of code
+    times_theta  whether the outputs times theta_b are torques, and `pinocchio` returns these torques for comparison
+    gradient     name of the output that is the gradient, by theta_b, of a scalar linear in theta_b. The gradient times
+                 theta_b is compared with this scalar, which `pinocchio` returns
+    beside       name of another function if the outputs are differences of its values: errors are relative to the
+                 values of this other function
     needs        what the model must have; left out: a positive definite mass matrix if the signature factorises one
-    in_limbs     whether its algorithms mark sums over limbs (Frame.limbs), so that limbs can run in SIMD lanes
-    accelerates  whether it computes accelerations, by the cheaper of two algorithms (Choices.articulated)
-    default      whether it is generated if the user names no functions
-    default_where_wide  the same for robots with joints of several coordinates
-    benched      whether `make bench` measures it
-    packs        the entries of another function's matrix that it stores: that function is lowered, and the other entries are
-                 left out. `trace`, and the values of `pinocchio`, are those of that function
-    regions      its body as loops and calls, from which C is printed; `trace` executes them. None: C is printed from
-                 straight-line code
+    in_limbs     whether the algorithms mark sums over limbs (equal branches, such as legs), so that limbs can run in
+                 SIMD lanes
+    accelerates  whether the function computes accelerations, by the cheaper of two algorithms (Choices.articulated)
+    default      whether the function is generated if the user names no functions
+    default_where_wide  `default` for robots that have joints of several coordinates, such as a floating base
+    benched      whether `make bench` measures the function
+    packs        the entries of another function's matrix that the function stores. The code of the other function is
+                 generated, and all other entries are left out. `trace` and `pinocchio` compute the whole matrix
+    regions      the function's body as loops and calls, from which C is printed; `trace` executes this body. None: C is
+                 printed from code without loops
     """
 
     signature: Signature

@@ -1,4 +1,5 @@
-"""One step of an integrator: its inputs and outputs, and its Jacobians from the derivatives of accelerations."""
+"""One time step of an integrator: the descriptions of inputs and outputs, and the Jacobians of the new state by the old
+state."""
 
 from __future__ import annotations
 
@@ -54,8 +55,8 @@ def stepped(values: Sequence[Scalar], rates: Sequence[Scalar], dt: Scalar) -> li
 
 
 def turned(frames: Sequence[Frame], q: Array, way: Array) -> Array:
-    """Return (k, nq) the positions after motion from q (k, nq) at constant rates; `way` (k, nv) are the rates times
-    seconds."""
+    """Return the joint positions (k, nq) after a motion from q (k, nq) at constant joint rates. `way` (k, nv) are the
+    rates multiplied by the duration."""
     return columns(integrated(frames, list(q.T), list(way.T)), len(q))
 
 
@@ -67,11 +68,15 @@ def step_on_arrays(given: Mapping[str, Array]) -> Array:
 def semi_implicit(
     by_q: Rows, by_qd: Rows, by_tau: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]
 ) -> tuple[list[Any], list[Any]]:
-    """Return the Jacobians A and B of a semi-implicit Euler step from the derivatives of accelerations, nv x nv each.
-    They are along the tangents at both ends.
+    """Return the Jacobians A and B of a semi-implicit Euler step. A has the derivatives of the new state by the old
+    state, B those by the torques.
 
-    d qd_next = d qd + dt d qdd and, if q is a vector, d q_next = d q + dt d qd_next. For joints of several rates,
-    `slopes` replace the factors one in the latter.
+    by_q, by_qd, by_tau   derivatives (nv, nv) of the accelerations
+    slopes                for each joint of several rates, such as a ball joint, the derivatives of the new position by
+                          the old one and by the motion; None for a joint of one rate
+
+    Changes of the state are small motions along the joint rates. They are d qd_next = d qd + dt d qdd and, for joints
+    of one rate, d q_next = d q + dt d qd_next.
     """
     rates = [
         [dt * x for x in row] + _plus_one(i, [dt * x for x in own])
@@ -114,8 +119,11 @@ def _plus_one(i: int, row: list[Scalar]) -> list[Scalar]:
 def semi_implicit_on_arrays(
     by_q: Array, by_qd: Array, by_tau: Array, dt: Array, slopes: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Return the Jacobians (k, 2 nv, 2 nv) and (k, 2 nv, nv) of `semi_implicit`, computed on arrays as products of the
-    two half steps. `slopes` (k, nv, nv) are the derivatives of `integrate` by its two arguments."""
+    """Return the Jacobians A (k, 2 nv, 2 nv) and B (k, 2 nv, nv) of a semi-implicit Euler step for k states, in NumPy.
+    They are products of the Jacobians of two parts: the change of rates, then the change of positions.
+
+    `slopes` are two arrays (k, nv, nv): the derivatives of the new position by the old one and by the motion.
+    """
     by_start, by_way = slopes
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
@@ -126,7 +134,8 @@ def semi_implicit_on_arrays(
 
 
 def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:
-    """Return (k, nv, nv) each: the derivatives of the end position of `integrate` by its start and by the way (k, nv)."""
+    """Return the derivatives of the new position of a motion at constant rates, two arrays (k, nv, nv) for k states.
+    The first is by the old position, the second by the motion `way` (k, nv), which is rates times duration."""
     count, nv = way.shape
     by_start, by_way = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
     first = first_rates(frames)

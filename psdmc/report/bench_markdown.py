@@ -38,8 +38,8 @@ GRADIENTS = tuple(
 
 
 def markdown(result: BenchResult, command: str = "make bench") -> str:
-    """Return tables of ns per state. Brackets show how many times faster psdmc is than Pinocchio and CasADi's C for one
-    state."""
+    """Return tables of psdmc's time in ns per state. The numbers in brackets say how many times faster psdmc is than
+    Pinocchio, and than C code of CasADi."""
     return "\n".join(_lines(result, command)) + "\n"
 
 

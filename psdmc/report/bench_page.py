@@ -105,7 +105,7 @@ def _environment() -> Environment:
 
 
 def read_result(path: Path) -> BenchResult:
-    """Read a benchmark result from JSON. Raise InputError if the file is missing or something else."""
+    """Read a benchmark result from JSON. Raise InputError if the file is missing or is no benchmark result."""
     try:
         text = read_file(path, LARGEST_RESULT, "make it with: psdmc bench --json").decode()
     except (OSError, UnicodeDecodeError) as error:

@@ -1,5 +1,5 @@
-"""Plots of the benchmark as inline SVG. They load nothing from the network, keep text as text, and use the page's
-colours."""
+"""Plots of the benchmark as SVG elements in the page. They load nothing from the network, keep text as text, and use
+the page's colours."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ def bars(case: CaseResult, function: str) -> str:
 
 
 def scaling(result: BenchResult, function: str) -> str:
-    """Draw times against the number of joints, for psdmc's two lowerings (factored and expanded) and Pinocchio."""
+    """Draw times against the number of joints, for Pinocchio and for psdmc's two forms of code (factored and
+    expanded)."""
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()

@@ -21,7 +21,8 @@ LAYOUT_TITLES = {"state": "one state per call", "rows": "batch, rows", "lanes": 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of a robot's table, as text: one library's result. `ours` is true for psdmc."""
+    """One row of a robot's table in the benchmark page, as text: the result of one library. `ours` is true for
+    psdmc."""
 
     who: str
     how: str
@@ -48,7 +49,8 @@ class FunctionTable:
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """A robot's row in the first table: how many times faster psdmc is than Pinocchio, and than CasADi's C."""
+    """A robot's row in the first table of the benchmark page: how many times faster psdmc is than Pinocchio, and than C
+    code of CasADi."""
 
     robot: str
     inverse_ns: str
@@ -64,8 +66,8 @@ class Headline:
 
 
 def headlines(result: BenchResult) -> tuple[Headline, ...]:
-    """Return, for every robot, psdmc's speed relative to Pinocchio's shipped library, with Pinocchio's faster
-    algorithm."""
+    """Return for every robot how many times faster psdmc is than the installed Pinocchio library. Pinocchio's faster
+    algorithm counts."""
     return tuple(_headline(case) for case in result.cases)
 
 
@@ -87,7 +89,7 @@ def _headline(case: CaseResult) -> Headline:
 
 
 def function_tables(case: CaseResult) -> tuple[FunctionTable, ...]:
-    """Return a table for each function that was measured on a robot."""
+    """Return a table of times for each function that was measured on a robot."""
     functions = dict.fromkeys(m.function for m in case.measurements)
     return tuple(FunctionTable(FUNCTION_TITLES[f], tuple(_rows(case, f))) for f in functions)
 
@@ -119,7 +121,8 @@ def _row(m: Measurement, reference: float | None) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class Quoted:
-    """A row of the paper's table 5 or of psdmc's version of it: times in microseconds, and ratios to the first row."""
+    """A row of table 5 of the paper Denso-2022, as printed or measured on this machine. It has the times of one library
+    in microseconds, and their ratios to the first row."""
 
     method: str
     inverse: str
@@ -137,7 +140,8 @@ def quoted_table() -> tuple[Quoted, ...]:
 
 
 def own_table(result: BenchResult) -> tuple[Quoted, ...]:
-    """Return the paper's table 5 with times measured on this machine; empty if the Denso robot was not measured."""
+    """Return table 5 of the paper Denso-2022 with times measured on this machine. The table is empty if the Denso robot
+    was not measured."""
     case = next((case for case in result.cases if case.name == "Denso"), None)
     if case is None:
         return ()
@@ -161,8 +165,8 @@ def _quoted(method: str, inverse: float, forward: float, inverse_one: float, for
 
 @dataclass(frozen=True, slots=True)
 class PublishedRow:
-    """Times that the authors of the method published, with psdmc's times for the same form of code and for its
-    default."""
+    """A robot's row in the table of times that the method's authors published. Beside them are psdmc's times for the
+    authors' form of code (expanded) and for psdmc's default form (factored)."""
 
     robot: str
     source: str
@@ -173,7 +177,8 @@ class PublishedRow:
 
 
 def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
-    """Return inverse and forward dynamics in ns for the robots whose times the authors published."""
+    """Return rows with the times of inverse and forward dynamics in ns, for the robots whose times the method's authors
+    published."""
     rows = []
     for case in result.cases:
         theirs = PUBLISHED.get(case.name)
@@ -244,7 +249,8 @@ class ThreadRow:
 
 
 def thread_rows(result: BenchResult) -> tuple[ThreadRow, ...]:
-    """Return the times in ns per state by number of threads, and how many times faster the most threads are than one."""
+    """Return rows with the times in ns per state by number of threads. A row says how many times faster the most
+    threads are than one thread."""
     rows = []
     for case in result.cases:
         for function, layout in dict.fromkeys((t.function, t.layout) for t in case.threads):

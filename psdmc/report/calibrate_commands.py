@@ -47,7 +47,8 @@ def excite_command(
     """Plan a calibration campaign for a model. Write trajectories, campaign.toml, excitation.json, .csv and .svg into
     `folder`.
 
-    force   replace the plan of an existing campaign; without it, raise InputError before the search
+    force   replace the plan of an existing campaign; without `force`, a campaign in the folder gives an InputError
+            before the search
     """
     began = cpu_seconds()
     options = options or CampaignOptions()
@@ -59,7 +60,7 @@ def excite_command(
     one_period = plan.found.motion.sampled(known.joint_names, options.sweep.period)
     picture = excitation_figure(plan.found, known.joint_names, [joint.limits for joint in plan.chain.joints])
     with being_written(folder):
-        campaign = write_campaign(folder, plan.runs, plan.found, options.table, force=force)
+        campaign = write_campaign(folder, plan.runs, plan.found, options.table, options.formats, force=force)
         write_trajectory(one_period, campaign.parent / "excitation.csv")
         write_whole(campaign.parent / "excitation.svg", picture)
     return plan
@@ -71,7 +72,8 @@ def simulate_command(
     options: SimulateOptions | None = None,
     progress: Progress = silent,
 ) -> int:
-    """Write a campaign's logs from a virtual robot. Return how many logs were simulated; the others were up to date."""
+    """Write the logs of a calibration campaign as a virtual (simulated) robot would record them. Return how many logs
+    were simulated; the others were up to date."""
     return simulate_campaign(plant, campaign, options or SimulateOptions(), progress)
 
 
@@ -93,11 +95,13 @@ def calibrate_command(
     """Calibrate a model or model file with a campaign or logs, and write the calibrated model and a report.
 
     output     path of the calibrated model file
-    report     path of an HTML page; its numbers go into a JSON file next to it. Only a report's JSON is replaced
-    actuators  folder for C code of friction and motors
-    loaded     further logs, recorded with the known load `load_on`: 'MASS,X,Y,Z' or a load's file
+    report     path of an HTML page; its numbers go into a JSON file next to it. A JSON file of another kind is not
+               replaced
+    actuators  folder into which C code of friction and motors is written
+    loaded     further logs, recorded while the robot carried the known load `load_on`: 'MASS,X,Y,Z' or the file of a
+               load
     keep       whether to write the model and the C code even if the verdict is `not usable`
-    validation  plain logs that only judge the fit
+    validation  plain logs that are not fitted but test the fit
     naming     topic and joint names of plain logs
     """
     if report is not None:
@@ -128,8 +132,8 @@ def calibrate_command(
 
 
 def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
-    """Write C code for the friction and motors of a calibrated model. Raise InputError if the model is not
-    calibrated."""
+    """Write C code for the friction and motors of a calibrated model into a folder. Raise InputError if the model is
+    not calibrated."""
     found = model.calibrated
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")
@@ -141,7 +145,8 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
 
 
 def require_actuators_folder(model: DynamicsModel, folder: str | Path) -> None:
-    """Raise InputError if a folder has files, but neither a package of psdmc nor this C code of the same robot."""
+    """Raise InputError if a folder has files that the C code would not replace. A package of psdmc may be there, and
+    earlier C code of friction and motors of this robot."""
     header = Path(folder) / "include" / f"{identifier(model.mechanism.name)}_actuators.h"
     if not content_of(folder) and not header.is_file():
         refuse_foreign_folder(folder, "choose a new or empty folder, or that of the robot's package")

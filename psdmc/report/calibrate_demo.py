@@ -44,7 +44,8 @@ def run_demo(
     workers: int = 2,
     say: Callable[[str], None] = print,
 ) -> dict[str, Comparison]:
-    """Plan, simulate, calibrate and report each variant. Return how each result compares with the true parameters."""
+    """Plan, simulate, calibrate and report each variant of the demonstration. Return how each result compares with the
+    true parameters."""
     begin = time.monotonic()
 
     def step(text: str) -> None:

@@ -1,4 +1,5 @@
-"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper Denso-2022."""
+"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper on the calibration of a Denso robot
+(published_denso.py)."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ FILE = (11, 6)
 
 
 def step_panels(step: StepQuality) -> tuple[str, ...]:
-    """Draw, for each joint, measured and predicted torque and their difference. Held-out parts of the log are shaded."""
+    """Draw the measured torque, the predicted torque and their difference for each joint, over time. Parts of the log
+    that were kept out of the fit are shaded."""
     return tuple(
         svg(partial(alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
         for sample in step.samples
@@ -82,8 +84,8 @@ def _shade(axis: Axes, x: Array, held_out: Array) -> None:
 def excitation_panels(
     found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()
 ) -> tuple[str, ...]:
-    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Also draw its
-    condition number and those of random motions."""
+    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Draw the
+    condition number of the motion, too, next to those of random motions."""
     return tuple(
         svg(partial(alone, draw), PANEL, f"exciting motion: {says}")
         for says, draw in _excitation(found, joint_names, limits)
@@ -102,7 +104,7 @@ def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Seq
 
 
 def limit_lines(limits: Sequence[Limits]) -> tuple[list[tuple[float, float]], ...]:
-    """Return (lowest, highest) position, speed and acceleration of each joint."""
+    """Return the limits of each joint for drawing: (lowest, highest) position, speed and acceleration."""
     positions = [(each.lower, each.upper) for each in limits]
     speeds = [(-each.speed, each.speed) for each in limits]
     return positions, speeds, [(-each.acceleration, each.acceleration) for each in limits]

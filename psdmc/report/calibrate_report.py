@@ -57,8 +57,8 @@ class VerdictView:
 
 @dataclass(frozen=True, slots=True)
 class ReportView:
-    """The data of the report's template. Tables are HTML text, empty if there is nothing to show; the template escapes
-    all other text.
+    """The data of the report's template. Tables are HTML text, empty if there is nothing to show. The template of the
+    page escapes all other text.
 
     truth     true parameters, which only a virtual robot has; None for logs of a real robot
     versions  names and versions of the programs that computed the result
@@ -93,7 +93,7 @@ def write_report(
 
 
 def require_free_numbers(page: str | Path) -> None:
-    """Raise InputError if the JSON file of a report would replace a file that belongs to no report."""
+    """Raise InputError if the JSON file of a report would replace a file that is not the JSON file of a report."""
     numbers = Path(page).with_suffix(".json")
     remedy = f"give --report another name, or move {numbers}: the report's numbers go there"
     refuse_foreign_file(numbers, NUMBERS_MARK, remedy)

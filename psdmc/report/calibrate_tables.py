@@ -1,4 +1,4 @@
-"""The tables of a calibration's report as HTML text, with every cell escaped."""
+"""Makes the tables of a calibration's report as HTML text, with every cell escaped."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ USES = {"validate": "held out whole", "with_load": "with the known load"}
 
 
 def verdict_table(verdict: Verdict) -> str:
-    """Return the table of numbers by which psdmc judged each joint. A gain in brackets does not count, because the robot
-    file predicts too small a torque."""
+    """Return the table of numbers by which psdmc judged each joint. A gain compares the errors of the robot file with
+    those of the calibration. It is in brackets and does not count if the file predicts too small a torque."""
     head = [
         "Joint",
         "R² held out",
@@ -44,8 +44,8 @@ def verdict_table(verdict: Verdict) -> str:
 
 
 def accuracy_table(record: Calibrated) -> str:
-    """Return RMSE and R^2 per joint and step: of held-out data, and in brackets of fitted data (table 3 of
-    Denso-2022)."""
+    """Return the table of RMSE and R^2 for each joint and calibration step (table 3 of Denso-2022). Numbers are for
+    data that were not fitted and, in brackets, for fitted data."""
     head = [
         "Joint",
         *(
@@ -72,8 +72,8 @@ def _both(held_out: Quality, fit: Quality) -> list[str]:
 
 
 def parameter_table(record: Calibrated) -> str:
-    """Return the base parameters: file's value, value found, standard deviation, unit and equation (table 4 of
-    Denso-2022)."""
+    """Return the table of base parameters: the robot file's value, the value found, standard deviation, unit and
+    equation (table 4 of Denso-2022)."""
     head = ["Parameter", "In the file", "Found", "±", "Relative", "Unit", "Equation", "In the data", "Group"]
     rows = []
     for row in record.parameters:
@@ -86,7 +86,7 @@ def parameter_table(record: Calibrated) -> str:
 
 
 def joint_table(record: Calibrated) -> str:
-    """Return torque constants and friction of each joint (table 2 of Denso-2022)."""
+    """Return the table of torque constants and friction of each joint (table 2 of Denso-2022)."""
     own = (*record.motors, *record.friction)
     units = joined_units((row.name, row.unit) for row in own)
     by_key = {(row.joint, row.name): row for row in own}
@@ -106,7 +106,8 @@ def spring_table(record: Calibrated) -> str:
 
 
 def joint_number(row: NumberRow | None) -> str:
-    """Return a joint's value with its standard deviation, in brackets if the data do not determine it by itself."""
+    """Return a value of a joint with its standard deviation as text. A value that the data alone do not determine is in
+    brackets, with the reason."""
     if row is None:
         return NOTHING
     if not row.seen:
@@ -128,7 +129,8 @@ def log_table(record: Calibrated) -> str:
 
 
 def step_table(record: Calibrated) -> str:
-    """Return the filter cut-off of each step and how its data were split; empty text if they are unknown."""
+    """Return the table of calibration steps: the cut-off frequency of the filter, and how the data were split. The text
+    is empty if they are unknown."""
     if record.prediction is None:
         return ""
     rows = []
@@ -173,7 +175,7 @@ def r_squared(value: float) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> str:
-    """Return an HTML table with every cell escaped. Columns of text break their lines."""
+    """Return an HTML table with every cell escaped. Columns of text are wrapped; columns of numbers are not."""
     names = "".join(_cell("th", cell, k in text_columns, ' scope="col"') for k, cell in enumerate(head))
     lines = ['<table class="plain">', f"<thead><tr>{names}</tr></thead>", "<tbody>"]
     for row in rows:

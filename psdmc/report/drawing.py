@@ -1,6 +1,6 @@
-"""Draw pictures as inline SVG with Matplotlib. Matplotlib is loaded for the first picture only, as this takes half a
-second and writes to the home folder. Pictures load nothing from the network, keep text as text, and use the page's
-colours."""
+"""Draws pictures as SVG elements with Matplotlib. Matplotlib is loaded for the first picture only, because loading
+takes half a second and writes to the home folder. Pictures load nothing from the network, keep text as text, and use
+the page's colours."""
 
 from __future__ import annotations
 
@@ -42,8 +42,11 @@ STYLE: dict[Any, Any] = {
 
 
 def svg(draw: Callable[[Figure], None], size: tuple[float, float], says: str) -> str:
-    """Return the drawing by `draw` on a figure of `size` (inches) as an <svg> element that scales with the page. `says`
-    is the description for screen readers. The same numbers give the same bytes."""
+    """Return a picture as an <svg> element that scales with the page. The function `draw` draws it on a figure of
+    `size` (inches).
+
+    `says` is the description for screen readers. Equal numbers give equal bytes.
+    """
     with _style(STYLE):
         figure = _new_figure(figsize=size)
         draw(figure)
@@ -59,7 +62,7 @@ PRINTED |= {"svg.fonttype": "path", "pdf.fonttype": 42}
 
 
 def document(name: str, draw: Callable[[Figure], None], size: tuple[float, float]) -> dict[str, bytes]:
-    """Write the drawing as NAME.pdf and NAME.svg. The same numbers give the same bytes."""
+    """Write a picture, which a function draws, as NAME.pdf and NAME.svg. Equal numbers give equal bytes."""
     found = {}
     with _style(PRINTED):
         figure = _new_figure(figsize=size)

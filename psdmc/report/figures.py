@@ -79,7 +79,7 @@ def write_figures(
 
 
 def require_own_folder(folder: str | Path) -> None:
-    """Raise InputError if a folder has files, but none that `psdmc figures` wrote."""
+    """Raise InputError if a folder has files, but none that the command `psdmc figures` wrote."""
     table = Path(folder) / TABLE
     try:
         with table.open("rb") as file:
@@ -108,7 +108,8 @@ def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQua
 
 
 def draw_parameters(figure: Figure, known: Calibrated) -> None:
-    """Draw the base parameters with intervals, one axis per unit. Open circles are the values of the robot file."""
+    """Draw the calibrated base parameters with confidence intervals, with one axis for each unit. Open circles are the
+    values of the robot file."""
     units = list(dict.fromkeys(row.unit for row in known.parameters))
     groups = [[row for row in known.parameters if row.unit == unit] for unit in units]
     axes = figure.subplots(len(units), 1, squeeze=False, height_ratios=[len(rows) + 2 for rows in groups])
@@ -131,8 +132,8 @@ def draw_parameters(figure: Figure, known: Calibrated) -> None:
 
 
 def friction_curves(known: Calibrated) -> dict[str, tuple[Array, Array]]:
-    """Return, for each joint, speeds and friction torques at constant speed, without friction that depends on position
-    or load."""
+    """Return for each joint an array of speeds and the friction torques at these constant speeds. Friction that depends
+    on position or load is left out."""
     law = known.prediction
     if law is None:
         return {}
@@ -157,8 +158,8 @@ def _reads(row: Row) -> frozenset[str]:
 
 
 def steady(rows: Sequence[Row], v: Array, sign_speed: float) -> Array:
-    """Return the friction at constant speeds that are not zero. An internal state, such as LuGre's, has its steady-state
-    value."""
+    """Return the friction torque or force at constant speeds that are not zero. A friction model with an internal
+    state, such as LuGre's, has the value that the state approaches at this speed."""
     sign = np.tanh(v / sign_speed) if sign_speed > 0.0 else np.sign(v)
     state, z = rows[0][0].law.state, np.zeros_like(v)
     if state is not None:
@@ -186,7 +187,7 @@ def draw_friction(
 
 
 def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -> None:
-    """Draw measured and predicted torque of each joint, and their difference."""
+    """Draw the measured torque, the predicted torque and their difference for each joint."""
     rows = figure.subplots(len(step.samples), 2, squeeze=False, sharex="row", width_ratios=[2, 1])
     for (both, left), sample in zip(rows, step.samples, strict=True):
         kept = thinned(len(sample.x))
@@ -210,7 +211,8 @@ def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -
 
 
 def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
-    """Return the LaTeX tables by file name. They need the packages booktabs, longtable and siunitx."""
+    """Return the tables of a calibration as LaTeX text, by file name. They need the packages booktabs, longtable and
+    siunitx."""
     equations = [parameter.terms for parameter in model.base_parameters]
     parameters = [
         [
@@ -254,7 +256,8 @@ def _seen(row: NumberRow) -> str:
 
 
 def tabular(columns: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "tabular") -> str:
-    """Return a LaTeX table from cells in LaTeX. A longtable continues on the next page and repeats its head."""
+    """Return a LaTeX table from cells in LaTeX. A longtable continues on the next page and repeats the head of the
+    table."""
     packages = "booktabs,siunitx" if kind == "tabular" else f"booktabs,{kind},siunitx"
     lines = [
         f"{MARK}; needs \\usepackage{{{packages}}}",
@@ -288,8 +291,8 @@ def preview(names: Sequence[str], pictures: Sequence[str]) -> str:
 
 
 def number(value: float, std: float = math.inf) -> str:
-    """Return a number for siunitx, rounded to two digits of its standard deviation; a dash for none. psdmc rounds it
-    itself, because siunitx drops the standard deviation of a number that is much smaller."""
+    """Return a number for siunitx, rounded to two digits of its standard deviation; a dash for none. psdmc rounds the
+    number itself, because siunitx drops the standard deviation of a number that is much smaller."""
     if not math.isfinite(value):
         return "--"
     if not 0.0 < std < math.inf:
@@ -302,7 +305,7 @@ UNIT = re.compile(r"[A-Za-z0-9.^/ ]+")
 
 
 def unit(text: str) -> str:
-    """Convert a unit from psdmc's notation to siunitx's."""
+    """Return a unit in the notation of the LaTeX package siunitx, from psdmc's notation."""
     if not text or text == "-":
         return ""
     if not UNIT.fullmatch(text):
@@ -323,7 +326,7 @@ SPECIAL = {
 
 
 def escaped(text: str) -> str:
-    """Return text as LaTeX code that shows it. Characters outside ASCII and Latin-1 are shown by their number."""
+    """Return LaTeX code that prints a text. Characters outside ASCII and Latin-1 are printed as their number."""
     return "".join(
         SPECIAL.get(c, c) if " " <= c <= "~" or "\xc0" <= c <= "\xff" else f"U+{ord(c):04X}" for c in text
     )

@@ -1,8 +1,8 @@
 """Tables 2 to 4 as printed in Denso-2022, which the report shows with the results of the virtual Denso's calibration.
 
 Denso-2022: Application of Pseudo-Symbolic Dynamic Modeling (PSDM) in the Modeling & Calibration of a 6-DOF Articulated
-Robot. Of table 4, this module has only the rows whose equations are legible and hold for the robot; the others lost
-signs or indices in print.
+Robot. Of table 4, this module has only the rows whose printed equations can be read and are true for the robot. The
+other rows lost signs or indices in print.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ class PublishedParameter:
     value     in SI units
     equation  in standard parameters about the links' frames (mx = m rx; Ixx and so on about the origin)
     terms     the equation as coefficients by parameter and link
-    fitted    whether the virtual robot was built to have this value, as closely as possible bodies can
+    fitted    whether the masses and inertias of the virtual robot were chosen to give this value, as nearly as real
+              bodies can
     """
 
     name: str

@@ -31,7 +31,7 @@ class TruthView:
     banner      states that the robot is virtual, and its sensors
     parameters  every base parameter with its true value
     joints, accuracy, published  tables 2, 3 and 4 of Denso-2022 with the values of this calibration
-    why         the reason of the differences
+    why         text that explains the differences
     """
 
     banner: str
@@ -43,8 +43,8 @@ class TruthView:
 
 
 def truth_view(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> TruthView:
-    """Return the true parameters and tables for the report of the virtual Denso. `true_model` has the true theta_b, in
-    the record's order."""
+    """Return the sections on true parameters for the report of the virtual Denso robot. `true_model` has the true base
+    parameters theta_b, in the order of the calibration record."""
     sensors, harness = robot.sensors, robot.harness
     noisy = sensors.current_noise or sensors.position_step
     with_sensors = (

@@ -27,7 +27,8 @@ MARK = '"schema": 1,\n "kind": "'
 
 @dataclass(frozen=True, slots=True)
 class TableView:
-    """A table of the HTML page. `short`: the rows that the terminal shows. prose: whether the last column is text."""
+    """A table of the HTML page on a validation. `short` are the rows that the terminal shows. `prose` tells whether the
+    last column is text."""
 
     title: str
     head: Sequence[str]
@@ -45,8 +46,8 @@ class TableView:
 class PageView:
     """The data of the page's template. Tables and figures are HTML text; the template escapes all other text.
 
-    kind    style of the verdict's box: "", "doubted" or "refused";  document: what the JSON file describes
-    lines   (kind, sentence), the first part of the page;  more: lines for the terminal
+    kind    style of the verdict's box: "", "doubted" or "refused";  document: kind of the JSON file
+    lines   (kind, sentence) for the first part of the page;  more: further lines that the terminal prints
     """
 
     document: str
@@ -67,7 +68,7 @@ class PageView:
 
 
 def require_free(report: Path) -> None:
-    """Raise InputError if the JSON file of a page would replace another kind of file."""
+    """Raise InputError if the JSON file of a page would replace a JSON file of another kind."""
     numbers = report.with_suffix(".json")
     remedy = f"give --report another name, or move {numbers}: the report's numbers go there"
     refuse_foreign_file(numbers, MARK, remedy)

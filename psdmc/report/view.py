@@ -1,4 +1,4 @@
-"""Draw a robot on an HTML page in 3D: links, axes, frames, bodies of the file and of a calibration, and the motion of
+"""Draws a robot on an HTML page in 3D: links, axes, frames, bodies of the file and of a calibration, and the motion of
 logs."""
 
 from __future__ import annotations
@@ -68,10 +68,10 @@ AXIS_COLOURS = ("#d62728", "#2ca02c", "#1f5fd0")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A body of the picture: its place, and the ellipsoid that shows its inertia.
+    """A body in the 3D picture: the position of its centre of mass, and the ellipsoid that shows its inertia.
 
-    joint      number of the joint frame that it moves with
-    mass       kg; com (3,) m in the joint frame; place (3,) m, the same point in the link's own frame
+    joint      number of the joint frame with which the body moves
+    mass       kg; com (3,) m in the joint frame; place (3,) m, the centre of mass in the frame of the link
     half_axes  (3,) m, semi-axes of the solid ellipsoid of this mass and inertia, ascending; zero if there is none
     root       (3, 3) m, symmetric: maps the unit sphere to the ellipsoid about `com`, in the joint frame
     fault      why no real body has this mass and inertia; "" for all others
@@ -95,9 +95,10 @@ class Body:
 
 
 def body(link: str, joint: int, frame: Placement, x: Array, judged: bool = True) -> Body:
-    """Return the body with standard parameters (10,) about a link frame; `frame` is the link frame in the joint frame.
+    """Return the drawn body from standard parameters x (10,) about a link frame: mass, first moments, inertia. `frame`
+    is the placement of the link frame in the joint frame.
 
-    judged   whether to test if a real body can have them; not for zeros that psdmc assumed
+    judged   whether to test if a real body can have these parameters; not for zeros that psdmc assumed
     """
     mass, com, six = about_com(x)
     six = np.where(np.abs(six) > ROUNDING * mass * float(com @ com), six, 0.0)
@@ -115,13 +116,13 @@ def body(link: str, joint: int, frame: Placement, x: Array, judged: bool = True)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Viewed:
-    """The content of a page: F poses of n joint frames.
+    """The content of the 3D page: bodies, remarks, and the motion as F poses of the n joint frames.
 
-    layers   bodies by FILE and CALIBRATED
+    layers   the bodies of the robot file, and those of a calibration: FILE or CALIBRATED -> bodies
     faults   texts on bodies that cannot be real and on missing inertias, the worst first
     notes    further remarks
     poses    (F, n, 12) rotation (rows) and origin (m) of each joint frame in the base frame
-    times    F, s;  logs   F, names; both empty without a log
+    times    F times in s;  logs   F names of logs; both empty without a log
     """
 
     chain: Mechanism
@@ -243,7 +244,8 @@ def _poses(chain: Mechanism, q: Array) -> Array:
 
 
 def write_view(view: Viewed, path: str | Path) -> None:
-    """Write the page. Raise InputError if plotly is not installed, or if the path has a file that is not such a page."""
+    """Write the 3D page of a robot. Raise InputError if plotly is not installed, or if the path has a file that is no
+    page of `psdmc view`."""
     script = _plotly()
     require_own_page(path)
     write_whole(path, page(view, script))
@@ -279,7 +281,8 @@ def page(view: Viewed, script: str) -> str:
 
 
 def embedded(value: Any) -> str:
-    """Return JSON for an HTML <script> element, in which no text can end the element."""
+    """Return a value as JSON text for an HTML <script> element. Characters are escaped so that no text in the value can
+    end the element."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

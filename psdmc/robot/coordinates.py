@@ -1,5 +1,5 @@
-"""Coordinates of joints. The position q of a joint is a coordinate of its own, follows another joint (a mimic joint,
-q_joint = ratio q_leader + offset), or is constant."""
+"""Describes how the position q of each joint is determined: it is an entry of the robot's q, follows another joint, or
+is constant. A mimic joint follows by q_joint = ratio q_leader + offset."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from psdmc.robot.joints import JointType
 class Coordinate:
     """Describes the position q of one joint as ratio * q[leader] + offset.
 
-    leader   index of the joint that has the coordinate; None: the joint is locked at `offset`
-    ratio    ratio of the two rates, in the joint's unit per the leader's unit
+    leader   index of the joint that is followed; for a joint that is no mimic joint, the joint itself. None: the joint
+             is locked at `offset`
+    ratio    rate of the joint divided by that of the leader, in the joint's unit per the leader's unit
     offset   rad or m
     """
 
@@ -33,18 +34,19 @@ class Coordinate:
 
 
 def own_coordinates(n: int) -> tuple[Coordinate, ...]:
-    """Return the coordinates of n joints of which none is a mimic joint."""
+    """Return the coordinates of n joints if no joint is a mimic joint: each joint is its own leader."""
     return tuple(Coordinate(i) for i in range(n))
 
 
 def leaders(coordinates: Sequence[Coordinate]) -> tuple[int, ...]:
-    """Return the indices of the joints that are not mimic joints, in order. Each of them has entries in q."""
+    """Return the indices of the joints that are not mimic joints, in order. The entries of q are the positions of these
+    joints."""
     return tuple(i for i, coordinate in enumerate(coordinates) if coordinate == Coordinate(i))
 
 
 def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coordinate, ...]:
-    """Return the coordinates of n joints. If none are given, each joint has its own. Raises ValueError if a mimic
-    joint follows another mimic joint."""
+    """Return the coordinates of n joints after a check. Without coordinates, no joint is a mimic joint. Raises
+    ValueError if a mimic joint follows another mimic joint."""
     if not coordinates:
         return own_coordinates(n)
     if len(coordinates) != n:
@@ -60,8 +62,8 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Following:
-    """Matrices that give the positions and rates of all joints, mimic joints included, from q and qd: q_joints =
-    shares q + offsets, rates_joints = ratios qd.
+    """Matrices that give the positions and rates of all joints, mimic joints included, from q and qd. They are q_joints
+    = shares q + offsets and rates_joints = ratios qd.
 
     shares   (coordinates of all joints, nq)
     offsets  (coordinates of all joints,)
@@ -83,18 +85,19 @@ class Following:
         )
 
     def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the positions (..., n) of all joints, mimic joints included, from q (..., nq)."""
+        """Return the positions (..., n) of all n joints, mimic joints included, from the robot's q (..., nq)."""
         return np.asarray(times(q, self.shares.T) + self.offsets)
 
     def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the rates (..., n) of all joints, mimic joints included, from qd (..., nv)."""
+        """Return the rates (..., n) of all n joints, mimic joints included, from the robot's qd (..., nv)."""
         return np.asarray(times(qd, self.ratios.T))
 
     def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
-        """Add the torques of mimic joints, times their ratios, to those of the joints that they follow.
+        """Return torques with one entry per rate of the robot, from torques of all joints. The torque of a mimic joint,
+        times its ratio, is added to that of the joint that it follows.
 
-        values  array with an axis of all joints, which becomes an axis of length nv
-        axis    that axis
+        values  array of torques, with one axis for the rates of all joints, mimic joints included
+        axis    number of this axis, which gets the length nv
         """
         return np.moveaxis(times(np.moveaxis(values, axis, -1), self.ratios), -1, axis)
 

@@ -1,4 +1,4 @@
-"""Checks whether psdmc can derive a model of a mechanism, and whether each joint has one coordinate."""
+"""Checks whether psdmc can derive a model of a robot, and whether each joint has one coordinate."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ AXES = "hold this joint: derive the model with --lock JOINT=0"
 
 
 def require_derivable(chain: Mechanism) -> None:
-    """Raise InputError with a remedy if a joint of the mechanism is constant. Readers of robot files merge such
-    joints."""
+    """Raise InputError with a remedy if a joint of the mechanism is locked at a constant position. Readers of robot
+    files merge the links of such joints."""
     for joint, coordinate in zip(chain.joints, chain.coordinates, strict=True):
         if coordinate.leader is None:
             raise InputError(
@@ -21,7 +21,7 @@ def require_derivable(chain: Mechanism) -> None:
 
 
 def require_axes(chain: Mechanism, what: str) -> None:
-    """Raise InputError if a joint has several coordinates.
+    """Raise InputError if a joint of the robot has several coordinates, such as a ball joint.
 
     what  name of the operation that needs joints with one coordinate, such as "calibration"
     """

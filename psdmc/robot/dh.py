@@ -1,4 +1,4 @@
-"""Reads the TOML file of a DH table into plain data and checks every entry."""
+"""Reads the TOML file of a DH table (Denavit-Hartenberg parameters) into plain data, and checks every entry."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class DhLink:
 class DhJoint:
     """One row of a DH table: a and d in m, alpha and theta in rad, drive_inertia in kg m^2 (kg), NaN if unknown.
 
-    parent   index of the row to which the joint of this row is attached, from 0, or BASE
+    parent   index, from 0, of the row whose link carries the joint of this row; BASE if the base carries the joint
     """
 
     name: str
@@ -195,7 +195,7 @@ Triple = tuple[float, float, float]
 
 
 def angle(value: object, accepted: Range = limits.ANGLE) -> float:
-    """Return an angle in rad from a number (rad) or a text such as "90 deg" or "1.5 rad". Raises ValueError for
+    """Return an angle in rad, read from a number (rad) or a text such as "90 deg" or "1.5 rad". Raises ValueError for
     anything else."""
     if not isinstance(value, str):
         return within(accepted)(value)
@@ -207,7 +207,7 @@ def angle(value: object, accepted: Range = limits.ANGLE) -> float:
 
 
 def finite(value: object) -> float:
-    """Return a finite number within the range of 64-bit floats. Raises ValueError for anything else."""
+    """Return a number read from a file if it is finite as a 64-bit float. Raises ValueError for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"found {shown(value)}, expected a finite number")
     if not abs(value) <= sys.float_info.max:
@@ -216,8 +216,8 @@ def finite(value: object) -> float:
 
 
 def within(accepted: Range) -> Callable[[object], float]:
-    """Return a function that reads a finite number whose magnitude must lie in a range. Its ValueError names the
-    range."""
+    """Return a reading function for finite numbers whose magnitude must lie in a range. The ValueError of this function
+    names the range."""
 
     def convert(value: object) -> float:
         number = finite(value)
@@ -230,7 +230,7 @@ def within(accepted: Range) -> Callable[[object], float]:
 
 
 class CheckedTable:
-    """Reads one TOML table key by key. It collects all faults in `problems`, each with the name of the table."""
+    """Reads one TOML table key by key. All faults are collected in `problems`, each with the name of the table."""
 
     def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
         self.where, self.problems = where, problems
@@ -242,7 +242,8 @@ class CheckedTable:
                 problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
 
     def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
-        """Return the value of a key after conversion, or `default` if the value is missing or wrong."""
+        """Return the value of a key of the table, converted by a reading function. If the value is missing or wrong,
+        return `default`."""
         if key not in self.table:
             return default
         try:
@@ -257,26 +258,26 @@ LENGTH = within(limits.LENGTH)
 
 
 def as_it_is(value: object) -> object:
-    """Return the value unchanged. This reader is for values whose parts are read one by one."""
+    """Return a value of a file unchanged. This reading function is for values whose parts are read one by one."""
     return value
 
 
 def plain_text(value: object) -> str:
-    """Return a text that is not empty. Raises ValueError for anything else."""
+    """Return a value of a file if it is a text that is not empty. Raises ValueError for anything else."""
     if not isinstance(value, str) or not value:
         raise ValueError(f"found {shown(value)}, expected a text")
     return value
 
 
 def any_list(value: object) -> list[object]:
-    """Return a list with entries of any type. Raises ValueError if the value is not a list."""
+    """Return a value of a file if it is a list, with entries of any type. Raises ValueError for anything else."""
     if not isinstance(value, list):
         raise ValueError(f"found {shown(value)}, expected a list")
     return value
 
 
 def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
-    """Return a function that reads a list of three values, each with `convert`."""
+    """Return a reading function for lists of three values. `convert` reads each of the values."""
 
     def read(value: object) -> Triple:
         values = any_list(value)
@@ -289,7 +290,7 @@ def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
 
 
 def not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
-    """Return a function that reads a number with `convert` and rejects negative numbers."""
+    """Return a reading function for numbers that must not be negative. `convert` reads the number."""
 
     def read(value: object) -> float:
         number = convert(value)
@@ -301,7 +302,7 @@ def not_negative(convert: Callable[[object], float]) -> Callable[[object], float
 
 
 def one_of(*words: str) -> Callable[[object], str]:
-    """Return a function that reads one of the given words."""
+    """Return a reading function that accepts only one of the given words."""
 
     def read(value: object) -> str:
         if not isinstance(value, str) or value not in words:
@@ -321,7 +322,7 @@ def parents_of(names: Sequence[str], given: Sequence[object]) -> tuple[tuple[int
     names   names of the rows' joints
     given   `parent` of each row in the file: the name of a joint, or "base"; None: the row before
 
-    The rows of a branch must be consecutive: the parent of a row is the row before it or an ancestor of that row.
+    The rows of a branch must be consecutive: the parent of a row is the row before, or an ancestor of the row before.
     """
     parents: list[int] = []
     faults: list[str] = []

@@ -1,7 +1,9 @@
 """Makes a robot from a DH table.
 
-Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the distal frame
-is the link frame. The joint frame lies after Rz(theta + q), and the link frame has a constant placement in it.
+Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the distal frame is
+the link frame. The joint frame lies after Rz(theta + q), and the link frame has a constant placement in the joint
+frame.
+
 Modified convention (Craig): a row is Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and the joint frame is the link frame. For a
 prismatic joint q adds to d and not to theta.
 """
@@ -25,10 +27,10 @@ from psdmc.robot.zeros import COM_NAMES, canonical
 
 
 def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames: Sequence[str] = ()) -> Draft:
-    """Return the robot in a DH file.
+    """Return the robot that a DH file describes.
 
-    gravity  (3,) m/s^2, replaces the gravity in the file; None: that of the file
-    snap     rad; an angle that differs by at most this much from a right angle becomes exact
+    gravity  (3,) m/s^2, gravity that replaces that of the file; None: that of the file
+    snap     rad; angles that differ by at most this much from a right angle become exact
     """
     robot = read_dh(text, source)
     joints, snaps = _placed_joints(robot, snap)
@@ -108,7 +110,8 @@ def _parameters(row: DhJoint) -> Array:
 
 
 def settled(link: DhLink) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass and inertia about it. Values that the `zero` list of the file names are zero."""
+    """Return mass, centre of mass, and inertia about the centre of mass of a link. Values that the `zero` list of the
+    file names are zero."""
     zero = canonical(link.zero)
     com_and_inertia = [
         0.0 if name in zero else value

@@ -27,12 +27,13 @@ SourceFormat = Literal["urdf", "dh"]
 def as_source(
     file: Path, text: str, options: LoadOptions, packages: Mapping[str, Path]
 ) -> tuple[str, SourceFormat, LoadOptions]:
-    """Return the text to read, its format, and the options, to which an MJCF adds its gravity and its floating base.
+    """Return the text of the robot to read, the format of the text, and the options. An MJCF file adds gravity and a
+    floating base to the options.
 
     packages   folders of ROS packages that a xacro file uses, by name
 
-    Raises InputError if psdmc does not read the file's format, if the format needs a package that is not installed, or
-    if an option is for files of another format.
+    Raises InputError if psdmc does not read the file's format, or if the format needs a package that is not installed.
+    The error is also raised if an option is for files of another format.
     """
     suffix = file.suffix.lower()
     tag = "" if suffix == ".toml" else root_tag(text)

@@ -1,8 +1,8 @@
-"""Chooses independent columns of a matrix in a given order (QR with column pivoting). Columns that nearly depend on
-the others come last.
+"""Chooses independent columns of a matrix, in a given order if possible (QR with column pivoting). Columns that nearly
+depend on the others come last.
 
-The result is the same on every processor and in each precision of the matrix. If several columns have equal residuals,
-their order decides and not rounding.
+The result is the same on every processor and in each precision of the matrix. The residual of a column is the part that
+is independent of the columns chosen before. If residuals are equal, the order of the columns decides and not rounding.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from psdmc.reproducible import combined, lengths
 
 
 def halving_shares(last: float) -> tuple[float, ...]:
-    """Return the thresholds 1/2, 1/4, ... down to `last` for `graded_pivots`.
+    """Return the thresholds 1/2, 1/4, ... down to `last`, with which `graded_pivots` chooses columns.
 
-    For each threshold the columns are examined in their order. A column becomes a pivot if its residual after the
-    earlier pivots exceeds this share of its length. With `last` as the only threshold, small residuals could become
-    divisors although larger ones exist.
+    For each threshold the columns are examined in their order. A column is chosen (becomes a pivot) if its residual
+    exceeds this share of its length. The residual is the part that is independent of the columns chosen before. With
+    `last` as the only threshold, divisors could be small although larger ones exist.
     """
     count = math.ceil(-math.log2(last))
     return (*(0.5**k for k in range(1, count)), last)
@@ -31,13 +31,16 @@ def halving_shares(last: float) -> tuple[float, ...]:
 def graded_pivots(
     work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float], groups: NDArray[Any] | None = None
 ) -> tuple[list[int], float, float]:
-    """Return the order in which columns of `work` (m, k) become pivots, the smallest threshold that a pivot needed,
-    and the largest residual of any other column as a share of its length. Changes `work` in place: its first rows
-    become triangular in the pivots.
+    """Choose independent columns of `work` (m, k), as the module describes. Return their order, the smallest threshold
+    that was needed, and the largest residual of the other columns.
 
-    norms   (k,)  the columns' lengths beforehand
+    A residual is the length of the part that is independent of the chosen columns, as a share of the column's length.
+    `work` is changed in place: its first rows become triangular in the chosen columns.
+
+    norms   (k,)  the columns' lengths before the call
     shares        decreasing thresholds, as from `halving_shares`
-    groups  (k,)  ascending numbers of groups. All thresholds are applied to one group before the next group; None: one group
+    groups  (k,)  ascending numbers of groups. All thresholds are applied to one group before the next group; None: one
+            group
     """
     pivots: list[int] = []
     taken = 1.0

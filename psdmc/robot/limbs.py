@@ -12,11 +12,13 @@ Limbs = tuple[tuple[int, ...], ...]
 
 
 def limb_groups(parents: Sequence[int], labels: Sequence[Hashable]) -> tuple[Limbs, ...]:
-    """Return the groups of two or more equal limbs on one body, those nearest to the base first. Each limb is a tuple
-    of joints. Groups within limbs are not returned.
+    """Return the groups of two or more equal limbs (branches such as legs) on one body, those nearest to the base
+    first. Each limb is a tuple of joints.
 
     parents  parent of each body: BASE or an earlier body
-    labels   one per joint; joints with different labels do not correspond to each other
+    labels   a label for each joint; joints of equal limbs must have equal labels
+
+    If a limb itself carries equal branches, such as fingers of a hand, these are not returned as a further group.
     """
     tree = _Tree(parents, labels)
     groups: list[Limbs] = []
@@ -47,7 +49,8 @@ class _Tree:
             self.shapes[i] = known.setdefault(shape, len(known))
 
     def joints(self, branch: int) -> tuple[int, ...]:
-        """Return the joints of a branch, in an order that is the same for all branches of equal structure."""
+        """Return the joints of a branch. In branches of equal structure, corresponding joints have the same place in
+        this order."""
         found = [branch]
         for child in sorted(self.children[branch], key=lambda child: (self.shapes[child], child)):
             found += self.joints(child)

@@ -34,10 +34,10 @@ __all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_r
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRobot:
-    """A mechanism, the text from which psdmc read it, and the options.
+    """A robot read from a file: the mechanism, the text from which psdmc read it, and the options.
 
     source_name   the file's name in messages
-    snap_report   every rotation that was replaced by a near exact one, with the angle between them (rad)
+    snap_report   every rotation that was replaced by a near one with exact zeros, with the angle between both (rad)
     """
 
     mechanism: Mechanism
@@ -49,11 +49,12 @@ class LoadedRobot:
 
     @property
     def chain(self) -> Mechanism:
-        """The mechanism. This property has the name that psdmc 0.1 used."""
+        """The mechanism: joints, bodies and gravity of the robot. psdmc 0.1 used the name `chain` for it."""
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
-        """Return the robot with the rotations as the file states them. It serves to compute the effect of snapping."""
+        """Return the robot with the rotations as the file states them. psdmc uses this robot to compute the effect of
+        snapping, which replaces rotations by near ones with exact zeros."""
         keywords = self.options.as_json() | {"snap": 0.0}
         return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
 
@@ -99,8 +100,8 @@ def _refuse_size(size: int, source: str) -> None:
 
 
 def robot_text(file: Path) -> str:
-    """Return the text of a file. Raises InputError if the file cannot be read, is no text, or is too large for a robot
-    file."""
+    """Return the text of a robot file. Raises InputError if the file cannot be read, is no text, or is too large for a
+    robot file."""
     try:
         data = read_file(file, limits.MAX_BYTES, "give a URDF or a DH .toml file")
         if data.startswith(PACKED):

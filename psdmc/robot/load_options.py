@@ -29,21 +29,24 @@ MAX_SNAP = 0.1
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """The options that define the robot together with the file. They are plain values, so a saved model can be read
-    again.
+    """The options that define the robot together with the file. All are plain values, which a model file can contain,
+    so the robot can be read again.
 
     base, tip      names of the first and last link of a chain in a URDF; None for both: the whole robot
     gravity        m/s^2 in the URDF's root frame or the DH base frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  True: drive inertias are parameters; numbers: they are, with these values, one per joint, kg m^2 (kg)
+    drive_inertia  True: the drive inertia of each joint is a parameter of unknown value; numbers: the values, one per
+                   joint, kg m^2 (kg)
     assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
     snap           rad; 0 keeps the file's rotations except for floating-point noise
-    frames         names of the links whose frames become named frames; empty: the tip
+    frames         names of the links whose frames become named frames, for which psdmc generates poses and Jacobians;
+                   empty: the tip
     tool           x y z (m), roll pitch yaw (rad) of an additional frame 'tool' in the tip frame; None: no such frame
     lock           joints of a URDF that are locked: positions by name, rad or m
     floating       whether the root link of a URDF is on a free joint
     root           the robot's first body in an MJCF with several separate bodies; None: all bodies
     xacro_args     values of a xacro file's arguments
-    unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": links without any
+    unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": links without
+                   any
     contacts       frames that can touch the world, which `frames` contains: "foot" is a point, "foot:6" a surface
     """
 
@@ -73,7 +76,7 @@ class LoadOptions:
 
 
 def checked_options(**given: Any) -> LoadOptions:
-    """Return the options as LoadOptions after checking each. Raises InputError for the first wrong option."""
+    """Return the options as LoadOptions after a check of every value. Raises InputError for the first wrong option."""
     options = LoadOptions(
         **{name: CHECKS[name](value) if name in CHECKS else value for name, value in given.items()}
     )

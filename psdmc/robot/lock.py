@@ -62,7 +62,7 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
 
 
 def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobot:
-    """Return the robot with these joints fixed at their positions, and a note for each."""
+    """Return the robot with the locked joints fixed at their positions, and a note for each of these joints."""
     held = held_positions(robot, lock, source)
     if not held:
         return robot

@@ -44,8 +44,8 @@ FREE_RATES = 6
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a joint in SI units (rad or m and their rates, N m or N). A limit that the file does not give is
-    infinite."""
+    """Limits of a joint: lower and upper position, speed, acceleration and effort, in SI units (rad or m and their
+    rates, N m or N). A limit that the file does not give is infinite."""
 
     lower: float = -math.inf
     upper: float = math.inf
@@ -58,10 +58,11 @@ class Limits:
 class Joint:
     """One movable joint and the link that it moves.
 
-    The joint frame F is defined by psdmc: its z axis is the axis of the joint, and it moves with the link. At q = 0 it lies
-    at `placement` in its parent's joint frame (or in the base frame). The transform
+    psdmc defines the joint frame F: the z axis of F is the axis of the joint, and F moves with the link. At q = 0, F
+    has the placement `placement` in the joint frame of the parent (or in the base frame). The transform
     F_parent -> F  is  placement @ type.transform(q):  Rz(q) for a rotation, Tz(q) for a translation.
-    The link frame is the file's (URDF child link frame, DH distal frame), `link_frame` its constant placement in F.
+    The link frame is that of the file (URDF child link frame, DH distal frame). `link_frame` is the constant placement
+    of the link frame in F.
     """
 
     name: str
@@ -82,8 +83,8 @@ class NamedFrame:
     """A frame fixed to a link, for which psdmc generates poses, Jacobians and other kinematic functions.
 
     name       name of a link in the file, or a name from the user: untrusted text
-    joint      index of the joint whose frame it moves with; 0 is the first
-    placement  its placement in that joint frame
+    joint      index of the joint frame with which the named frame moves; 0 is the first
+    placement  placement of the named frame in this joint frame
     rows       contact rows: 3 for a point, 6 for a surface, 0 for no contact
     """
 
@@ -94,8 +95,8 @@ class NamedFrame:
 
 
 def contact_names(contacts: Iterable[tuple[str, int]]) -> dict[str, tuple[str, ...]]:
-    """Return the names of contacts ('contacts') and of their rows ('contact_rows', such as 'foot.x') along the axes of
-    arrays."""
+    """Return the names of contacts ('contacts'), and the names of the contacts' rows ('contact_rows', such as
+    'foot.x'). They label the axes of arrays."""
     own = tuple(contacts)
     rows = (f"{name}.{axis}" for name, count in own for axis in ("x", "y", "z", "rx", "ry", "rz")[:count])
     return {"contacts": tuple(name for name, _ in own), "contact_rows": tuple(rows)}
@@ -107,15 +108,15 @@ class Mechanism:
 
     joints           n, parents before their children; a serial chain's from base to tip
     parameters       (n, 11)   standard parameters x about the link frames (PARAMETER_NAMES), SI; NaN if unknown
-    parameter_span   (11 n, k) basis of the parameters that the assumptions allow (assume_zero, no drive inertia, links
-                               without inertia). It is in reduced column echelon form: each column leads with a one, in a
-                               row where all other columns are zero
+    parameter_span   (11 n, k) basis, of k columns, of the parameters that assumptions allow (assume_zero, no drive
+                     inertia, links without inertia). The basis is in reduced column echelon form: each column leads
+                     with a one, in a row where all other columns are zero
     gravity          (3,)      m/s^2, acceleration of gravity in the base frame
     tip              tip frame in the joint frame of `tip_body`
     notes            what was snapped, merged, locked or assumed, one sentence each, for the command `show`
     parents          n, the parent body of each body: its index, or BASE; left out: the body before
     tip_body         the body that the tip frame is fixed to; left out: the only body without children
-    coordinates      n, the coordinate that determines each joint's q; left out: each joint its own
+    coordinates      n, the coordinate that determines each joint's q; left out: no joint is a mimic joint
     frames           named frames; left out: the tip alone
     massless         moving links without inertia in the file, which psdmc treats as massless: they have no parameters
     """
@@ -160,13 +161,13 @@ class Mechanism:
 
     @property
     def has_unknown_body(self) -> NDArray[np.bool_]:
-        """(n,) whether at least one of a link's ten inertial parameters is unknown."""
+        """Return for each of n links whether at least one of the ten inertial parameters is unknown."""
         return np.asarray(np.isnan(self.parameters[:, :DRIVE]).any(axis=1))
 
     @property
     def known_parameters(self) -> Array:
-        """(n, 11) standard parameters. They are zero for links with an unknown parameter, and for unknown drive
-        inertias."""
+        """Return the standard parameters (n, 11) with zeros for everything unknown: links with an unknown parameter,
+        and unknown drive inertias."""
         known = np.nan_to_num(self.parameters)
         known[self.has_unknown_body, :DRIVE] = 0.0
         return known
@@ -217,7 +218,7 @@ class Mechanism:
 
     @property
     def rate_joints(self) -> tuple[int, ...]:
-        """For each of the nv rates, the index of its joint."""
+        """Return the index of the joint for each of the nv rates."""
         own = leaders(self.coordinates)
         return tuple(i for i in own for _ in range(self.joints[i].type.nv))
 
@@ -238,7 +239,8 @@ class Mechanism:
 
     @property
     def base_frame(self) -> str:
-        """The name, in words, of the frame in which gravity and placements are given."""
+        """Return the name of the frame in which gravity and placements are given: base frame, or world frame if the
+        base floats."""
         return "world frame" if self.has_free_root else BASE_FRAME
 
     @property
@@ -256,7 +258,7 @@ class Mechanism:
         return self.base_name if parent == BASE else self.joints[parent].link_name
 
     def path_to(self, body: int) -> tuple[int, ...]:
-        """Return the bodies on the path from the base to this body, which comes last."""
+        """Return the bodies on the path from the base to a body. The last entry is this body itself."""
         path: list[int] = []
         while body != BASE:
             path.append(body)

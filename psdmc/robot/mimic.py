@@ -13,22 +13,23 @@ from psdmc.robot.urdf import UrdfJoint
 
 
 class Followed(NamedTuple):
-    """The joint that a mimic joint follows, directly or through other mimic joints: q = ratio q_joint + offset."""
+    """Describes which joint a mimic joint follows, directly or through other mimic joints: q = ratio q_joint +
+    offset."""
 
     joint: UrdfJoint
     ratio: float
     offset: float
 
     def position(self, q: float) -> float:
-        """Return the position of the mimic joint if the joint that it follows is at q."""
+        """Return the position of a mimic joint from the position q of the joint that it follows."""
         return self.ratio * q + self.offset
 
 
 def mimic_coordinates(
     movable: Sequence[UrdfJoint], every: Sequence[UrdfJoint], source: str
 ) -> tuple[Coordinate, ...]:
-    """Return the coordinate of each movable joint. If a mimic joint follows another mimic joint, its leader is the
-    first joint of that sequence that follows none.
+    """Return the coordinate of each movable joint, which says which joint it follows. If a mimic joint follows another
+    mimic joint, the leader is the first joint of the sequence that follows none.
 
     movable  the robot's joints, in order
     every    all joints of the file
@@ -55,8 +56,8 @@ def mimic_coordinates(
 def followed(
     joint: UrdfJoint, known: Mapping[str, UrdfJoint], source: str, ends: Collection[str] = ()
 ) -> Followed:
-    """Return the joint that a mimic joint follows: the first one in the sequence that is no mimic joint, or is among
-    `ends`.
+    """Return the joint that a mimic joint follows, directly or through other mimic joints. The search ends at a joint
+    that is no mimic joint, or that is among `ends`.
 
     Raises InputError if the joints form a ring, or if the leader is not a movable joint.
     """

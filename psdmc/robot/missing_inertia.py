@@ -28,7 +28,7 @@ MOST_NAMED = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedBodies:
-    """The inertias of n moving links after this decision.
+    """The inertias of n moving links, after the decision which links are massless and which are unknown.
 
     parameters  n (11,), NaN if unknown
     zeros       n tuples of parameters assumed zero: the mass of massless links
@@ -49,8 +49,8 @@ def judged_bodies(
     unknown: Sequence[str],
     source: str,
 ) -> JudgedBodies:
-    """Return the inertias of a route's movable joints. They are unknown for links that `unknown` names, and for all
-    links if no moving link of the file has an inertia.
+    """Return the inertias of the links that the selected movable joints move. Inertias are unknown for links that
+    `unknown` names, and for all links if no moving link of the file has an inertia.
 
     bodies   for each joint, the links that move with it
     merged   for each joint, the parameters (10,) of these links together
@@ -109,8 +109,8 @@ def _unknown(
 
 
 def with_massless_warning(chain: Mechanism) -> Mechanism:
-    """Return the mechanism with an additional first note. It names the massless links, what psdmc cannot generate
-    because of them, and the option that makes their inertia unknown."""
+    """Return the mechanism with a warning about massless links as the first note. The note names the links, what psdmc
+    cannot generate because of them, and the option that makes their inertia unknown."""
     if not chain.massless:
         return chain
     idle = [chain.joints[i].name for i in idle_joints(chain)]
@@ -139,13 +139,14 @@ def massless_words(chain: Mechanism) -> str:
 
 
 def unknown_option(chain: Mechanism) -> str:
-    """Return the option of the command line that makes the inertia of massless links unknown, quoted for a shell."""
+    """Return the option of the command line, quoted for a shell, that makes the inertia of massless links unknown."""
     few = len(chain.massless) <= MOST_NAMED
     return f"--unknown {shlex.quote(','.join(chain.massless)) if few else MISSING}"
 
 
 def idle_joints(chain: Mechanism) -> tuple[int, ...]:
-    """Return the joints that move no mass, no inertia and no drive inertia, neither directly nor through mimic joints."""
+    """Return the joints that move no mass, no inertia and no drive inertia. Masses that a joint moves through mimic
+    joints count."""
     leaders = [i if c.leader is None else c.leader for i, c in enumerate(chain.coordinates)]
     moving = {
         leaders[i] for body, x in enumerate(chain.parameters) if x[:DRIVE].any() for i in chain.path_to(body)

@@ -1,8 +1,8 @@
 """Reads an MJCF file by MuJoCo's own compiler, which resolves defaults, includes, inertias of shapes and reference
 positions.
 
-The compiled model is converted to a URDF of the same tree (psdmc/robot/mjcf_text.py). So all functions for URDFs work,
-and a model file contains a source that can be read again without MuJoCo and the included files.
+The compiled model is converted to a URDF of the same tree (psdmc/robot/mjcf_text.py). So all functions for URDFs work.
+A model file contains this URDF, which can be read again without MuJoCo and the included files.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ REASON = 300
 
 @dataclass(frozen=True, slots=True)
 class MjcfRobot:
-    """The result of reading an MJCF: `text`, a URDF of the tree; gravity in m/s^2 along the world's axes; and
-    `is_free`, whether the root link is on a free joint."""
+    """The result of reading an MJCF file. `text` is a URDF of the tree, and `gravity` is in m/s^2 along the world's
+    axes. `is_free` says whether the root link is on a free joint."""
 
     text: str
     gravity: tuple[float, float, float]
@@ -190,7 +190,8 @@ def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None
 
 
 def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
-    """Return notes on elements of the file that the rigid-body model leaves out, with their names."""
+    """Return notes, with names, on elements of the MJCF file that the rigid-body model leaves out, such as
+    actuators."""
     joints, bodies = range(model.njnt), range(model.nbody)
     found = {
         "actuators are not modelled: efforts are those of the joints": _names(

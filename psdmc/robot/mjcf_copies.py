@@ -229,7 +229,8 @@ ROOM = ("nkey", "nuserdata", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_sit
 
 
 def refuse_large(element: Element, source: str) -> None:
-    """Raise InputError if an element asks for more points, cells or numbers than a robot's file needs."""
+    """Raise InputError if an element of an MJCF file asks for more points, cells or numbers than a robot's file
+    needs."""
     if element.tag == "mesh" and element.get("builtin"):
         most = MAX_CORNERS if element.get("builtin") == CONE else MAX_POINTS
         _refuse(_points(element), most, "points", f"mesh {_name(element)}", source)

@@ -1,5 +1,5 @@
-"""Finds elements of an MJCF file that change how the tree moves: mimic joints, and elements that psdmc rejects by
-name."""
+"""Finds elements of an MJCF file that change how the robot moves: mimic joints, which follow other joints, and elements
+that psdmc rejects by name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
 
 @dataclass(frozen=True, slots=True)
 class Follows:
-    """Describes a mimic joint: its q is ratio times that of `leader`, plus offset."""
+    """Describes a mimic joint of an MJCF file: its position q is ratio times that of `leader`, plus offset."""
 
     leader: str
     ratio: float
@@ -49,7 +49,8 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
 
 
 def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """Raise InputError with the names of joints whose reference position is not one where sine and cosine are exact."""
+    """Raise InputError with the names of joints whose reference position is outside the accepted range. At larger
+    angles, sine and cosine lose digits."""
     ranges = {int(mujoco.mjtJoint.mjJNT_HINGE): ANGLE, int(mujoco.mjtJoint.mjJNT_SLIDE): LENGTH}
     found = []
     for j in range(model.njnt):
@@ -117,12 +118,13 @@ def _wide_drives(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
 
 
 def of_balls(mujoco: Any, model: Any) -> list[int]:
-    """Return the numbers of the ball joints in MuJoCo's model."""
+    """Return the numbers of the ball joints among the joints of MuJoCo's model."""
     return [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL]
 
 
 def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
-    """Return the joints that follow another joint by an equality constraint, q1 - ref1 = c0 + c1 (q2 - ref2)."""
+    """Return the joints that follow another joint by an equality constraint q1 - ref1 = c0 + c1 (q2 - ref2). Here ref1
+    and ref2 are the reference positions of the joints."""
     found = {}
     for k in range(model.neq):
         if not (is_active(mujoco, model, k) and _is_linear(mujoco, model, k)):

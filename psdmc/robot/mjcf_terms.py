@@ -1,7 +1,7 @@
-"""Collects values that a compiled MJCF stores in several arrays: drive inertias, force coefficients and active
+"""Collects values that a compiled MJCF file stores in several arrays: drive inertias, force coefficients and active
 constraints.
 
-An array that the installed version of MuJoCo does not have counts as zero.
+If the installed version of MuJoCo does not have an array, its values count as zero.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 
 def armatures(mujoco: Any, model: Any) -> Array:
-    """Return the drive inertia (njnt,) at each joint, kg m^2 (kg): that of the joint plus that of each actuator times
-    the square of its gear ratio."""
+    """Return the drive inertia at each of MuJoCo's joints (njnt,), in kg m^2 (kg). It is the joint's armature plus each
+    actuator's armature times the square of the gear ratio."""
     found = np.array(model.dof_armature[model.jnt_dofadr], dtype=float)
     for k in _with_armature(model):
         if model.actuator_trntype[k] in _joint_transmissions(mujoco):
@@ -28,17 +28,20 @@ def armatures(mujoco: Any, model: Any) -> Array:
 
 
 def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
-    """Return the actuators with armature that do not act on a joint but, for example, on a tendon."""
+    """Return the actuators that have an armature (rotor inertia) but do not act on a joint; for example, they act on a
+    tendon."""
     return [k for k in _with_armature(model) if model.actuator_trntype[k] not in _joint_transmissions(mujoco)]
 
 
 def reflected(model: Any, actuator: int) -> float:
-    """Return the inertia of an actuator at its joint, which is its armature times the square of the gear ratio."""
+    """Return the inertia of an actuator as seen at the joint: the actuator's armature times the square of the gear
+    ratio."""
     return float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
 
 
 def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Return for each object whether it has a force of the given kind, of any sign and power of position or velocity.
+    """Return for each object of one kind whether a force of the given kind acts on it. The force may have any sign, and
+    may be nonlinear in position or velocity.
 
     kind  objects to examine: jnt (joints), dof (degrees of freedom), tendon or actuator
     word  kind of force: stiffness, damping or frictionloss
@@ -47,7 +50,8 @@ def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
 
 
 def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Return for each object whether its force is nonlinear or has the wrong sign. URDF cannot express such forces.
+    """Return for each object of one kind whether the force of the given kind is nonlinear or has the wrong sign. URDF
+    cannot express such forces.
 
     kind  objects to examine, as in `acting`
     word  kind of force, as in `acting`
@@ -58,14 +62,16 @@ def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
 
 
 def is_active(mujoco: Any, model: Any, equality: int) -> bool:
-    """Return whether an equality constraint is active: neither it nor all constraints are switched off."""
+    """Return whether an equality constraint is active. It is inactive if the file switches off this constraint, or all
+    constraints."""
     bits = mujoco.mjtDisableBit
     off = int(model.opt.disableflags) & int(bits.mjDSBL_EQUALITY | bits.mjDSBL_CONSTRAINT)
     return bool(model.eq_active0[equality]) and not off
 
 
 def gravity(mujoco: Any, model: Any) -> tuple[float, float, float]:
-    """Return gravity in m/s^2 along the world's axes. It is zero if the file switches gravity off."""
+    """Return the acceleration of gravity in m/s^2 along the world's axes. It is zero if the file switches gravity
+    off."""
     if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return 0.0, 0.0, 0.0
     x, y, z = model.opt.gravity.tolist()
@@ -97,7 +103,8 @@ def _sizes(model: Any) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of bodies and joints by their numbers in MuJoCo. Objects without a name in the file get a new one."""
+    """Names of bodies and joints, by the numbers that MuJoCo gives them. Bodies and joints without a name in the file
+    get a new name."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]

@@ -1,9 +1,11 @@
 """Converts the tree of a compiled MJCF to the text of a URDF, with all digits of every number.
 
 MuJoCo places a body in its parent, then moves it by its joints one after the other. Each joint moves about or along an
-axis through a point of the body by q - ref. URDF has one joint per link, about the link's origin. So a body with k
-joints becomes a chain of k links, each at the anchor of its joint. A fixed link follows if the last anchor is not the
-body's origin. Each joint frame is rotated (or shifted) by -ref, so that its q equals MuJoCo's.
+axis through a point of the body by q - ref. URDF has one joint per link, about the origin of the link.
+
+So a body with k joints becomes a chain of k links, each at the anchor of its joint. A fixed link follows if the last
+anchor is not the body's origin. Each joint frame is rotated (or shifted) by -ref, so that the q of the URDF's joint
+equals MuJoCo's.
 """
 
 from __future__ import annotations
@@ -41,8 +43,8 @@ class _Writer:
     joints: set[str] = field(default_factory=set)
 
     def link(self, name: str, body: int | None = None) -> None:
-        """Add a link with the inertia of a body, if that has one. Without a body, it is a link with zero inertia
-        between two joints."""
+        """Add a link to the URDF, with the inertia of a body of the MJCF if the body has one. Without a body, add a
+        link with zero inertia, which lies between two joints of one body."""
         element = SubElement(self.root, "link", name=name)
         if body is not None and not (self.model.body_mass[body] > 0.0 or self.model.body_inertia[body].any()):
             return
@@ -73,7 +75,7 @@ def tree_text(
     free: int | None,
     notes: Sequence[str],
 ) -> str:
-    """Return the text of the URDF.
+    """Return the text of a URDF with the tree of a compiled MJCF.
 
     follows  the mimic joints
     free     the body that becomes the root link, on a free joint
@@ -220,7 +222,8 @@ COMPILER = {
 
 
 def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
-    """Return a <mujoco> element with the bodies, inertias, joints, drive inertias and gravity of the compiled model."""
+    """Return a <mujoco> element with the bodies, inertias, joints, drive inertias and gravity of the compiled model,
+    and nothing else."""
     root = Element("mujoco", model="kept")
     SubElement(root, "compiler", COMPILER)
     SubElement(root, "option", gravity=_kept_numbers(model.opt.gravity))

@@ -1,5 +1,5 @@
-"""Computes a robot's torques with MuJoCo, if it is installed. MuJoCo is a second reference with a parser and an
-algorithm that differ from Pinocchio's."""
+"""Computes a robot's torques with MuJoCo, if it is installed. MuJoCo is a second reference besides Pinocchio: it reads
+files and computes torques by other code."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ States = tuple[Array, Array, Array]
 
 
 class NotCompared(Exception):
-    """MuJoCo cannot read this robot, so nothing is compared with it. The message says why."""
+    """An exception: MuJoCo is not installed or cannot read a robot, so nothing is compared with MuJoCo. The message
+    says why."""
 
 
 def mujoco_version() -> str:
@@ -55,8 +56,8 @@ def mujoco_version() -> str:
 
 
 def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return the torques (k, nv), N m (N), that MuJoCo computes from the robot's file at q (k, nq), qd and qdd (k,
-    nv).
+    """Return the torques (k, nv), N m (N), that MuJoCo computes from the robot's file. They are for k states q (k, nq),
+    qd and qdd (k, nv).
 
     Raises NotCompared if MuJoCo is not installed, or does not read this file.
     """
@@ -161,7 +162,7 @@ def _entries(first: Array, counts: Sequence[int]) -> list[int]:
 
 
 def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-    """Return the states q (k, nq), qd and qdd (k, nv) of a robot with a floating base in MuJoCo's conventions.
+    """Return k states q (k, nq), qd and qdd (k, nv) of a robot with a floating base, in MuJoCo's conventions.
 
     The quaternion becomes (w, x, y, z). The linear rates become those along the world's axes. The acceleration of the
     base's origin is a + w x v along the base's axes, for rates v, w and their derivatives a.
@@ -176,7 +177,8 @@ def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
 
 
 def force_from_mujoco(q: Array, tau: Array) -> Array:
-    """Return MuJoCo's efforts (k, nv) with the force on the floating base along the base's own axes; q is MuJoCo's."""
+    """Return joint efforts (k, nv) for k states with the force on the floating base along the axes of the base.
+    MuJoCo's efforts have the force along the world's axes; `q` is in MuJoCo's convention."""
     back = np.swapaxes(_rotations(q[:, 3:7]), 1, 2)
     return np.concatenate([_turned(back, tau[:, :3]), tau[:, 3:]], axis=1)
 

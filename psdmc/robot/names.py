@@ -10,7 +10,7 @@ from psdmc.robot.limits import MAX_NAME, shown
 
 
 def naming_faults(names: Sequence[str], what: str) -> list[str]:
-    """Return the faults of the names of a robot's links or joints, one sentence each."""
+    """Return what is wrong with the names of a robot's links or joints, one sentence for each fault."""
     counts = Counter(names)
     faults = [f"a {what} has no name"] if counts[""] else []
     faults += [fault for name in counts for fault in name_faults(name, what)]
@@ -18,7 +18,7 @@ def naming_faults(names: Sequence[str], what: str) -> list[str]:
 
 
 def name_faults(name: str, what: str) -> list[str]:
-    """Return the faults of one name, one sentence each."""
+    """Return what is wrong with one name, one sentence for each fault."""
     faults = [f"{what} name {shown(name)} has control characters"] if _has_control(name) else []
     if len(name) > MAX_NAME:
         faults.append(f"{what} name {shown(name)}: expected at most {MAX_NAME}")

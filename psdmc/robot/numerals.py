@@ -1,7 +1,8 @@
 """Reads numbers in robot files. A number must be a plain decimal in ASCII.
 
-Python's float also accepts underscores, digits of other alphabets and other kinds of spaces. The C++ streams of
-urdfdom accept none of them and read zero without a message. With one grammar all readers get the same number.
+Python's float also accepts underscores, digits of other alphabets and other kinds of spaces. The C++ streams of urdfdom
+accept none of them and read zero without a message. Because psdmc accepts only plain decimals, all readers get the same
+number.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ def words(text: str) -> list[str]:
 
 
 def decimal(word: str) -> float | None:
-    """Return the number that a word represents, or None if the word is no finite decimal number, or is too long or too
-    small."""
+    """Return the number that a word represents. Return None if the word is no finite decimal number, or if it is too
+    long or too small."""
     if len(word) > MAX_CHARACTERS or not DECIMAL.fullmatch(word):
         return None
     value = float(word)

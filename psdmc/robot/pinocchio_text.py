@@ -37,7 +37,7 @@ def pinocchio_model(
     """Return Pinocchio's model of a URDF that read_urdf has accepted. Its joints are called JOINT_PREFIX + name.
 
     movable   names of joints; all others become fixed, and their bodies are merged (None: all joints stay)
-    kinds     joint types of the file and the types that replace them
+    kinds     joint types of the file -> types that replace them
     free_root name of a free joint for the root link (None: the root link is fixed)
 
     A continuous joint becomes a revolute one, because Pinocchio would use a cosine and a sine as its coordinates.
@@ -74,7 +74,8 @@ def _with_balls(model: pinocchio.Model, balls: Collection[str]) -> pinocchio.Mod
 
 
 def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Model:
-    """Return the model with some joints fixed at given positions and their bodies merged.
+    """Return Pinocchio's model with some joints fixed at given positions. The bodies that such a joint connects are
+    merged.
 
     held  positions by joint name, without JOINT_PREFIX
     """
@@ -89,9 +90,9 @@ def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Mo
 
 
 def reduced(model: pinocchio.Model, joints: Sequence[int], q: Array) -> pinocchio.Model:
-    """Return the model with these joints fixed at their positions in q.
+    """Return Pinocchio's model with some joints fixed at their positions in q.
 
-    Pinocchio makes the frames of such joints their own parents. This function restores the right parents.
+    Pinocchio gives a frame of a fixed joint a wrong parent: the frame itself. This function restores the right parents.
     """
     found = pinocchio.buildReducedModel(model, list(joints), q)
     number = {_key(frame): k for k, frame in enumerate(found.frames)}

@@ -23,7 +23,7 @@ def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
 
 
 def made_again(value: Any) -> tuple[type[Any], tuple[Any, ...]]:
-    """Return what `__reduce__` of a dataclass must return so that pickle and copy call its constructor. The arrays of
+    """Return the value of `__reduce__` with which pickle and copy call the constructor of a dataclass. The arrays of
     the copy are then read-only, too."""
     return type(value), tuple(getattr(value, field.name) for field in fields(value) if field.init)
 

@@ -25,9 +25,9 @@ DIFFERENCE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n), SI.
+    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n) with n joints, SI.
 
-    tip_name     the frame of `jacobian`
+    tip_name     name of the frame of which `jacobian` returns the Jacobian
     frame_names  the named frames; empty: the tip alone
     rows         for each named frame, 3 for a contact point, 6 for a surface, 0 for none; empty: all are points
     """
@@ -39,7 +39,8 @@ class Reference:
 
     @property
     def contacts(self) -> list[tuple[int, int]]:
-        """For each contact, Pinocchio's number of its frame, and its number of rows (3 or 6)."""
+        """Return for each contact the number of the contact's frame in Pinocchio's model, and the number of rows (3 or
+        6)."""
         ids = self.frame_ids
         return [
             (frame, rows) for frame, rows in zip(ids, self.rows or (POINT,) * len(ids), strict=True) if rows
@@ -52,7 +53,8 @@ class Reference:
 
     @property
     def joint_types(self) -> list[JointType]:
-        """The types of the joints in Pinocchio's order. All joints with one coordinate count as revolute."""
+        """Return the types of the joints in the order of Pinocchio's model. All joints with one coordinate count as
+        revolute."""
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
@@ -63,7 +65,7 @@ class Reference:
         return self.each(pinocchio.aba, q, qd, tau)
 
     def mass_matrix(self, q: Array) -> Array:
-        """Return the mass matrices (..., n, n), with both triangles."""
+        """Return the mass matrices (..., n, n) at positions q, with both triangles."""
         upper = np.triu(self.each(pinocchio.crba, q))
         return upper + np.swapaxes(np.triu(upper, 1), -1, -2)
 
@@ -78,7 +80,8 @@ class Reference:
         return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
     def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """Return the derivatives of the torques by q, qd and qdd, (..., n, n) each. Row i belongs to tau[i]."""
+        """Return the derivatives of the joint torques by q, qd and qdd, an array (..., n, n) each. Row i belongs to
+        tau[i]."""
 
         def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
@@ -90,8 +93,8 @@ class Reference:
     def forward_dynamics_derivatives(
         self, q: Array, qd: Array, tau: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the accelerations (..., n) and their derivatives by q, qd and tau, (..., n, n) each. Row i belongs to
-        qdd[i]."""
+        """Return the joint accelerations (..., n), and their derivatives by q, qd and tau, an array (..., n, n) each.
+        Row i belongs to qdd[i]."""
 
         def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
@@ -101,7 +104,8 @@ class Reference:
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
     def integrated(self, q: Array, way: Array) -> Array:
-        """Return the positions (..., nq) that constant rates lead to from q; `way` is the rates times the duration."""
+        """Return the positions (..., nq) after a motion from q at constant rates. `way` is the rates multiplied by the
+        duration."""
 
         def moved(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.asarray(pinocchio.integrate(model, *state))
@@ -109,7 +113,8 @@ class Reference:
         return self.each(moved, q, way)
 
     def integrated_slopes(self, q: Array, way: Array) -> tuple[Array, Array]:
-        """Return the derivatives of `integrated` by q and by `way`, (..., nv, nv) each, along tangents."""
+        """Return the derivatives of `integrated` by q and by `way`, an array (..., nv, nv) each. Changes of positions
+        are small motions along the joint rates."""
 
         def slopes(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.array(
@@ -122,7 +127,7 @@ class Reference:
     def coordinate_rates(self, q: Array, qd: Array) -> Array:
         """Return the time derivatives (..., nq) of the coordinates at these rates.
 
-        They are a central difference of eighth order of `integrate`, with an error of 1e-12 of the rates.
+        They are computed by a central difference of eighth order, with an error of 1e-12 of the rates.
         """
         step = DIFFERENCE / max(1.0, float(np.abs(qd).max()))
         total = np.zeros_like(q)
@@ -139,7 +144,8 @@ class Reference:
         return self.each(unit, q)
 
     def jacobian(self, q: Array) -> Array:
-        """Return the Jacobian (..., 6, n) of the tip frame: linear, then angular, along the axes of the base frame."""
+        """Return the Jacobian (..., 6, n) of the tip frame along the axes of the base frame: three linear rows, then
+        three angular rows."""
         frame = self.model.getFrameId(self.tip_name)
         aligned = pinocchio.LOCAL_WORLD_ALIGNED
 
@@ -153,7 +159,7 @@ class Reference:
         return self.each(of_tip, q)
 
     def poses(self, q: Array, link_names: Sequence[str]) -> Array:
-        """Return the poses (..., len(link_names) + 1, 4, 4) of the links' frames and of the tip in the base frame."""
+        """Return the poses (..., number of links + 1, 4, 4) of all links' frames and of the tip in the base frame."""
         kind = pinocchio.FrameType.BODY
         frames = [self.model.getFrameId(name, kind) for name in link_names]
         frames.append(self.model.getFrameId(self.tip_name))
@@ -171,8 +177,8 @@ class Reference:
 
     @property
     def path_length(self) -> float:
-        """Length in m of the longest path from the base to the tip or to another end of the tree, at the neutral
-        position. The path goes through all frames, including those of fixed joints."""
+        """Return the length in m of the longest path from the base to an end of the tree, at the neutral position. The
+        path goes through all frames, including those of fixed joints."""
         model, data = self.model, self.model.createData()
         pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
         parents = list(model.parents)
@@ -182,8 +188,8 @@ class Reference:
         return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
 
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
-        """Return the values of a Pinocchio function of (model, data, state ...) at every state; leading axes
-        broadcast."""
+        """Return the values of a Pinocchio function of (model, data, state ...) at every state. The leading axes of the
+        states broadcast as in NumPy."""
         data = self.model.createData()
         rows = [np.asarray(state, dtype=float) for state in states]
         lead = np.broadcast_shapes(*(row.shape[:-1] for row in rows))
@@ -223,8 +229,8 @@ def pinocchio_version() -> str:
 # must come before its followers.
 @dataclass(frozen=True, slots=True, eq=False)
 class OnCoordinates:
-    """The dynamics of a Reference for a robot with mimic joints, in the robot's own coordinates q, qd, qdd, tau (...,
-    nv)."""
+    """The dynamics of a robot with mimic joints, computed with Pinocchio. The arrays q, qd, qdd, tau (..., nv) are for
+    the joints that follow no other joint."""
 
     free: Reference
     following: Following
@@ -237,7 +243,8 @@ class OnCoordinates:
         return self.following.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))
 
     def on_joints(self, q: Array, *rates: Array) -> tuple[Array, ...]:
-        """Return the positions and rates (..., n) of every joint, mimic joints included."""
+        """Return the positions and rates (..., n) of all n joints from those of the joints that follow no other
+        joint."""
         return self.following.positions(q), *map(self.following.rates, rates)
 
     @property

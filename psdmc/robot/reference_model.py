@@ -1,13 +1,14 @@
 """Builds Pinocchio's model of a robot from the robot's own file. psdmc compares its results with this model.
 
 The model shares as little code as possible with psdmc's own reader. Pinocchio reads a URDF, merges its links and locks
-its joints; `dh_model` reads a DH table. Only the names of joints, links, base and tip come from psdmc's mechanism. For
-a robot with snapped rotations, the placements of the joints also come from the mechanism, because the file does not
+its joints; `dh_model` reads a DH table. Only the names of joints, links, base and tip come from psdmc's mechanism.
+
+For a robot with snapped rotations, the placements of the joints also come from the mechanism, because the file does not
 have them.
 
 The model has one coordinate per joint (a continuous joint is an angle) and the joints in the order of the mechanism.
-Its universe is the base, and it has a frame for the tip. All Pinocchio functions work with it on plain arrays q, qd,
-qdd (n,).
+The root frame of the model (Pinocchio's universe) is the base, and there is a frame for the tip. All Pinocchio
+functions take plain arrays q, qd, qdd (n,).
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ def reference_model(
     snapped      True: joints are placed as in the mechanism; False: as in the file, rounding included
     parameters   (n, 11) standard parameters about the link frames that replace those of the file
 
-    Bodies with parameters assumed zero get the mechanism's values, because the file does not have them. Raises
-    ValueError if parameters are needed and unknown.
+    Bodies with parameters assumed zero (option assume_zero) get the mechanism's values, because the file does not have
+    them. Raises ValueError if parameters are needed and unknown.
     """
     chain = loaded.mechanism
     model = as_written(loaded)
@@ -59,8 +60,8 @@ def reference_model(
 
 
 def as_written(loaded: LoadedRobot) -> pinocchio.Model:
-    """Return Pinocchio's model of the file without psdmc's changes. Only names come from the mechanism. Links without
-    inertia in the file have none in the model."""
+    """Return the model that Pinocchio makes from the robot file alone, without psdmc's assumptions. psdmc only chooses
+    the joints and names them. Links without inertia in the file have none in the model."""
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:
@@ -107,9 +108,10 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
 
 
 def body_of(parameters: Array) -> pinocchio.Inertia:
-    """Return Pinocchio's inertia with ten standard parameters, physically possible or not.
+    """Return Pinocchio's inertia object with the given ten standard parameters, which need not be physically possible.
 
-    Pinocchio divides by the mass. A body without mass gets the smallest possible mass, and its first moments are lost.
+    Pinocchio divides by the mass. A body without mass gets the smallest possible mass, and the first moments of the
+    body are lost.
     """
     if not parameters[:DRIVE].any():
         return pinocchio.Inertia.Zero()
@@ -120,7 +122,8 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
 
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
-    """Return whether the file alone does not determine some bodies, because parameters are assumed zero or unknown."""
+    """Return whether parameters of some bodies are assumed zero or unknown, so that the file alone does not determine
+    these bodies."""
     return bool(_assumed(loaded.mechanism))
 
 
@@ -169,9 +172,10 @@ MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelP
 
 
 def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
-    """Return Pinocchio's model of a DH table that read_dh has accepted. Its links are called link1, link2 and so on.
+    """Return Pinocchio's model of a DH table that read_dh has accepted. The links of the model are called link1, link2
+    and so on. A body with unknown numbers gets zeros.
 
-    gravity   m/s^2 in the base frame, replaces that of the table; bodies with unknown numbers are zero
+    gravity   m/s^2 in the base frame, replaces that of the table
     """
     table = tomllib.loads(text)
     is_modified = table.get("convention", "standard") == "modified"

@@ -1,9 +1,10 @@
 """Replaces the rounded entries of a file's rotations by exact zeros and ones.
 
 Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16 in floats. Both turn an exact zero of the dynamics into a tiny
-number that later steps cannot distinguish from a small one. Because its rows are orthogonal, a rotation matrix has six
-zeros (axes map to axes), four (one axis maps to an axis), one, or none. Only these three patterns are tried, the one
-with most zeros first.
+number, which later steps would take for a real value.
+
+Because the rows are orthogonal, a rotation matrix has six zeros (axes map to axes), four (one axis maps to an axis),
+one, or none. The patterns with six, four and one zero are tried, in this order.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ zero. What a file means by 1.57079632679 for a right angle is a thousand times l
 
 
 def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
-    """Return the rotation with most zeros within `tolerance` (rad) of a (3, 3) rotation, and the angle between them
-    (rad).
+    """Return a rotation (3, 3) near the given one, with as many exact zeros as possible, and the angle between both
+    (rad). The angle is at most `tolerance` (rad).
 
-    Zeros and ones are exact, and the other entries are orthonormal to machine precision. If no such rotation is near,
-    the function returns the rotation itself and 0. Floating-point noise (ROUNDING) is removed with any tolerance.
+    Zeros and ones are exact, and the other entries are orthonormal to machine precision. If no rotation with zeros is
+    near, the function returns the given rotation and 0. Floating-point noise (ROUNDING) is removed with any tolerance.
     """
     if np.all((rotation == 0.0) | (np.abs(rotation) == 1.0)):
         return rotation + 0.0, 0.0
@@ -46,8 +47,8 @@ def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
 
 
 def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
-    """Return a unit vector (3,) with exact zeros within `tolerance` (rad) of an axis, and the angle between them
-    (rad)."""
+    """Return a unit vector (3,) near the given axis, with as many exact zeros as possible, and the angle between both
+    (rad). The angle is at most `tolerance` (rad)."""
     unit = axis / length(axis)
     kept = np.where(np.abs(unit) > max(tolerance, ROUNDING) / math.sqrt(2.0), unit, 0.0)
     snapped = np.sign(kept) if np.count_nonzero(kept) == 1 else kept / length(kept)
@@ -55,12 +56,13 @@ def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
 
 
 def snap_translation(translation: Array, chain_length: float) -> Array:
-    """Return a translation (3,) in m in which entries are zero that are only rounding errors (LENGTH_ROUNDING)."""
+    """Return a translation (3,) in m, in which entries that are only rounding errors (LENGTH_ROUNDING) are set to
+    zero."""
     return np.where(np.abs(translation) > LENGTH_ROUNDING * chain_length, translation, 0.0) + 0.0
 
 
 def angle_between(a: Array, b: Array) -> float:
-    """Return the angle of the rotation from a to b, rad. It is accurate for tiny angles."""
+    """Return the angle between the orientations a and b (rotation matrices), rad. It is accurate for tiny angles."""
     return float(2.0 * arcsine(min(1.0, length((a - b).reshape(-1)) / math.sqrt(8.0))))
 
 
@@ -123,11 +125,11 @@ def _unit(x: float, y: float) -> tuple[float, float]:
 
 
 def link_rotation(axis: Array) -> Array:
-    """Return the rotation (3, 3) from a link's frame into a joint frame whose z axis is the given unit axis in the
-    link.
+    """Return the rotation (3, 3) from a link's frame into the joint frame that psdmc chooses. The z axis of the joint
+    frame is the given unit axis in the link.
 
-    The x axis of the joint frame is the coordinate axis most perpendicular to z, made exactly perpendicular. So an
-    axis along a coordinate axis gives an exact signed permutation, and parallel axes give parallel frames.
+    The x axis of the joint frame is the coordinate axis most perpendicular to z, made exactly perpendicular. So an axis
+    along a coordinate axis gives an exact signed permutation, and parallel axes give parallel frames.
     """
     k = int(np.argmin(np.abs(axis)))
     x = np.eye(3)[k] - axis[k] * axis
@@ -142,8 +144,8 @@ MOST = 8
 
 
 def coarse_right_angles(angles: Mapping[str, Sequence[float]], snap: float) -> tuple[str, ...]:
-    """Return a note if joints have multiples of pi/2 with few digits that differ by more than `snap` (rad) from the
-    exact angles.
+    """Return a note if the file states right angles with few digits, such as 1.57. The note names joints whose angles
+    differ by more than `snap` (rad) from exact multiples of pi/2.
 
     angles  rad, by the joint's name
     snap    rad; 0 means that the user wants the file's angles, so there is no note

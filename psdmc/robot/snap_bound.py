@@ -1,4 +1,5 @@
-"""Computes a bound of the change of torques by snapping, from Pinocchio's model of the original file.
+"""Computes an upper bound of the change of torques by snapping, which replaces rotations by near ones with exact zeros.
+The bound is computed with Pinocchio's model of the original file.
 
 Each snapped angle is applied to Pinocchio's model in every direction that it could affect. The sum of the changes of
 the torques is a bound to first order.
@@ -20,8 +21,8 @@ MARGIN = 2.0
 
 
 def angles_by_segment(snaps: Sequence[Snap], n: int, largest: float) -> Array:
-    """Return the sum of the snapped angles, rad (n + 2,): before each joint (0 to n - 1), before the tip (n), and from
-    root to base (last).
+    """Return the snapped angles, summed for each section of the robot, rad (n + 2,). The sections are before each joint
+    (0 to n - 1), before the tip (n), and from root to base (last).
 
     largest   rad: each single angle counts at most this much
     """
@@ -32,7 +33,8 @@ def angles_by_segment(snaps: Sequence[Snap], n: int, largest: float) -> Array:
 
 
 def torque_bound(reference: Reference, angles: Array, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return the bound (n,) of the change of each joint's torque over the states (k, n), N m (N).
+    """Return an upper bound (n,) of the change of each joint's torque by snapped rotations, N m (N). The bound covers
+    all k states q, qd, qdd (k, n).
 
     angles   (n + 2,) rad, as from angles_by_segment
     """

@@ -29,8 +29,8 @@ MOST_NOTES = 100
 
 
 def with_source_words(draft: Draft, text: str, source: str) -> Draft:
-    """Return the draft with the drive inertias, ball joints and notes that psdmc wrote into the URDF. Raises
-    InputError if one of their numbers is wrong."""
+    """Return the robot with the drive inertias, ball joints and notes that psdmc wrote into the URDF. Raises InputError
+    if one of their numbers is wrong."""
     if SPACE not in text:
         return draft
     root = parse_xml(text, source, "robot")

@@ -20,11 +20,11 @@ BALL = "a URDF has no joint about every axis: write it as three revolute ones th
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """The selected joints: `to_base` from the root to the base link, and `path` from the base link to the tip, with
-    fixed joints.
+    """The joints of a URDF that a model contains, with the fixed joints between them. `to_base` is the path from the
+    root to the base link, `path` that from the base link to the tip.
 
-    ends   end links if `path` is the whole tree; empty for a chain. The joints of a tree are in the order of Pinocchio's
-           buildModelFromUrdf: branch by branch, and by name if they are on the same link
+    ends   end links if `path` is the whole tree; empty for a chain. The joints of a tree are in the order of
+           Pinocchio's buildModelFromUrdf: branch by branch, and by name if they are on the same link
     """
 
     base: str
@@ -42,11 +42,11 @@ class Route:
 def find_route(
     robot: UrdfRobot, base: str | None, tip: str | None, source: str, frames: Sequence[str] = ()
 ) -> Route:
-    """Return the chain from base (default: the root) to tip (default: see default_tip).
+    """Return the joints from the base link (default: the root) to the tip link (default: see default_tip).
 
-    If neither is given and the joints branch, return the whole tree. Its tip is the first of `frames`, or of its end
-    links. Raises InputError if a link is unknown, the tip is not below the base, no joint moves, or psdmc cannot model
-    a joint.
+    If neither link is given and the joints branch, return the whole tree. The tip of a tree is the first of `frames`,
+    or of the end links. Raises InputError if a link is unknown, the tip is not below the base, no joint moves, or psdmc
+    cannot model a joint.
     """
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in robot.inertials:
@@ -144,7 +144,8 @@ def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
 
 
 def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
-    """Return the joints from link `start` down to link `end`, or None if `end` is not below `start`."""
+    """Return the joints on the path from link `start` outward to link `end`. Return None if `end` is not beyond
+    `start`."""
     above = {joint.child: joint for joint in robot.joints}
     path: list[UrdfJoint] = []
     link = end
@@ -157,7 +158,8 @@ def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, .
 
 
 def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[str, ...]]:
-    """Return the end of the path with most movable joints, and a note if several ends were possible.
+    """Return the name of the link at the end of the path with most movable joints. Return a note, too, if several ends
+    were possible.
 
     If several paths have equally many joints, like the fingers of a gripper, the tip is the link where they branch.
     That link must have more movable joints before it than each path has after it. Otherwise the function raises an

@@ -16,7 +16,8 @@ SLACK = 1e-6
 
 
 def units_of(types: Iterable[JointType]) -> tuple[tuple[int, int], ...]:
-    """Return the (start, stop) slices of q that must have length one, for joints of these types in order."""
+    """Return the slices (start, stop) of q that are quaternions or pairs of cosine and sine, whose length must be one.
+    `types` are the types of the robot's joints, in order."""
     found, start = [], 0
     for kind in types:
         if kind.unit.stop:
@@ -29,7 +30,7 @@ def refuse_other_lengths(what: str, q: NDArray[Any], units: Sequence[tuple[int, 
     """Raise InputError for the first row of q (..., nq) in which a quaternion, or a pair of cosine and sine, has not
     length one.
 
-    units  (start, stop) slices of q that must have length one
+    units  slices (start, stop) of q that must have length one
     """
     rows = np.reshape(q, (-1, q.shape[-1]))
     for start, stop in units:

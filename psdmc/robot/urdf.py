@@ -1,4 +1,4 @@
-"""Reads a URDF into plain data and checks every number, before a chain is selected."""
+"""Reads a URDF into plain data and checks every number. The joints of the robot are selected later (tree.py)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ normalized."""
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The placement of a frame in another one: xyz (m), and either rpy (rad) or a unit quaternion (x, y, z, w)."""
+    """The placement of a frame in another one, as in a URDF: xyz (m), and either rpy (rad) or a unit quaternion (x, y,
+    z, w)."""
 
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)
@@ -50,8 +51,9 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class UrdfInertial:
-    """The element <inertial> of a link: mass in kg, and inertia in kg m^2 (INERTIA_NAMES) about the centre of mass
-    along the axes of the inertial frame. `origin` places that frame in the link; its origin is the centre of mass."""
+    """The element <inertial> of a link: mass in kg, and inertia in kg m^2 (INERTIA_NAMES). The inertia is about the
+    centre of mass, along the axes of the inertial frame. `origin` is the placement of the inertial frame in the link;
+    the origin of this frame is the centre of mass."""
 
     mass: float
     inertia: tuple[float, ...]
@@ -69,12 +71,12 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One element <joint>.
+    """One element <joint> of a URDF.
 
     origin        placement of the child link in the parent at q = 0
-    axis          axis in the child link
-    mimic         the joint that it follows, if it is a mimic joint
-    has_dynamics  whether it has friction, damping or a spring
+    axis          axis of the joint in the child link
+    mimic         for a mimic joint, which joint is followed, and how
+    has_dynamics  whether the joint has friction, damping or a spring
     held          for a locked joint, the additional placement of the child by the locked position
     """
 
@@ -96,7 +98,8 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class UrdfRobot:
-    """A tree of links. `inertials` contains every link in the file's order, and None for a link without <inertial>.
+    """The content of a URDF: a tree of links. `inertials` contains every link in the file's order, and None for a link
+    without <inertial>.
 
     notes      content of the file that psdmc ignores, one sentence each
     free_root  the free joint that was added above the file's root link, if any
@@ -309,7 +312,7 @@ Ends = tuple[str, str, str]
 
 
 def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
-    """Return the reasons why the links do not form one tree, one sentence each."""
+    """Return the reasons why the links of a URDF do not form one tree, one sentence for each."""
     known = dict.fromkeys(links)
     faults = []
     parents: dict[str, list[str]] = {}

@@ -24,15 +24,16 @@ to 1e3 rad leaves 1e-13, another reading of a number far more."""
 
 
 def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
-    """Return the placement of an <origin> element. Its rotations about the axes are snapped one by one (snap in rad)."""
+    """Return the placement that an <origin> element states. The rotations about the three axes are snapped one by one:
+    near right angles become exact (`snap` in rad)."""
     if origin.quaternion is None:
         return Placement(roll_pitch_yaw(origin.rpy, snap), np.array(origin.xyz))
     return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
 
 
 def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
-    """Return the placement of a joint's child link at q = 0, or at the locked position. Rotations are snapped (snap in
-    rad)."""
+    """Return the placement of a joint's child link at q = 0, or at the locked position of the joint. Rotations are
+    snapped: near right angles become exact (`snap` in rad)."""
     place = placement_of(joint.origin, snap)
     if joint.held is None:
         return place
@@ -40,17 +41,17 @@ def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
 
 
 def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
-    """Return ten standard parameters for each movable joint: those of all links that move with it, about its child
-    link's frame.
+    """Return ten standard parameters for each movable joint, about the frame of the joint's child link. The parameters
+    are those of all links that move with the joint.
 
-    Joints that are not on the route are locked at their neutral position.
+    Joints that are not among the selected ones are locked at their neutral position.
     """
     return [without_noise(_merged(robot, body)) for body in bodies_of(robot, route.movable)]
 
 
 def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:
-    """Return for each of these joints the links that move with it and with no later joint, by their placements in its
-    child link's frame. The child link comes first."""
+    """Return for each movable joint the links that it moves together, up to the next movable joints. A link has the
+    placement in the frame of the joint's child link, which comes first."""
     below: dict[str, list[tuple[str, Placement]]] = {}
     moves = {joint.name for joint in movable}
     for joint in robot.joints:
@@ -60,7 +61,7 @@ def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, 
 
 
 def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
-    """Return the standard parameters (10,) of a link's inertia about a frame in which the link has the placement
+    """Return the standard parameters (10,) of a link about another frame, in which the link has the placement
     `place`."""
     if body is None:
         return np.zeros(10)
@@ -80,7 +81,8 @@ def hold_against_pinocchio(
     """Raise InputError with the name of the first link whose inertia Pinocchio reads or merges differently.
 
     First each link is compared alone, in a model where every joint is revolute, so that no links are merged. Then the
-    merged inertias are compared. `held` are the positions of joints that are locked away from their neutral position.
+    merged inertias are compared. `held` are the positions of joints that are locked at another position than the
+    neutral one.
     """
     free = robot.free_root
     alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), free_root=free)
@@ -132,7 +134,7 @@ def _listed(values: Array) -> str:
 
 
 def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:
-    """Return the named frame 'tool', given by x y z (m), roll pitch yaw (rad) in the tip frame."""
+    """Return the named frame 'tool', placed in the tip frame by x y z (m) and roll pitch yaw (rad)."""
     # Turns are about fixed axes x, y, z in turn, as in URDF.
     x, y, z, roll, pitch, yaw = tool
     return NamedFrame(

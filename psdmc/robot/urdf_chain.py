@@ -1,4 +1,5 @@
-"""Makes a robot from a URDF: places the joints and merges the inertias by the numbers of the file."""
+"""Makes a robot from a URDF: places the joints and merges the inertias of links that move together, by the numbers of
+the file."""
 
 from __future__ import annotations
 
@@ -41,10 +42,11 @@ ALONG_Z = (0.0, 0.0, 1.0)
 
 
 def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
-    """Return the chain from base to tip, or the whole tree (see find_route), with gravity in the root frame.
+    """Return the robot of a URDF: the chain from base to tip, or the whole tree (see find_route). Gravity is in the
+    root frame.
 
-    The options determine snapped rotations, locked joints, a floating base and unknown inertias. If the options name
-    no frames, the named frames of a tree are its end links.
+    The options determine snapped rotations, locked joints, a floating base and unknown inertias. If the options name no
+    frames, the named frames of a tree are the end links.
     """
     snap, frames = options.snap, options.frames
     read = read_urdf(text, source)
@@ -179,8 +181,8 @@ def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap], segment: int) -> P
 def merged_placement(
     place: Placement, where: str, snap: float, snaps: list[Snap], segment: int, reach: float
 ) -> Placement:
-    """Return the product of several placements, with its rotation snapped. The change by snapping is appended to
-    `snaps`."""
+    """Return the product of several placements, with the rotation snapped (replaced by a near one with exact zeros).
+    The angle of this change is appended to `snaps`."""
     rotation, angle = snap_rotation(place.rotation, snap)
     _record(snaps, where, angle, segment)
     return Placement(rotation, snap_translation(place.translation, reach))
@@ -221,7 +223,8 @@ WORLD = "universe"
 
 
 def on_free_root(robot: UrdfRobot) -> UrdfRobot:
-    """Return the robot with its root link on a free joint between the world frame and the root link's frame."""
+    """Return the robot with a free joint (six degrees of freedom) between the world frame and the frame of the root
+    link."""
     name = free_name(ROOT_JOINT, {joint.name for joint in robot.joints})
     world = free_name(WORLD, set(robot.inertials))
     free = UrdfJoint(
@@ -252,8 +255,8 @@ def urdf_frames(
     names: Iterable[str],
     source: str,
 ) -> tuple[NamedFrame, ...]:
-    """Return the named frames of these links, placed by the numbers of the file. The tip has the same placement as in
-    the chain.
+    """Return the named frames of these links, placed by the numbers of the file. The placement of the tip equals that
+    in the chain.
 
     Raises InputError if a link does not exist, does not move, or is not rigidly attached to a link of the chain.
     """

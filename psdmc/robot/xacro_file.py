@@ -25,7 +25,7 @@ ASSIGNED = ":="
 
 
 def parsed_arguments(texts: Sequence[str]) -> dict[str, str]:
-    """Return values by argument name from texts of the command line such as "name:=ur5e"."""
+    """Return the values of a xacro file's arguments by name, from texts of the command line such as "name:=ur5e"."""
     found: dict[str, str] = {}
     for text in texts:
         name, assigned, value = text.partition(ASSIGNED)
@@ -140,8 +140,8 @@ NAMED = re.compile(rb"<name>\s*([\w.-]+)\s*</name>")
 
 
 def checked_packages(packages: Mapping[str, str | os.PathLike[str]] | None) -> dict[str, Path]:
-    """Return the folders by package name. Raises InputError if a package name is not valid, or if a folder does not
-    exist."""
+    """Return the folders of ROS packages by package name, after a check. Raises InputError if a package name is not
+    valid, or if a folder does not exist."""
     found = {}
     for name, folder in (packages or {}).items():
         path = Path(folder).expanduser()

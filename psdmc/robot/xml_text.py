@@ -39,7 +39,8 @@ def root_tag(text: str) -> str:
 def parse_xml(text: str, source: str, expected: str) -> Element:
     """Return the root element of an XML text, without its default name space.
 
-    Raises InputError if the text is no XML, if its root is not `expected`, or if it defines or fetches entities.
+    Raises InputError if the text is no XML, if the root element is not `expected`, or if it defines or fetches
+    entities.
     """
     try:
         root = _without_space(_parsed(text.lstrip()))
@@ -88,7 +89,7 @@ def _without_space(root: Element) -> Element:
 
 
 def only(parent: Element, tag: str) -> Element | None:
-    """Return the child element with this name, or None. Raises ValueError if there are several."""
+    """Return the child element with this name, or None if there is none. Raises ValueError if there are several."""
     found = parent.findall(tag)
     if len(found) > 1:
         raise ValueError(f"{len(found)} <{tag}> elements, expected one")
@@ -98,8 +99,8 @@ def only(parent: Element, tag: str) -> Element | None:
 def numbers(
     element: Element | None, attribute: str, default: tuple[float, ...], accepted: Range
 ) -> tuple[float, ...]:
-    """Return as many numbers from an attribute as `default` has. Raises ValueError with the text found if one is out
-    of range."""
+    """Return the numbers that an XML attribute lists, as many as `default` has. Raises ValueError, with the text found,
+    if a number is out of range."""
     text = None if element is None else element.get(attribute)
     if element is None or text is None:
         return default
@@ -124,7 +125,7 @@ def numbers(
 def number(
     element: Element | None, attribute: str, default: float, accepted: Range, *, is_magnitude: bool = False
 ) -> float:
-    """Return one number from an attribute. Raises ValueError if it is out of range, or negative although
+    """Return one number from an attribute. Raises ValueError if the number is out of range, or negative although
     `is_magnitude` is true."""
     value = numbers(element, attribute, (default,), accepted)[0]
     if is_magnitude and value < 0.0 and element is not None:

@@ -1,13 +1,16 @@
-"""Applies assumptions that link parameters are zero: which values remain, and which parameter vectors are possible.
+"""Applies the assumption that some parameters of a link are zero. Computes which values remain, and which parameter
+vectors are possible.
 
-A zero about the link frame ("Ixz") removes a parameter. A zero about the centre of mass ("rx", "Ixz@com") does not:
-the frame's Ixz is Ixz@com - m rx rz and can differ from zero while rx and rz do. The result is the span of all
-parameter vectors that fulfil the assumption. They are polynomials in m, r and the inertia about the centre of mass,
+A zero about the link frame ("Ixz") removes a parameter. A zero about the centre of mass ("rx", "Ixz@com") does not: the
+frame's Ixz is Ixz@com - m rx rz and can differ from zero while rx and rz do.
 
-    (m, m r, I_com + sum over i, j of m r_i r_j V_ij),
+The result is the span of all parameter vectors that fulfil the assumption. With the centre of mass r, the parameters
+about the link frame are
 
-The monomials are linearly independent. So the span is exactly that of the coefficient vectors of the remaining
-monomials.
+    (m, m r, I_com + sum over i, j of m r_i r_j V_ij).
+
+V_ij are constant vectors. The monomials m, m r_i, m r_i r_j and the entries of I_com are linearly independent. So the
+vectors that multiply the remaining monomials span the result.
 """
 
 from __future__ import annotations
@@ -28,8 +31,8 @@ ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """Return the assumptions with their consequences, in a fixed order. Zero mass implies a massless link; zero first
-    moments imply that the centre of mass is at the origin."""
+    """Return the assumed zeros of one link with the zeros that follow from them, in a fixed order. Without mass, all
+    parameters of the body are zero. Zero first moments imply a centre of mass at the origin, and conversely."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY_PARAMETERS]) | set(COM_NAMES)
@@ -40,7 +43,8 @@ def canonical(names: Collection[str]) -> tuple[str, ...]:
 
 
 def link_span(names: Collection[str]) -> Array:
-    """Return a basis (11, k) of one link's parameters if `names` are zero, in reduced column echelon form."""
+    """Return a basis (11, k), of k columns, of one link's possible parameters if the parameters `names` are zero. The
+    basis is in reduced column echelon form."""
     zero = canonical(names)
     generators = [] if "m" in zero else [_unit("m"), *_moments(zero), *_second_moments(zero)]
     generators += [_unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)]
@@ -52,7 +56,8 @@ def link_span(names: Collection[str]) -> Array:
 
 
 def link_values(parameters: Array, names: Collection[str]) -> Array:
-    """Return the standard parameters (11,) with the assumed zeros applied, first those about the centre of mass."""
+    """Return the standard parameters (11,) of a link with the assumed zeros applied. Zeros about the centre of mass are
+    applied first."""
     zero = canonical(names)
     values = np.array(parameters, dtype=float)
     if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY_PARAMETERS]).any():
@@ -67,7 +72,7 @@ def link_values(parameters: Array, names: Collection[str]) -> Array:
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:
-    """Return the block-diagonal matrix (11 n, k) of n blocks (11, k_i)."""
+    """Return the block-diagonal matrix (11 n, k) of n blocks with 11 rows each. The blocks have k columns together."""
     span = np.zeros((sum(b.shape[0] for b in blocks), sum(b.shape[1] for b in blocks)))
     row = column = 0
     for block in blocks:
@@ -105,7 +110,7 @@ def parse_statements(
 
 
 def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
-    """Return the reduced column echelon form of (rows, k) columns, without dependent columns.
+    """Return columns (rows, k) in reduced column echelon form, without columns that depend on the others.
 
     The entries in this module are small integers, so the elimination is exact. `tolerance` only protects a division.
     """
@@ -124,14 +129,15 @@ def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
 
 
 def leading_rows(span: Array) -> NDArray[np.int64]:
-    """Return for each column of a reduced echelon form (rows, k) the row of its leading one, (k,)."""
+    """Return for each of the k columns of a reduced echelon form (rows, k) the row of the column's leading one,
+    (k,)."""
     leads: NDArray[np.int64] = np.argmax(span != 0.0, axis=0).astype(np.int64)
     return leads
 
 
 def outside(span: Array, x: Array) -> Array:
-    """Return the magnitudes by which x differs from the vector in the span with the same leading entries. They are
-    zero if x is in the span."""
+    """Return by how much each entry of x differs from a vector in the span of the columns of `span`. The vector has the
+    leading entries of x. All differences are zero if x is in the span."""
     missed: Array = np.abs(x - span @ x[leading_rows(span)])
     return missed
 

@@ -129,7 +129,7 @@ PRESETS = {
 
 
 def preset(name: str) -> Target:
-    """Return the target with this name. Raises InputError if there is none."""
+    """Return the target (processor) with this name, such as "cortex-m4f". Raises InputError if there is none."""
     if name not in PRESETS:
         raise InputError(f"target is {name!r}", f"choose one of {', '.join(PRESETS)}")
     return PRESETS[name]

@@ -1,5 +1,5 @@
-"""The class Target, which describes the processor for which psdmc generates code. All facts about processors are in
-this folder."""
+"""The class Target, which describes the processor for which psdmc generates code. Only the files in this folder contain
+facts about processors."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ FORMS: tuple[Form, ...] = ("single", "batch", "batch_soa")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A processor, and the form of the code for it.
+    """A processor, and the form of the code that psdmc generates for this processor.
 
     about          description for people: what it is and what differs from the default
-    real, trig     precision and method of sines if the user chooses none
-    vectors        vector registers that the C code supports, widest first. The first one whose macro is defined is used,
-                   else the last; none: plain C
-    forms          forms of each function: for one state, one state per row, one state per lane
+    real, trig     default of the precision and of the method of sines
+    vectors        kinds of vector registers that the C code supports, widest first. The first kind whose macro is
+                   defined is used, else the last; empty: plain C
+    forms          forms of each function: for one state, for states in rows of an array, for one state per SIMD lane
     texts          whether the library contains tables of joint names, units and equations of parameters
     hosted         whether there is an operating system: shared libraries, position-independent code, threads
-    cache_line     bytes of one prefetch
+    cache_line     bytes of a cache line, which one prefetch loads
     blocks_ahead   how many blocks before their use a batch function prefetches its inputs
     flags          flags that the compiler must accept
-    host_flags     flags for the machine at hand, of which the first one that the compiler accepts is used; in a package only
-                   if its user asks for it
+    host_flags     flags for the machine at hand; the first that the compiler accepts is used. In a package, it is used
+                   only if the package's user asks for it
     costs          costs by which psdmc chooses among programs
-    tools          prefix of the names of its usual compiler and ar; empty: those of the machine at hand
+    tools          prefix of the names of the compiler and archiver; empty: those of the machine at hand
     """
 
     name: str

@@ -19,7 +19,7 @@ interface."""
 
 @dataclass(frozen=True, slots=True)
 class SignMask:
-    """The instruction that collects the sign bits of all lanes in one integer.
+    """The processor instruction that puts the sign bits of all numbers in a SIMD vector into one integer.
 
     macro             macro that compilers predefine if the instruction exists
     float64, float32  name of the instruction in GCC and clang, for vectors of these types
@@ -34,10 +34,11 @@ class SignMask:
 
 @dataclass(frozen=True, slots=True)
 class Narrower:
-    """Narrower registers for the sines of a single state, if wide registers slow the scalar code around them.
+    """Narrower vector registers for the sines of a single state. They are for processors on which wide registers slow
+    the other code, which computes single numbers.
 
     unit    the narrower registers
-    unless  C condition that selects processors on which wide registers do not slow the code
+    unless  C condition that selects processors on which wide registers do not slow the other code
     """
 
     unit: VectorUnit
@@ -49,9 +50,9 @@ class VectorUnit:
     """A kind of SIMD vector registers, each of the size `bytes`.
 
     macro      macro that compilers predefine if the registers exist; the narrowest unit of a target needs none
-    sign_mask  the instruction for sign bits; None: signs are collected lane by lane
-    narrower   registers for sines within scalar code; None: this unit
-    half       registers of half the size on the same processors; None: there are none, or none is needed
+    sign_mask  the instruction that collects sign bits; None: signs are read number by number
+    narrower   registers for sines within code that computes single numbers; None: this kind
+    half       registers of half the size on the same processors; None if not available or not needed
     """
 
     bytes: int

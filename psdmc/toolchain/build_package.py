@@ -1,4 +1,4 @@
-"""Builds an emitted package with its own build files and runs its self-test."""
+"""Builds a generated C package with the package's build files, and runs the self-test of the package."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ MARKS = (UNFINISHED, "CMakeCache.txt", "CMakeFiles", "compiled_by")
 
 
 def build_package(directory: str | Path, edited: bool = False, progress: Progress = silent) -> str:
-    """Build the package in the folder `build` of `directory`, run its self-test, and return the output of the tools.
+    """Build the package in the folder `build` of `directory`, run the self-test of the package, and return the output
+    of the tools.
 
-    edited    True: build although files are missing or differ from what emit-c wrote
+    edited    True: build although files are missing or differ from what the command `emit-c` wrote
     progress  function that psdmc calls with the number of compiled files and their share
 
     The build uses CMake if it is installed, else make. Raises InputError if the folder holds no package, or an edited
@@ -126,7 +127,7 @@ def _self_test(words: list[str], root: Path) -> str:
 
 
 def checks_of(report: str) -> str:
-    """Return the summary of the self-test, such as '39 checks of 15 functions'."""
+    """Return the summary of a package's self-test, such as '39 checks of 15 functions'."""
     found = re.findall(r": (\d+ checks of \d+ functions), 0 failed", report)
     return found[-1] if found else "nothing to check"
 
@@ -143,10 +144,11 @@ FOLDERS = ("src", "test")
 
 @contextmanager
 def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
-    """Until the block ends, report to `progress` how many of `files` object files exist below the folder `build`.
+    """Report the progress of a build until the block ends: how many of `files` object files exist below the folder
+    `build`.
 
-    Compilers print nothing while they work, so the files are counted. If an earlier build left its files, the time
-    left is not known.
+    Compilers print nothing while they work, so the files are counted. If an earlier build left its files, the time left
+    is not known.
     """
     done, most = threading.Event(), 0
 

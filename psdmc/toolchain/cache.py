@@ -37,7 +37,8 @@ from psdmc.toolchain.cache_room import (
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
-    """Return the key of an entry: a hex digest of file names, texts and everything else that the binary depends on."""
+    """Return the key of a cache entry: a hex digest of file names, texts and everything else on which the library
+    depends."""
     platform = (sys.platform, sysconfig.get_platform(), str(sysconfig.get_config_var("SOABI")))
     digest = hashlib.sha256()
     for part in (*platform, *parts, *(item for path in sorted(files) for item in (path, files[path]))):
@@ -48,7 +49,8 @@ def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
 
 
 def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()) -> Path:
-    """Return the folder of the cache entry for this key. If there is no sound entry, `build` first fills a new folder.
+    """Return the folder of the cache entry for this key. If there is no complete, unaltered entry, the function `build`
+    first fills a new folder.
 
     products  files that `build` must have made
 
@@ -86,8 +88,8 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
 
 
 def found(key: str) -> Path | None:
-    """Return the folder of the cache entry for a key, or None if there is no unaltered one. Errors are those of
-    `cached`."""
+    """Return the folder of the cache entry for a key, or None if there is no complete, unaltered entry. Errors are
+    those of `cached`."""
     final = open_cache() / key
     if not re.fullmatch(r"[0-9a-f]{64}", key) or not is_sound(final):
         return None
@@ -114,8 +116,8 @@ BETWEEN = 0.02
 
 @contextlib.contextmanager
 def turn(place: Path, key: str) -> Iterator[None]:
-    """Within the block, hold the lock that allows one process or thread to build an entry. Wait for the process that
-    has it.
+    """Within the block, hold the lock that allows one process or thread to build an entry. If another process has the
+    lock, wait.
 
     The lock is released explicitly, because a forked process with a copy of the handle would keep it. On file systems
     without locks, no process waits.

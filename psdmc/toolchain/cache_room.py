@@ -1,5 +1,5 @@
-"""Limits the size of the compile cache: removes leftovers of killed builds and the entries that were not used for
-longest."""
+"""Limits the size of the compile cache. Leftovers of killed builds are removed first, then the entries that were not
+used for longest."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def make_room(place: Path, keep: Path, limit: int) -> None:
 
 
 def sweep(place: Path) -> None:
-    """Remove the build folders of processes that have ended."""
+    """Remove the build folders, in the compile cache, of processes that have ended."""
     with contextlib.suppress(OSError):
         for name in sorted(os.listdir(place)):
             if _PASSING.fullmatch(name):
@@ -115,8 +115,8 @@ def _opened(folder: Path) -> int:
 
 
 def remove(entry: Path) -> None:
-    """Remove a cache entry. It is first renamed, so that no other process finds an incomplete entry. An entry that
-    another process has just removed is ignored."""
+    """Remove a cache entry. The entry is first renamed, so that no other process finds an incomplete entry. An entry
+    that another process has just removed is ignored."""
     gone = entry.parent / f".gone-{secrets.token_hex(8)}"
     try:
         entry.rename(gone)
@@ -168,7 +168,7 @@ LARGEST_SEAL = 1 << 20
 
 
 def seal(folder: Path) -> None:
-    """Write a list of all files of an entry with their digests, and let only this user write them."""
+    """Write a list of all files of a cache entry with their digests. Make the entry writable for this user only."""
     files: dict[str, str] = {}
     size = 0
     for path in sorted(folder.rglob("*")):
@@ -184,7 +184,7 @@ def seal(folder: Path) -> None:
 
 
 def is_sound(folder: Path) -> bool:
-    """Return whether an entry is complete, unaltered and writable by this user alone, and thus safe to load."""
+    """Return whether a cache entry is complete, unaltered and writable by this user alone, and thus safe to load."""
     try:
         if not _is_own(folder, stat.S_ISDIR):
             return False
@@ -198,14 +198,14 @@ def is_sound(folder: Path) -> bool:
 
 
 def touch(folder: Path) -> None:
-    """Record that an entry was used now. The function does nothing if the cache cannot be written."""
+    """Record that a cache entry was used now. The function does nothing if the cache cannot be written."""
     with contextlib.suppress(OSError):
         os.utime(folder / SEAL)
 
 
 def used_and_size(folder: Path) -> tuple[float, int]:
-    """Return when an entry was last used (s since 1970) and its size in bytes. For an incomplete entry, return when it
-    was made."""
+    """Return when a cache entry was last used (s since 1970), and the entry's size in bytes. For an incomplete entry,
+    return the time when it was made."""
     try:
         content, used = _seal_of(folder)
         return used, int(content["bytes"])
@@ -292,8 +292,8 @@ def cache_limit() -> int:
 
 
 def open_cache() -> Path:
-    """Return the cache folder, and make it if it is missing. Raises ToolchainError if it cannot be made, or if other
-    users could write into it."""
+    """Return the cache folder, and make the folder if it is missing. Raises ToolchainError if the folder cannot be
+    made, or if other users could write into it."""
     place = cache_directory()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -331,7 +331,7 @@ def _is_ours(status: os.stat_result) -> bool:
 
 
 def unusable(place: Path, error: OSError) -> ToolchainError:
-    """Return the error for a cache folder that cannot be written."""
+    """Return the exception to raise for a cache folder that cannot be written."""
     return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _choose())
 
 

@@ -76,7 +76,8 @@ class CompiledRobot(CompiledFunctions):
 
 
 def is_direct(function: Signature, units: Sequence[tuple[int, int]]) -> bool:
-    """Return whether DirectCall can call a function: it needs inputs, and not too many arrays or quaternions."""
+    """Return whether the extension module (direct_calls.py) can call a function. The function needs inputs, and not too
+    many arrays or quaternions."""
     arrays = len(function.inputs) + len(function.outputs)
     return bool(function.inputs) and arrays <= MOST_ARRAYS and len(function.inputs) * len(units) <= MOST_UNITS
 

@@ -32,8 +32,8 @@ INTERFACE = "interface.json"
 def compiled_once(
     parts: Sequence[str], make: Callable[[], PackageView], target: Target = NATIVE
 ) -> tuple[Interface, Path]:
-    """Return the interface and the shared library of a package. They come from the cache if an equal call was made
-    before; else `make` returns the package, which is then compiled.
+    """Return the interface and the shared library of a package. They come from the compile cache if an equal call was
+    made before. Else `make` generates the package, which is then compiled.
 
     parts   everything that the package depends on except psdmc's own sources: the model's hash, the options
     target  the target of the package
@@ -128,8 +128,8 @@ DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "rob
 
 
 def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
-    """Return the generated programs (kernels) that `lower` returns, from the compile cache if an equal call was made
-    before.
+    """Return the generated programs (kernels) that the function `lower` computes. They come from the compile cache if
+    an equal call was made before.
 
     parts  everything that the result depends on except psdmc's own sources: the model's hash, the options
 
@@ -159,7 +159,7 @@ def sources_digests() -> tuple[str, ...]:
 
 
 def digest(places: Iterable[Traversable]) -> str:
-    """Return the SHA-256 of the names and contents of these files, and of all files in these folders and their
+    """Return a SHA-256 digest of the names and contents of these files, and of all files in these folders and their
     subfolders."""
     found = hashlib.sha256()
     for name, content in _files("", places):

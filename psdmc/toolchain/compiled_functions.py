@@ -80,7 +80,7 @@ class RobotFacts:
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
-        """Return the number of base parameters, the length of theta_b."""
+        """Return the number of base parameters, which is the length of theta_b."""
         return self._interface.l
 
     @property
@@ -185,9 +185,11 @@ Array = NDArray[Any]
 
 
 class CompiledFunctions(RobotFacts):
-    """Calls the library of a compiled package by the signature of each function.
+    """Calls the C functions of a compiled package with NumPy arrays. The signature of a function says which inputs and
+    outputs it has.
 
-    more    function that compiles a generated function, by name, that the package does not have; None: such a call fails
+    more    function that compiles a generated function, by name, that the package does not have; None: such a call
+            fails
     origin  the request from which another process builds the same robot; None: the robot cannot be pickled
     """
 
@@ -363,15 +365,15 @@ class CompiledFunctions(RobotFacts):
         return (kernels[function] if function in kernels else kernels[f"{function}_theta"]).tails
 
     def call_at(self, kernel: str, count: int, addresses: Sequence[int]) -> None:
-        """Compute `count` states from memory addresses of contiguous rows: those of the inputs, then theta_b, then the
-        outputs.
+        """Compute `count` states from memory addresses of the arrays: those of the inputs, then theta_b, then the
+        outputs. An array has the states in contiguous rows.
 
         Nothing is checked. If a matrix is not positive definite, the results of that state are NaN.
         """
         self._kernel(kernel).batch(count, *(self._ffi.cast(self._pointer, address) for address in addresses))
 
     def tails(self, kernel: str) -> tuple[tuple[int, ...], ...]:
-        """Return the shape of each output of a generated function for one state."""
+        """Return for each output of a generated function the shape for one state, without batch axes."""
         return self._kernel(kernel).tails
 
     def address_of(self, kernel: str) -> int:
@@ -398,7 +400,8 @@ class CompiledFunctions(RobotFacts):
 
 @dataclass(frozen=True, slots=True)
 class OnArrays:
-    """A function of a robot, with optional theta_b, that can be pickled and sent to other processes."""
+    """A function of a robot, with optional base parameters theta_b, that can be called with arrays. The object can be
+    pickled and sent to other processes."""
 
     robot: CompiledFunctions
     function: str

@@ -31,7 +31,7 @@ class Compiler:
 
     command   the words that start it
     version   its version text, for cache keys
-    portable  flags for every machine: FLAGS, and for GCC some of its own
+    portable  flags for every machine: FLAGS, and further ones for GCC
     flags     the portable flags, and those for the target or this machine's CPU
     target    macros that the compiler predefines with these flags; they name the CPU features
     """
@@ -44,7 +44,7 @@ class Compiler:
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """The properties of the compiler that a library depends on, for cache keys."""
+        """Return the properties of the compiler on which a compiled library depends. They are part of cache keys."""
         return (*self.command, self.version, self.target, *self.flags)
 
 
@@ -141,7 +141,8 @@ def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
-    """Return the standard output of a program. Raises ToolchainError with a line of its error output if it fails."""
+    """Run a program and return the standard output. Raises ToolchainError with a line of the error output if the
+    program fails."""
     done = attempt(words, what, cwd)
     if done.returncode != 0:
         raise failure(words, what, done)

@@ -1,6 +1,7 @@
-"""The data that is needed to call a compiled library: names, sizes and prototypes. The package itself is not needed.
+"""The data with which a compiled library is called: names, sizes and prototypes. The generated package is not needed
+for a call.
 
-The compile cache keeps these data with each library. So a model that was compiled before can be called without
+The compile cache keeps this data with each library. So a model that was compiled before can be called without
 generating its code again.
 """
 
@@ -25,7 +26,7 @@ FORMAT = 7
 class Interface:
     """The data that a caller of a compiled package needs.
 
-    robot        prefix of its C symbols
+    robot        prefix of the library's C symbols
     real         C name of its floating-point type; `dtype` is the name in NumPy
     n, l         numbers of joints and base parameters
     nq, nv       lengths of q, and of rates and torques
@@ -34,12 +35,12 @@ class Interface:
     v_names      names of the nv entries of rates and torques
     frame_names  names of the named frames
     contacts     names and numbers of rows of the contacts
-    units        (start, stop) slices of q that must have length one, such as quaternions
+    units        (start, stop) slices (start, stop) of q that must have length one, such as quaternions
     limits       n rows: lower, upper, speed, acceleration, effort; infinite if unknown
     gravity      3 numbers, m/s^2 along the axes of the base frame
     base_frame   name of that frame in words: the base frame, or the world frame of a floating base
     theta_b      l base parameters; None if unknown
-    kernels      name of each C function -> shapes of its results for one state
+    kernels      name of each generated function in C -> shapes of the function's results for one state
     patterns     function -> (row, column) of the entries of its matrix that may differ from zero
     cdef         C declarations of the functions that are called
     """
@@ -67,20 +68,24 @@ class Interface:
 
     @property
     def sizes(self) -> Sizes:
-        """Return the lengths of axes for this robot, by their words such as nq."""
+        """Return the lengths of this robot's axes, such as nq and nv."""
         rows = tuple(rows for _, rows in self.contacts)
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names), rows_of_contacts=rows)
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """The names along the axes of arrays, by the words of the axes."""
+        """Return the names of the entries along each axis: word of the axis, such as nq -> names."""
         own = {"n": self.joint_names, "nq": self.q_names, "nv": self.v_names, "frames": self.frame_names}
         return own | contact_names(self.contacts)
 
 
 def interface_of(package: PackageView) -> Interface:
-    """Return the interface of a package's library. It has the batch function of each generated function, and the
-    function for one state if Python raises an error for a pivot that is not positive."""
+    """Return the interface of the library of a package. The interface has every generated function for batches of
+    states.
+
+    If a matrix that is not positive definite must raise an error in Python, the interface also has the function for one
+    state.
+    """
     values = [parameter.value for parameter in package.info.parameters]
     known = tuple(value for value in values if value is not None)
     return Interface(
@@ -170,7 +175,7 @@ class Origin:
 
     again    importable function that returns the robot
     request  its argument, which can be pickled
-    key      text that is the same for equal robots
+    key      text that is equal for equal robots
     """
 
     again: Callable[[Any], Any]

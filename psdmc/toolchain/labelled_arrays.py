@@ -63,7 +63,7 @@ def foreign(
     tails: Sequence[tuple[int, ...]],
     dtype: Any,
 ) -> tuple[Any, ...]:
-    """Return the outputs as xarray arrays if an input is one, else as Dask arrays.
+    """Return the outputs of a function as xarray arrays if an input is an xarray array, else as Dask arrays.
 
     tails  shape of each output for one state
     """
@@ -85,8 +85,8 @@ def in_chunks(
     call    function that computes the outputs for a chunk of the inputs
     tails   shape of each output for one state
 
-    Inputs that are divided along the axes of one state are joined there. Inputs get equal chunks of states. Raises
-    InputError if the length of an axis differs from the robot's, or from another input's.
+    If chunks divide the axes of one state, such as the joints, they are joined. All inputs get equal chunks of states.
+    Raises InputError if the length of an axis differs from that of the robot, or from that of another input.
     """
     import dask.array
 
@@ -180,10 +180,10 @@ def _core(quantity: Quantity) -> str:
 def by_names(
     call: Call, axes: RobotAxes, function: Signature, inputs: Sequence[Any]
 ) -> tuple[xr.DataArray, ...]:
-    """Return the outputs as xarray data arrays.
+    """Return the outputs as xarray data arrays, whose dimensions have names.
 
-    The dimension of joints is 'joint', that of matrix columns 'joint_column', and so on. All other dimensions are
-    batch axes and broadcast by name. Names of joints and frames become coordinates.
+    The dimension of joints is 'joint', that of matrix columns 'joint_column', and so on. All other dimensions are batch
+    axes and broadcast by name. Names of joints and frames become coordinates.
 
     call  function that takes the NumPy or Dask data with the named dimensions last
 
@@ -213,7 +213,8 @@ def by_names(
 
 
 def dimensions(quantity: Quantity) -> tuple[str, ...]:
-    """Return the names of a quantity's axes. A repeated axis gets a second name, such as 'joint_column'."""
+    """Return the names of the dimensions of a quantity, such as 'joint'. If a dimension occurs twice, the second gets
+    another name, such as 'joint_column'."""
     names: list[str] = []
     for axis in quantity.axes:
         name = _DIMENSIONS.get(axis, f"axis_of_{axis}" if axis not in WORDS else axis)

@@ -55,8 +55,8 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 
 def documentation(function: Signature) -> str:
-    """Return a method's docstring: what it computes, its arguments and results, when results are NaN, and the lengths
-    of axes."""
+    """Return the docstring of the method for a generated function: what it computes, arguments and results, when
+    results are NaN, and the lengths of axes."""
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [
@@ -122,7 +122,7 @@ def stub(functions: Iterable[Signature]) -> str:
 
 
 def result_name(function: Signature) -> str:
-    """Return the name of the named tuple that a function with several outputs returns."""
+    """Return the name of the named tuple that the method of a function with several outputs returns."""
     return "".join(word.capitalize() for word in function.name.split("_"))
 
 
@@ -147,13 +147,15 @@ def _shape(quantity: Quantity, lead: tuple[str, ...] = ("...",)) -> str:
 
 
 def own_methods() -> set[str]:
-    """Return the names of the model's own methods. They are read from its source file, which is not imported."""
+    """Return the names of the methods that the class of models defines itself. They are read from the source file of
+    the class, which is not imported."""
     tree = ast.parse((MODEL / "dynamics_model.py").read_text(encoding="utf-8"))
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
 
 
 def answers_stub(functions: Iterable[Signature]) -> str:
-    """Return the text of answers.pyi: the generated functions of models, other than the model's own methods."""
+    """Return the text of answers.pyi, which declares generated functions as methods of models. Methods that the class
+    of models defines itself are left out."""
     own = own_methods()
     shown = [function for function in functions if function.name not in own]
     several = sorted(result_name(function) for function in shown if len(function.outputs) > 1)

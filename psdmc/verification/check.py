@@ -1,8 +1,8 @@
 """Compares a model with other programs' dynamics of the same robot file. It uses no code of the derivation.
 
-Pinocchio reads the original file, and so does MuJoCo if it is installed and reads this format. If rotations were
-snapped, torques are compared with Pinocchio's bodies on joints placed as in the model. The change by snapping is then
-compared with the robot of the original file separately.
+Pinocchio reads the original file, and so does MuJoCo if it is installed and reads this format. Snapped rotations were
+replaced by near ones with exact zeros. For a model with snapped rotations, Pinocchio's joints are placed as in the
+model. The change of torques by snapping is checked separately, against the original file.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class CheckRow:
 
     name     what was compared
     against  the function of Pinocchio, or other reference, that it was compared with
-    error    largest difference, relative to the largest magnitude (joint by joint, if there is a value per joint)
+    error    largest difference, divided by the largest magnitude; for values per joint, divided joint by joint
     limit    largest error that passes; None if nothing could be compared
     remark   why nothing could be compared, or what the limit allows for
     """
@@ -79,9 +79,9 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
 
     source  the robot to compare with; None: the robot in the source text that the model contains
 
-    If the model's parameters differ from those of the source, its own standard parameters are used if they are known
-    (after a payload was added). Else random physically possible parameters are used (theta_b unknown or calibrated).
-    Raises InputError if the source is another robot.
+    If the model's parameters differ from those of the source, the model's standard parameters are used if they are
+    known (after a payload was added). Else random physically possible parameters are used (theta_b unknown or
+    calibrated). Raises InputError if the source is another robot.
     """
     loaded = source_of(model) if source is None else source
     require_same_robot(model, loaded)
@@ -227,10 +227,10 @@ def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Arra
 
 
 def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Array:
-    """Return the largest error (n + 1,) of each link's pose relative to its parent, and of the tip's pose relative to
-    its link.
+    """Return the largest errors (n + 1,) of poses. These are the poses of n links relative to their parent links, and
+    of the tip relative to its link.
 
-    found, expected   (k, n + 1, 4, 4), poses in the base frame
+    found, expected   (k, n + 1, 4, 4), poses in the base frame at k states
     above             parents of the n + 1 frames: index or BASE
 
     An error is the larger of the angle (rad) and the distance divided by the robot's reach.
@@ -244,14 +244,14 @@ def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Arr
 
 
 def gravity_error(found: Array, expected: Array) -> float:
-    """Return the distance between two vectors (3,), relative to the length of the larger one."""
+    """Return the distance between two gravity vectors (3,), divided by the length of the larger one."""
     size = max(float(np.linalg.norm(found)), float(np.linalg.norm(expected)), np.finfo(float).tiny)
     return float(np.linalg.norm(found - expected)) / size
 
 
 def reach_of(poses: Array, above: Sequence[int]) -> float:
-    """Return the length in m of the longest path outward over the largest distances between neighbouring frames, or 1
-    if all are zero."""
+    """Return the reach of a robot in m: the length of the longest path from the base outward. The length of a path is
+    the sum of the largest distances between neighbouring frames. If all are zero, the reach is 1."""
     steps = np.linalg.norm(_in_the_one_above(poses, above)[..., :3, 3], axis=-1).max(axis=0)
     far: list[float] = []
     for step, outer in zip(steps.tolist(), above, strict=True):
@@ -286,10 +286,11 @@ NO_TORQUE = 1e-9
 
 
 def worst(values: Array, expected: Array, bound: Array, share: float) -> tuple[float, float]:
-    """Return error and limit of the joint whose error is closest to its limit, both relative to its largest torque.
+    """Return the error and the limit of the joint whose error is closest to the limit. Both are relative to the joint's
+    largest torque.
 
     values, expected  torques (states, nv)
-    bound             (nv,) errors that are allowed in addition to `share` of the joint's largest torque
+    bound             (nv,) errors that are allowed in addition to the fraction `share` of the joint's largest torque
     """
     scale = _scales(expected)
     error = np.abs(values - expected).max(axis=0)
@@ -298,11 +299,12 @@ def worst(values: Array, expected: Array, bound: Array, share: float) -> tuple[f
 
 
 def relative_error(values: Array, expected: Array, least: float = 0.0) -> float:
-    """Return the largest difference relative to the largest magnitude, joint by joint; a matrix counts as one
-    quantity.
+    """Return the largest difference, divided joint by joint by the joint's largest magnitude. A matrix counts as one
+    quantity and is divided by its largest entry.
 
-    If a joint's torques are below NO_TORQUE of the largest torque, as for a vertical axis under gravity, its error is
-    relative to that largest torque. If all torques are below `least`, errors are relative to `least` / NO_TORQUE.
+    A joint's torques can be below NO_TORQUE of the largest torque, as for a vertical axis under gravity. The joint's
+    error is then relative to the largest torque of all joints. If all torques are below `least`, errors are relative to
+    `least` / NO_TORQUE.
     """
     if expected.ndim == 3:
         return float(np.abs(values - expected).max()) / _largest(expected)

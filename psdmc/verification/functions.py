@@ -1,5 +1,5 @@
-"""Compares the generated functions that do not follow directly from E, P and theta_b with Pinocchio's, by their NumPy
-references."""
+"""Compares generated functions with Pinocchio. It covers those functions that are not written as torque polynomials;
+check.py compares the others. The functions are computed by their NumPy references."""
 
 from __future__ import annotations
 
@@ -36,8 +36,10 @@ ROUNDED = 1e-4
 def function_errors(
     model: DynamicsModel, theta: Array, robot: OnCoordinates, solvable: bool
 ) -> Iterator[tuple[Recipe, float, str]]:
-    """Return for each such function its recipe, the largest error relative to the largest value of each output, and
-    the reason if it was not compared.
+    """Yield the results of the comparison of each function that is not written as torque polynomials. A result is the
+    function's recipe, the largest error, and the reason if the function was not compared.
+
+    The error is relative to the largest value of each output.
 
     solvable  whether the mass matrix can be inverted
     """

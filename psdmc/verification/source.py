@@ -1,5 +1,5 @@
-"""Finds the robot with which a model is compared: the source that it was derived from, with parameters that both can
-have."""
+"""Finds the robot with which a model is compared: the robot file from which the model was derived. Chooses parameters
+that both the model and this robot can have."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def source_of(model: DynamicsModel) -> LoadedRobot:
 
 
 def require_same_robot(model: DynamicsModel, loaded: LoadedRobot) -> None:
-    """Raise InputError if the source has other joints or links than the model."""
+    """Raise InputError if the joints or links of the source differ from those of the model."""
     found, expected = loaded.mechanism, model.mechanism
     for what, there, here in (
         ("joints", found.joint_names, expected.joint_names),
@@ -40,8 +40,8 @@ def _links(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def compared_parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array | None]:
-    """Return theta_b (l,) and the standard parameters (n, 11) for Pinocchio; None instead of these: those of the
-    source."""
+    """Return the base parameters theta_b (l,) and the standard parameters (n, 11) with which the model and Pinocchio
+    are compared. None instead of the standard parameters means those of the source."""
     if model.theta_b is not None:
         theta = np.asarray(model.theta_b)
         for known in (loaded.mechanism.parameters, model.mechanism.parameters):

@@ -1,8 +1,9 @@
-"""Translation of a PROGRAM to C expressions. A value that is used once is written at its use; other values get names.
+"""Translates a PROGRAM (the list of operations to generate) to C expressions. A value that is used once is written at
+its use; any other value gets a C variable.
 
-The C text for one state is the same as for one state per SIMD lane. A value has the type `V`, a real or a vector of
-reals, or is uniform, that is, the same for all states. Constants, and values computed from parameters only, are
-uniform.
+The C text for one state is also the text for a SIMD vector with one state per lane. A value has the C type `V`, which
+is a real number or a vector of real numbers. Values that are equal for all states, such as constants and parameters,
+are called uniform and have the type `real`.
 """
 
 from __future__ import annotations
@@ -30,24 +31,30 @@ _SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), 
 
 
 class Expr(NamedTuple):
-    """C text of a value, with the binding strength of its outermost operator and its depth of nesting."""
+    """C text of an expression, with the precedence of its outermost operator and the depth of its nested brackets."""
 
     text: str
     binding: int = _ATOM
     depth: int = 0
 
     def beside(self, binding: int, is_right: bool) -> str:
-        """Return the text as an operand of another operator, in brackets unless C parses it the same without them."""
+        """Return the expression as an operand of another operator. Brackets are added unless C parses the text with the
+        same meaning without them.
+
+        binding   precedence of the other operator
+        is_right  whether the expression is the right operand
+        """
         loose = self.binding < binding or (is_right and self.binding in (binding, _UNARY))
         return f"({self.text})" if loose else self.text
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """The C names of a PROGRAM's values, decided before any expression is written.
+    """Which values of a PROGRAM (the list of operations to generate) become C variables, decided before any expression
+    is written.
 
-    named    values that get a name: outputs, and values that are used more than once
-    uniform  values that are the same for all states
+    named    for each value, whether it becomes a variable: outputs, and values that are used more than once
+    uniform  for each value, whether it is equal for all states of a batch
     """
 
     program: Program
@@ -56,7 +63,8 @@ class Names:
 
     @staticmethod
     def of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> Names:
-        """Decide the names of a PROGRAM's values; vectors in `shared` are the same in all lanes."""
+        """Return which values of a PROGRAM (the list of operations to generate) become C variables. The vectors in
+        `shared` are equal for all states of a batch."""
         named = [count > 1 for count in program.uses()]
         for _, index in program.outputs:
             named[index] = True
@@ -65,7 +73,8 @@ class Names:
 
 
 def uniform_of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> tuple[bool, ...]:
-    """For each value of the PROGRAM, whether it is the same for all states."""
+    """Return, for each value of the PROGRAM (the list of operations to generate), whether it is equal for all states of
+    a batch. Such a value is computed from constants and from the vectors `shared` only."""
     uniform: list[bool] = []
     for op, args, slot, _ in program.body:
         if len(args) == 2 and op in _OPERATORS:
@@ -93,8 +102,8 @@ def _cut_deep_trees(program: Program, named: list[bool]) -> None:
 
 
 def is_call(op: Op) -> bool:
-    """Whether the generated C writes this operation as a macro, because C has no operator for it. Sines and cosines are
-    not among these macros."""
+    """Return whether the generated C writes this operation as a macro, because C has no operator for it. Square roots
+    are an example. Sines and cosines have other code."""
     return op in _CALLS
 
 

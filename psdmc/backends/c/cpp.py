@@ -12,10 +12,10 @@ from psdmc.backends.c.prototypes import Prototype
 
 @dataclass(frozen=True, slots=True)
 class CppMethod:
-    """One member function of the C++ class.
+    """One member function of the C++ class, which takes raw pointers.
 
-    parameters  raw pointers
-    call        C++ text of the call of the C function, with the theta_b of the class if the function takes it
+    parameters  C++ text of the parameters
+    call        C++ text of the call of the C function; if the C function takes theta_b, that of the class is passed
     """
 
     name: str
@@ -32,8 +32,8 @@ class CppMethod:
 class CppArrayMethod:
     """A member function that takes and returns std::array.
 
-    output  the output that is returned, of type result_type; '' if all outputs are parameters, because there are several or
-            the C function returns a status
+    output  the output that is returned, of type result_type; '' if all outputs are parameters. Outputs are parameters
+            if there are several, or if the C function returns a status
     """
 
     name: str
@@ -46,10 +46,10 @@ class CppArrayMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppClass:
-    """One C++ class. There are three: for functions without parameters, with the robot's own parameters, or with a
-    user's.
+    """One C++ class with generated functions as members. There are three classes: for functions without base
+    parameters, for the base parameters of the robot file, and for base parameters that the user passes.
 
-    theta  whether the class holds theta_b
+    theta  whether the class stores theta_b, the base parameters of the user
     """
 
     name: str

@@ -16,8 +16,8 @@ from psdmc.target.target import Target
 def description(
     info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView], with_frames: bool
 ) -> tuple[str, ...]:
-    """Return the facts of the robot, and a description of the arrays and variants of functions, as lines of text. Names
-    from the robot file are not escaped yet."""
+    """Return the text at the top of the C header, as lines. It gives the facts of the robot, the layout of arrays, and
+    the variants of functions (such as for many states). Names from the robot file are not escaped yet."""
     lines = [*facts(info, options), *_arrays(info), *_forms(options.target)]
     if any(function.name.endswith(THETA_ROWS) for function in functions):
         lines += [

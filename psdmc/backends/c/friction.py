@@ -1,4 +1,4 @@
-"""The friction of a calibrated model, in the form that templates print."""
+"""The joint friction of a calibrated model as C text for the templates."""
 
 from __future__ import annotations
 
@@ -52,7 +52,8 @@ class FrictionView:
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """What the calibration found besides this friction, in sentences without names from files."""
+        """Return sentences about effects that the calibration found in addition to joint friction and rigid bodies,
+        such as springs. The sentences contain no names from files."""
         return self.friction.beyond
 
     @property
@@ -79,16 +80,17 @@ class FrictionView:
 
     @property
     def speeds(self) -> tuple[str, ...]:
-        """The joint speeds at which the self-test compares friction, as C text.
+        """Return, as C text, the joint speeds at which the self-test of the package compares friction torques.
 
-        They are zero, a tenth of the speed over which friction changes sign, speeds in both directions, and speeds that
-        are constants of a friction law.
+        The speeds are zero, a tenth of the speed over which friction changes sign, and speeds in both directions.
+        Constants of a friction law that are speeds are included, too.
         """
         return self._printed(self._states)
 
     @property
     def expected(self) -> tuple[str, ...]:
-        """The expected friction at the speeds of the self-test, as C text. Positions are equal to the speeds there."""
+        """Return the friction torques that the self-test of the package expects, as C text. The self-test passes the
+        joint speeds as joint positions, too."""
         return self._printed(self.friction.torque(self._states, self._states))
 
     @property

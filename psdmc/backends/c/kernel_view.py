@@ -1,5 +1,5 @@
-"""A kernel (the code of one function variant) in the form that templates print: names, sizes, bodies, and the C text of
-signatures and calls."""
+"""A kernel (one variant of a generated function) as data for the templates: names, sizes, function bodies, and C text
+of signatures and calls."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ LOOPED = 10
 
 @dataclass(frozen=True, slots=True)
 class VectorView:
-    """An input or output of a C function: `size` reals per state, and the lengths of its axes."""
+    """An input or output of a C function. `size` is how many real numbers belong to one state, `shape` are the lengths
+    of the array's axes."""
 
     name: str
     size: int
@@ -31,8 +32,9 @@ class VectorView:
 class OutputView(VectorView):
     """One output of a C function.
 
-    direct  a batch call writes its rows straight from registers, without first storing a block of them on the stack
-    zero    entries that are zero at every state
+    direct  True: a batch call writes registers straight into the output array; False: a block of states is collected on
+            the stack first
+    zero    indices of entries that are zero at every state
     """
 
     direct: bool = False
@@ -41,14 +43,17 @@ class OutputView(VectorView):
 
 @dataclass(frozen=True, slots=True)
 class KernelView:
-    """One kernel, the code of one variant of a function: its body files, C functions and their signatures.
+    """One kernel (one variant of a generated function): its files with function bodies, its C functions and their
+    signatures.
 
-    single_file  body file, included once per instantiation; also `lanes_file` if one order of operations serves both
-    limbs        a further body for one state, with limbs in SIMD lanes; None if there is none
-    positive     the vector that must be positive and is not an output; None if there is no such vector
+    theta        whether theta_b (the base parameters) is an input
+    single_file  file with the body for one state; also used as `lanes_file` if both need the same order of operations
+    lanes_file   file with the body for SIMD vectors that hold one state per lane
+    limbs        a further body for one state, which computes equal limbs (legs) in SIMD lanes; None if there is none
+    positive     the vector of pivots, which must be positive, if it is no output; None if there is no such vector
     pivot_order  the order in which the entries of `positive` are computed
-    places       of a packed matrix: (row, column) of each entry
-    regions      loops and calls, which replace all bodies; None if there are none
+    places       of a matrix that is stored without zeros: (row, column) of each stored entry
+    regions      loops and calls of functions, which replace all other bodies; None if there are none
     """
 
     name: str
@@ -71,20 +76,20 @@ class KernelView:
 
     @property
     def variant(self) -> str:
-        """The ending of the kernel's name: '_theta' or '_theta_rows' for parameters at run time, '' for compiled-in
-        ones."""
+        """Return the ending of the kernel's name, which says where the base parameters come from. '' stands for
+        compiled-in parameters, '_theta' for an input theta_b, and '_theta_rows' for one theta_b per state of a batch."""
         if self.name.endswith(THETA_ROWS):
             return THETA_ROWS
         return "_theta" if self.theta else ""
 
     @property
     def pivots_in_loop(self) -> bool:
-        """Whether the code for one state tests its pivots in a loop."""
+        """Return whether the code for one state checks in a loop that all pivots of a factorised matrix are positive."""
         return len(self.pivot_order) >= LOOPED and self.pivot_order == tuple(range(len(self.pivot_order)))
 
     @property
     def single_parts(self) -> str:
-        """Name of the file that contains the C functions of a long body."""
+        """Return the name of the file with the C functions into which a long function body is divided."""
         return self.single_file.replace(".inc", "_parts.inc")
 
     @property
@@ -93,30 +98,33 @@ class KernelView:
 
     @property
     def by_state(self) -> bool:
-        """Whether batch functions compute one state after the other, because code for SIMD lanes would be too long."""
+        """Return whether the batch function computes the states one after the other. It does so if code with one state
+        per SIMD lane would be too long."""
         return any(product.shape.n >= LARGE for product in self.single_body.products)
 
     @property
     def direct(self) -> bool:
-        """Whether a batch call writes the rows of at least one output straight from registers."""
+        """Return whether a batch call writes at least one output straight from registers into the output array."""
         return any(output.direct for output in self.outputs)
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some outputs are written from registers while others, or the pivots, are stored in a block first."""
+        """Return whether a batch call needs both kinds of storage. One output is then written straight from registers
+        into the output array, while another output or the pivots are first collected in a block."""
         return self.direct and (
             self.positive is not None or not all(output.direct for output in self.outputs)
         )
 
     @property
     def fails_alone(self) -> bool:
-        """Whether exactly one output vector becomes NaN on failure, and this vector is as long as the pivots."""
+        """Return whether the function has one output only, which becomes NaN on failure and has as many entries as
+        there are pivots."""
         shapes = [output.shape for output in self.outputs]
         return self.positive is not None and shapes == [self.positive.shape]
 
     @property
     def mark_rows(self) -> str:
-        """C expression for the number of the first failing row of a block."""
+        """Return a C expression for the number of the first state in a block of a batch whose computation failed."""
         assert self.positive is not None
         block = f"{self.positive.name}_block"
         if self.fails_alone:
@@ -125,12 +133,14 @@ class KernelView:
 
     @property
     def needs_lanes(self) -> bool:
-        """Whether another function calls the variant that leaves its outputs lane by lane."""
+        """Return whether another C function calls the variant that stores its results as [entry][lane], with one state
+        per lane."""
         return not self.direct or "batch_soa" in self.prototypes
 
     @property
     def lanes(self) -> str:
-        """The static C function that computes one state per SIMD lane."""
+        """Return the name of the static C function that computes one state per SIMD lane and stores its results as
+        [entry][lane]."""
         return f"{self.name}_lanes"
 
     @property
@@ -139,7 +149,8 @@ class KernelView:
 
     @property
     def rows(self) -> str:
-        """The static C function that computes one state per lane and writes direct outputs into the caller's rows."""
+        """Return the name of the static C function that computes one state per SIMD lane. It writes outputs that need
+        no intermediate block straight into the array of the caller."""
         return f"{self.name}_rows"
 
     @property
@@ -168,7 +179,8 @@ class KernelView:
 
     @property
     def row_arguments(self) -> str:
-        """C text of the arguments with which the function for one state is called for a row."""
+        """Return C text of the arguments for one call of the function for one state. The call is for the state `row` of
+        a batch, and reads and writes the arrays of the caller."""
         inputs, outputs = (
             [f"{vector.name} + row * {vector.size}" for vector in vectors]
             for vectors in (self.inputs, self.outputs)
@@ -177,7 +189,8 @@ class KernelView:
 
     @property
     def one_arguments(self) -> str:
-        """C text of the arguments for one state that was copied out of its block of lanes."""
+        """Return C text of the arguments for one call of the function for one state. The state was first copied out of
+        a block that holds one state per lane."""
         return ", ".join(f"{vector.name}_one" for vector in (*self.inputs, *self.outputs))
 
     def _arguments(self, outputs: Iterable[str]) -> str:
@@ -189,12 +202,13 @@ class KernelView:
 
     @property
     def cost_text(self) -> str:
-        """The number of operations for one state, as text for the header."""
+        """Return the numbers of multiplications and additions for one state, as text for the C header."""
         limbs = f"; one state with limbs in lanes: {self.limbs.cost}" if self.limbs else ""
         return f"{self.name}: {self.cost}, {self.lowering}{limbs}"
 
     @property
     def blocks(self) -> tuple[VectorView, ...]:
-        """Buffers of a batch call, lane by lane: all vectors except those whose rows are written directly."""
+        """Return the vectors for which a batch call has blocks on the stack with one state per lane. Outputs that are
+        written straight into the output array need no block."""
         outputs = (output for output in self.outputs if not output.direct)
         return (*self.inputs, *outputs, *((self.positive,) if self.positive else ()))

@@ -1,8 +1,8 @@
-"""How the outputs of limbs (such as legs) are stored: neighbouring outputs of one limb as one vector, not one by one.
+"""Decides how the outputs of limbs (such as legs) are stored: several neighbouring outputs of one limb as one vector.
 
-Each output of a limb is one lane of a vector that holds the same output of all limbs. If several outputs are neighbours
-in memory for every limb, as in the rows of a mass matrix, four vectors are transposed in registers. Four neighbouring
-reals of each limb are then stored at once.
+While code computes, one vector holds the same output of all limbs, one limb per lane. In memory, several outputs may be
+neighbours for every limb, as in the rows of a mass matrix. Four such vectors are then transposed in registers, and four
+neighbouring numbers of each limb are stored at once.
 """
 
 from __future__ import annotations
@@ -23,11 +23,14 @@ Lane = tuple[int, Slot, int]
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Up to four neighbouring outputs of every limb of a group, whose vectors are transposed before they are stored.
+    """Up to four neighbouring outputs of every limb of a group (such as four legs). The vectors of the group, one limb
+    per lane, are transposed before the outputs are stored.
 
-    slots   of the group, in the order of the neighbours; None: zero
+    vector  name of the function's output
+    group   the limbs
+    slots   for each neighbour, the entry of the group's vectors that is stored; None: zero
     at      for each limb, the index of its first neighbour in the function's output
-    widths  for each limb, how many reals are stored
+    widths  for each limb, how many numbers are stored
     """
 
     vector: str
@@ -47,8 +50,12 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """Two or three neighbouring outputs of every limb of a group, with the limbs next to each other in memory. The
-    vectors are interleaved to store them."""
+    """Two or three neighbouring outputs of every limb of a group (such as four legs). In memory, the limbs follow one
+    another without gaps, so their vectors are interleaved when they are stored.
+
+    slots  entries of the group's vectors, in the order of memory
+    first  index of the first output in the function's output vector
+    """
 
     vector: str
     group: LimbGroup
@@ -69,7 +76,8 @@ class Packed:
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """One output, or four neighbouring outputs, taken from any lanes of any vectors. None stands for zero."""
+    """One output, or four neighbouring outputs, whose values come from any lanes (limbs) of any vectors. None in
+    `lanes` is the value zero."""
 
     vector: str
     first: int
@@ -85,11 +93,11 @@ Stored = Rows | Packed | Gathered
 
 
 def stores(limbs: LimbProgram, sizes: Mapping[str, int]) -> Iterator[Stored]:
-    """Yield the stores of all limb outputs and of zeros, in the order in which they must be executed. `sizes` are the
-    lengths of the outputs.
+    """Yield the stores of all outputs of limbs, and of zeros, in the order in which the stores must be executed.
+    `sizes` are the lengths of the output vectors.
 
-    Keeps: what the core's stages have stored. A store may overwrite neighbours if a later store corrects them. Leaves
-    out: outputs that products store.
+    A store may overwrite a neighbouring entry only if a later store writes the right value there. Outputs that the core
+    (code outside limbs) has stored are kept. Outputs that matrix products store are left out.
     """
     own = {slot for stage in limbs.stages for slot, _ in stage.program.outputs}
     own |= limbs.products.written if limbs.products else set()
@@ -108,13 +116,15 @@ class _Run:
 
     @property
     def is_packed(self) -> bool:
-        """Whether this run of outputs can be stored as full vectors of four by interleaving two or three vectors."""
+        """Return whether the outputs can be stored as full vectors of four numbers, by interleaving two or three
+        vectors."""
         count, wide = len(self.at), len(self.slots)
         side_by_side = tuple(range(self.at[0], self.at[0] + wide * count, wide))
         return wide < FOUR and count % FOUR == 0 and self.at == side_by_side
 
     def rows(self, vector: str, before: int) -> Iterator[Rows]:
-        """Split the run of outputs into rows of four. The first row starts `before` entries early, filled with None."""
+        """Yield the outputs of each limb in rows of four neighbours. The first row begins `before` entries earlier, and
+        these entries are None (zero)."""
         padded = (*(None,) * before, *self.slots, *(None,) * (-(before + len(self.slots)) % FOUR))
         for k in range(0, len(padded), FOUR):
             first = tuple(index - before + k for index in self.at)

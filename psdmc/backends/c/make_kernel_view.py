@@ -1,5 +1,5 @@
-"""Decisions for the C code of one kernel: which outputs are written directly, which body files and which variants it
-has."""
+"""Decides how the C code of one kernel (one variant of a generated function) is written. The decisions are which
+outputs need no intermediate block, which files hold the code, and which C functions exist."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ from psdmc.program.signature import Quantity, Signature, Sizes
 
 
 def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
-    """Return the kernel as templates print it. Raises InternalError if C uses the name of one of its inputs or outputs.
+    """Return one kernel (one variant of a generated function) as data for the templates. Raises InternalError if the C
+    code itself uses a name of an input or output.
 
-    robot   identifier that the C functions' names start with
+    robot  identifier with which the names of the C functions begin
     """
     function, sizes = _checked(kernel.function), sizes_of(kernel, sizes)
     has_lanes = options.target.has_batches and not _is_by_state(kernel, sizes)
@@ -74,7 +75,8 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
 
 
 def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
-    """Return the robot's sizes; if the kernel packs a matrix, with the number of entries that it stores."""
+    """Return the sizes of the robot for one kernel (one variant of a generated function). If the kernel stores a matrix
+    without zeros, the number of stored entries is included."""
     return replace(sizes, nonzeros=len(kernel.places))
 
 

@@ -28,12 +28,13 @@ RESERVED = _listed()
 
 
 def is_reserved(word: str) -> bool:
-    """Whether a robot with exactly this name would collide with a name of C, C++ or a library."""
+    """Return whether a robot with exactly this name would collide with a name of C, C++ or a library, or with a Windows
+    device."""
     return word in RESERVED or DEVICE.fullmatch(word) is not None
 
 
 def identifier(name: str) -> str:
-    """Return a C and C++ identifier for `name`, which is never a word of RESERVED."""
+    """Return a C and C++ identifier for `name`. It is never a name in RESERVED (words of C, C++ and their libraries)."""
     return identifier_of(name, is_reserved)
 
 

@@ -1,4 +1,5 @@
-"""The complete C package in the form that templates print, made from the robot's metadata and the kernels."""
+"""The complete C package as data for the templates. It is made from the robot's metadata and the kernels (variants of
+generated functions)."""
 
 from __future__ import annotations
 
@@ -41,11 +42,12 @@ ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_w
 
 @dataclass(frozen=True, slots=True)
 class PackageView:
-    """One C package, in the form that templates print.
+    """One C package as data for the templates.
 
-    robot     identifier with which every symbol starts
-    adapters  names of psdmc.backends.c.adapters
-    private   functions for one state that only adapters call; no header declares them
+    robot       identifier with which every C name starts
+    references  inputs and expected results for the self-test; None: no self-test
+    adapters    names of the other programs, such as CasADi, for which the package has files
+    private     functions for one state that only adapters call; no header declares them
     """
 
     robot: str
@@ -64,8 +66,9 @@ class PackageView:
 
     @property
     def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
-        """The adapters whose C file becomes a separate shared library, lib<robot>_<name>, and the sources that are
-        compiled into each library. Files for CasADi include these sources under other names, and need none."""
+        """Return the adapters (files for other programs) whose C file becomes a separate shared library,
+        lib<robot>_<name>. Each adapter has the C files that its library needs in addition. The files for CasADi already
+        include the code of the package, and need none."""
         sources = {"casadi": (), "casadi_theta": (), "casadi_hessian": (), "fmu": self.sources}
         return {name: sources[name] for name in self.adapters if name in sources}
 
@@ -80,8 +83,9 @@ class PackageView:
 
     @property
     def size_macros(self) -> dict[str, int]:
-        """Further sizes for the header, by name: numbers of joints, of entries of q and of rates if they differ; of
-        bodies; of contacts; and of entries in sparse matrices' patterns."""
+        """Return the sizes that the C header defines in addition to the degrees of freedom, by name. They are joints,
+        entries of q, rates, bodies, contacts, and the nonzero entries of matrices. A size is left out if the package
+        does not need it."""
         wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
         wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
         if uses_contacts(function.signature for function in self.functions):
@@ -90,8 +94,8 @@ class PackageView:
 
     @property
     def patterns(self) -> tuple[Pattern, ...]:
-        """The sparsity patterns of packed matrices and, for a tree robot, of all sparse matrices. A serial chain has
-        few zeros."""
+        """Return the sparsity patterns (positions of nonzero entries) that the package lists. Listed are matrices that
+        are stored without zeros. For a tree robot, all other matrices with zeros are listed, too."""
         found = patterns(self.functions)
         return tuple(each for each in found if each.is_packed or (self.info.is_tree and each.is_sparse))
 
@@ -113,7 +117,7 @@ class PackageView:
 
     @property
     def arithmetic_flags(self) -> str:
-        """The compiler flags for the arithmetic of the C code, the same on every machine."""
+        """Return the compiler flags for the arithmetic of the C code, which are equal on every machine."""
         return " ".join(ARITHMETIC)
 
     @property
@@ -166,28 +170,32 @@ class PackageView:
 
     @property
     def friction(self) -> FrictionView | None:
-        """The data of the calibrated friction; None if the package has no function for it."""
+        """Return the data for the C function of the calibrated joint friction; None if the package has no such
+        function."""
         return FrictionView(self.info.friction, self.robot, self.real) if self.info.friction else None
 
     @property
     def payload(self) -> PayloadView | None:
-        """The data of the functions that add a load to theta_b; None if the package has no such functions."""
+        """Return the data for the C functions that add a load to theta_b (the base parameters); None if the package has
+        no such functions."""
         return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
 
     @property
     def bodies(self) -> BodiesView | None:
-        """The data of the function that computes theta_b from all bodies; None if the package has no such function."""
+        """Return the data for the C function that computes theta_b (the base parameters) from all bodies; None if the
+        package has no such function."""
         return BodiesView(self.robot, self.real, self.info.bodies) if self.info.bodies else None
 
     @property
     def version(self) -> str:
-        """psdmc's version as three numbers. CMake and pkg-config compare versions in this form."""
+        """Return psdmc's version as three numbers, the form in which CMake and pkg-config compare versions."""
         found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
         return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
 
     @property
     def pivot_size(self) -> int:
-        """The number of pivots that must be positive, if the outputs that become NaN are one vector of that length."""
+        """Return the number of pivots (of a factorised matrix) that must be positive, for functions with one output of
+        this length."""
         found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
         return next(found, self.n)
 
@@ -210,18 +218,20 @@ class PackageView:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some kernel writes the rows of one output from registers, and those of another output from a block on
-        the stack."""
+        """Return whether a function of the package needs both kinds of storage. One output is then written straight
+        into the array of the caller, and another is first collected in a block on the stack."""
         return any(kernel.is_mixed for kernel in self._all_kernels)
 
     @property
     def fails_in_several(self) -> bool:
-        """Whether some kernel sets more than one vector, or other outputs than a vector per joint, to NaN if it fails."""
+        """Return whether a failed function of the package sets several outputs to NaN, or an output that is no vector
+        with one entry per joint."""
         return any(k.positive and not (k.fails_alone and k.regions is None) for k in self._all_kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
-        """The shapes of all matrix products that follow the straight-line code of kernels, without duplicates."""
+        """Return the sizes of all matrix products that follow straight-line code in functions of the package, without
+        duplicates."""
         return tuple(sorted({p.shape for function in self.functions for p in function.products}))
 
     @property
@@ -250,7 +260,7 @@ class PackageView:
         return call_views(frozenset(found))
 
     def limb_calls(self, count: int) -> tuple[CallView, ...]:
-        """The operations that are C macros in code for `count` equal limbs, such as four legs."""
+        """Return the operations that code for `count` equal limbs, such as four legs, writes as C macros."""
         views = [kernel.limbs for kernel in self.kernels if kernel.limbs]
         stages = [stage for view in views for stage in view.stages if stage.count == count]
         return call_views(frozenset(op for stage in stages for op in stage.body.calls))
@@ -262,13 +272,14 @@ class PackageView:
 
     @property
     def multiplies_lanes(self) -> bool:
-        """Whether batch kernels need matrix products for one state per SIMD lane, too."""
+        """Return whether batch functions of the package compute matrix products with one state per SIMD lane."""
         own = (kernel for kernel in self.kernels if kernel.single_body.products)
         return self.target.has_batches and any(not kernel.by_state for kernel in own)
 
     @property
     def leads_on(self) -> bool:
-        """Whether q is longer than the rates, and the package has the functions that compute one q from another."""
+        """Return whether q has more entries than qd (quaternions), and the package has the functions that integrate q
+        and compute differences of q."""
         names = {function.name for function in self.functions}
         return self.info.is_wide and all(recipe in names for recipe in ON_MANIFOLD)
 
@@ -279,7 +290,8 @@ class PackageView:
 
     @property
     def uses_frames(self) -> bool:
-        """Whether some function of the package has to do with the named frames."""
+        """Return whether a function of the package needs the named frames of the robot. It may have an input or output
+        for frames, or add a load at a frame."""
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
@@ -291,9 +303,10 @@ def package_view(
     references: ReferenceStates | None = None,
     adapters: Sequence[str] = (),
 ) -> PackageView:
-    """Return the C package with all decisions made, ready for the templates.
+    """Return the C package as data for the templates.
 
-    Raises InputError if there are no functions, or if an adapter is not possible for this package.
+    Raises InputError if there are no functions, or if an adapter (files for another program) is not possible for this
+    package.
     """
     if not kernels:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")

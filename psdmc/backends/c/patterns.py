@@ -12,12 +12,12 @@ from psdmc.backends.c.tables import Table
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """The entries of a function's matrix that may differ from zero, row by row.
+    """The entries of a function's output matrix that may differ from zero at some state, row by row.
 
-    function   name of the function whose only output is the matrix
+    function   name of the function, which has no other output
     places     (row, column) of each entry
-    is_packed  whether the function stores these entries only
-    is_sparse  whether the matrix has further entries, which are zero
+    is_packed  whether the function stores these entries only, one after the other
+    is_sparse  whether the matrix has further entries, which are zero at every state
     """
 
     function: str
@@ -27,7 +27,8 @@ class Pattern:
 
     @property
     def macro(self) -> str:
-        """Name of the C macro for the number of nonzero entries, without the robot's prefix."""
+        """Return the name of the C macro for the number of entries that may differ from zero, without the robot's
+        prefix."""
         return f"{self.function.upper()}_NONZEROS"
 
     def table(self, robot: str) -> Table:
@@ -43,10 +44,11 @@ class Pattern:
 
 
 def patterns(functions: Sequence[FunctionView]) -> Iterator[Pattern]:
-    """Yield the sparsity pattern of every function whose only output is a matrix, packed or not.
+    """Yield the sparsity pattern (positions of nonzero entries) of every function whose only output is a matrix. The
+    matrix may be stored with or without its zeros.
 
-    In a matrix that is not packed, an entry counts as zero if it is the constant zero in every kernel of the function,
-    both with parameters compiled in and with parameters at run time.
+    In a matrix that is stored with zeros, an entry counts as zero if it is zero at every state. This must hold in all
+    variants of the function, with compiled-in base parameters and with theta_b as an input.
     """
     for function in functions:
         if function.kernels[0].places:

@@ -1,7 +1,8 @@
-"""Matrix products that follow a function's straight-line code: loops for one state, single statements for SIMD lanes.
+"""Matrix products that follow the straight-line code of a function. For one state, a product is a loop; for a batch
+with one state per SIMD lane, each entry is one statement.
 
-For one state, straight-line code slows down if it is longer than some 27 KB. For lanes, either form runs out of
-registers, and both are equally fast. Single statements then need no memory for the factors.
+For one state, straight-line code slows down if it is longer than some 27 KB. For a batch, loops and statements are
+equally fast, because both run out of registers. Statements then need no memory for the factors.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from psdmc.program.program import Program, Slot
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """C statement for one entry of a factor of a matrix product. KEEP saves an entry of the right factor. NAME names an
-    entry of the left factor, which is also an output."""
+    """C statement for one entry of a factor in a matrix product, as a call of the C macro KEEP or NAME. KEEP saves an
+    entry of the right factor. NAME gives a name to an entry of the left factor, which is also an output of the
+    function."""
 
     macro: Literal["KEEP", "NAME"]
     matrix: str
@@ -34,15 +36,16 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Shape:
-    """The shape of a matrix product: n x n. The first `zero` columns of the right factor are always zero and are not
-    saved."""
+    """The shape of a product of two n x n matrices. The first `zero` columns of the right factor are always zero and
+    are not saved."""
 
     n: int
     zero: int
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """C statements of the product, one per entry, with stores in groups for the variant that writes rows."""
+        """Return the C statements of the matrix product, one for each entry. Batch code that writes into the rows of
+        the output array has further statements, which store four entries at once."""
         groups, n = StoreGroups({"product": self.n**2}), self.n
         found = []
         for index in range(n * n):
@@ -72,6 +75,7 @@ class Multiplication:
 
 
 def multiplication(program: Program, product: Product, sizes: Mapping[str, int]) -> Multiplication:
-    """Return the C code of a matrix product after a PROGRAM; `sizes` are the lengths of the outputs."""
+    """Return the C code of a matrix product that follows a PROGRAM (the list of operations to generate). `sizes` are
+    the lengths of the output vectors."""
     shape = Shape(math.isqrt(sizes[product.output]), zero_columns(program, product))
     return Multiplication(product.output, product.left, product.right, shape)

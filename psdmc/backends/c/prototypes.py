@@ -1,4 +1,5 @@
-"""C signatures of the generated functions. The header, the definitions and the cdef for cffi all use them."""
+"""C signatures of the generated functions. The header and the definitions use these signatures, and so do the
+declarations for the Python package cffi."""
 
 from __future__ import annotations
 
@@ -50,8 +51,8 @@ def prototype(function: Signature, variant: Variant, robot: str, real: str) -> P
 
 
 def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
-    """Return the signatures of the functions that add a load to theta_b: at the tip, and at a frame with a given
-    number."""
+    """Return the signatures of the two functions that add a load to theta_b (the base parameters). One function is for
+    a load at the tip, the other for a load at a frame with a given number."""
     load = (f"{real} mass", f"const {real} *com", f"const {real} *inertia", f"{real} *theta_b")
     return (
         Prototype("void", f"{robot}_add_payload", load),
@@ -60,7 +61,8 @@ def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
 
 
 def bodies_prototype(robot: str, real: str) -> Prototype:
-    """Return the signature of the function that computes theta_b from all bodies."""
+    """Return the signature of the function that computes theta_b (the base parameters) from the masses, centres of mass
+    and inertias of all bodies."""
     given = tuple(f"const {real} *{name}" for name in ("masses", "coms", "inertias"))
     return Prototype("void", f"{robot}_theta_from_bodies", (*given, f"{real} *theta_b"))
 

@@ -28,7 +28,8 @@ def c_real(options: EmitOptions) -> CReal:
 
 
 def rounded_out(value: float, real: str) -> float:
-    """Return the value if C's `real` has a number near it, else the infinity or the zero to which it rounds."""
+    """Return the value to which a number outside the range of the C type `real` is rounded: infinity, the largest
+    number, or zero. Any other number is returned unchanged."""
     if real == "double" or math.isnan(value):
         return value
     if abs(value) >= TOO_LARGE:
@@ -39,7 +40,8 @@ def rounded_out(value: float, real: str) -> float:
 
 
 def check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) -> None:
-    """Raise InputError if a parameter, gravity or a constant of the code is too large for `real`.
+    """Raise InputError if a base parameter, gravity or a constant in the generated code is too large for the C type
+    `real`.
 
     Joint limits are not checked. A limit that is too large for `real` is no limit, and is written as infinite.
     """

@@ -17,7 +17,8 @@ from psdmc.robot.inertia import six_of
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTable:
-    """One constant C array of the self-test: its name, number of entries per row, and rows as C text."""
+    """One constant C array of the self-test: its name, the number of columns, and the C text of each row. A row belongs
+    to one state."""
 
     name: str
     columns: int
@@ -26,8 +27,8 @@ class ReferenceTable:
 
 @dataclass(frozen=True, slots=True)
 class LoadView:
-    """The self-test's load as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and rows `added`. The rows are what
-    the load adds to theta_b."""
+    """The example load of the self-test as C text: mass, com (centre of mass), inertia (Ixx Ixy Iyy Ixz Iyz Izz), and
+    rows `added`. Each row is what the load adds to theta_b (the base parameters) at the tip or at one named frame."""
 
     mass: str
     com: str
@@ -39,9 +40,11 @@ class LoadView:
 class ReferenceView:
     """The data of the self-test as C text.
 
-    tables    the states' vectors, then the expected values of each output
-    expected  labels of the outputs that have a table of expected values
-    theta_b   the run-time parameters, one constant each; empty if no kernel takes theta_b
+    count     number of states
+    tables    the inputs at all states, then the expected values of each output
+    expected  names of the outputs that have a table of expected values
+    theta_b   the base parameters that the functions take as an input, one constant each; empty if no function takes
+              them
     load      a load and what it adds to theta_b; None if the package has no functions that add loads
     """
 
@@ -59,7 +62,12 @@ def reference_view(
     labels: Collection[str],
     takes_theta: bool,
 ) -> ReferenceView:
-    """Return the states as C constants: the inputs of the package's kernels, and the expected outputs by label.
+    """Return the data of the self-test as C text: the inputs of the package's functions at some states, and the
+    expected outputs.
+
+    vectors      inputs that the functions read
+    labels       names of the outputs that the self-test compares
+    takes_theta  whether a function takes the base parameters as an input
 
     Raises ValueError if the states belong to another robot.
     """

@@ -1,5 +1,5 @@
-"""C code of a function that is a list of regions (straight-line code, loops and calls), in the form that its template
-prints. Loops and calls are text; straight-line code is a body."""
+"""C code of a function that consists of regions (straight-line code, loops, and calls of other functions), as data for
+the template. Loops and calls are C text; straight-line code is a list of statements."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from psdmc.program.theta_rows import THETAS
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Some lines of C, or the body of straight-line code, indented by a number of spaces."""
+    """Part of a function's C code: some lines of C text, or the statements of straight-line code, indented by a number
+    of spaces."""
 
     spaces: int
     lines: tuple[str, ...]
@@ -25,8 +26,8 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class RegionsView:
-    """A function's body: declarations of the function's internal arrays and constants, then pieces of code in their
-    order."""
+    """The body of a C function that contains loops or calls. First come declarations of the internal arrays and
+    constants, then the parts of the code in their order."""
 
     declarations: tuple[str, ...]
     pieces: tuple[Piece, ...]
@@ -38,10 +39,11 @@ class RegionsView:
 
 
 def regions_view(body: Regions, inputs: Sequence[str], robot: str, suffix: str) -> RegionsView:
-    """Return the C code of these regions; `inputs` are the names of the function's inputs.
+    """Return the C code of a function that consists of regions (straight-line code, loops, and calls of other
+    functions). `inputs` are the names of the function's inputs.
 
-    robot   prefix of the called functions' names
-    suffix  of constants
+    robot   prefix of the names of the called functions
+    suffix  of C constants: '' for double, 'f' for float
     """
     constants = tuple(
         f"static const real {name}[{len(values)}] = {{{', '.join(literal(x, suffix).text for x in values)}}}"

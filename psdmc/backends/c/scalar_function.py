@@ -1,5 +1,5 @@
-"""A PROGRAM with one output, written as a static C function of numbers and a vector p of parameters. The friction of
-one joint is such a function."""
+"""Writes a PROGRAM (a list of scalar operations) with one output as a static C function. The arguments are numbers and
+a vector p of parameters. The friction law of one joint is such a function."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ TYPE = "number"
 
 @dataclass(frozen=True, slots=True)
 class ScalarFunction:
-    """A C function `name(const number *p, number x, ...)`, with those of `arguments` that the PROGRAM reads.
+    """A C function `name(const number *p, number x, ...)`. p are the parameters; the numbers are those of `arguments`
+    that the PROGRAM (the list of operations) reads.
 
-    suffix  of C library functions and literals: f for float
+    suffix  of C library functions and constants: 'f' for float
     """
 
     name: str
@@ -40,7 +41,7 @@ class ScalarFunction:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The statements of the function; the last one returns the value."""
+        """Return the C statements of the function. The last statement returns the result."""
         named = Names.of(self.program).named
         values: list[Expr] = []
         found: list[str] = []

@@ -1,4 +1,5 @@
-"""The function calls of the package's self-test: every function in every layout, compared with reference states."""
+"""The function calls of the package's self-test. Every function is called for single states and for batches in every
+memory layout, and the results are compared with reference values."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ from psdmc.backends.self_test import compared_by_row, given_name, tolerance
 
 @dataclass(frozen=True, slots=True)
 class GivenVector:
-    """One input of the self-test: its name in the reference states, and `size` reals per state. `of_joints`: the input
-    has one entry per joint."""
+    """One input of the self-test: its name in the reference states, and how many real numbers belong to one state
+    (`size`). `of_joints` states whether the input has one entry per joint."""
 
     name: str
     size: int
@@ -36,14 +37,17 @@ class GivenVector:
 
 @dataclass(frozen=True, slots=True)
 class SelfCheck:
-    """The comparison of one output of a kernel, which is called state by state, row by row and, if possible, lane by
-    lane.
+    """The comparison of one output of a generated function with expected values, in the self-test. The function is
+    called for single states and, if it has batch variants, for many states.
 
-    rows, columns  shape of the output per state
-    single         C call for one state with the number `row`
-    batch, lanes   C calls for `count` states, row by row and lane by lane; '' if the kernel has no such variant
+    rows, columns  shape of the output for one state
+    single         C call for the state with the number `row`
+    batch          C call for `count` states, stored one state after the other; '' if there is no batch variant
+    lanes          C call for `count` states, stored in blocks [entry][lane] with one state per lane; '' if there is no
+                   such variant
     status         whether the calls return a status
-    expected       array of the expected values; '' if no reference state has any
+    expected       C name of the array of expected values; '' if there are no expected values
+    tolerance      largest permitted error, as C text
     """
 
     kernel: str
@@ -65,14 +69,16 @@ class SelfCheck:
 def self_checks(
     kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
 ) -> tuple[SelfCheck, ...]:
-    """Return one comparison per output of each kernel. `known` are the labels of outputs with reference values."""
+    """Return one comparison for each output of each kernel (one variant of a generated function). `known` are the names
+    of outputs that have expected values."""
     return tuple(
         _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
     )
 
 
 def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
-    """Return the inputs of all these kernels without duplicates, by their names in the reference states."""
+    """Return the inputs of all kernels (variants of generated functions), without duplicates, by their names in the
+    reference states."""
     return tuple(
         dict.fromkeys(
             GivenVector(given_name(v.name, kernel.variant), v.size, v.size == n)

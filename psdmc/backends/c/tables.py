@@ -15,11 +15,12 @@ from psdmc.backends.info import PackageInfo
 class Table:
     """One constant array in C that is also a constexpr member of the C++ class.
 
-    name          without the robot's prefix
-    declaration   in C, without `extern`
-    entries       as C text
-    cpp_type      element and length in C++: 'Real, dof'
-    cpp_entries   as C++ text
+    name         without the robot's prefix
+    declaration  in C, without `extern`
+    entries      values as C text
+    cpp_type     element type and length in C++, such as 'Real, dof'
+    cpp_entries  values as C++ text
+    is_text      whether the entries are strings
     """
 
     name: str
@@ -33,7 +34,8 @@ class Table:
 def tables(
     info: PackageInfo, robot: str, real: str, with_frames: bool = False, with_texts: bool = True
 ) -> tuple[Table, ...]:
-    """Return all tables of a package in the header's order. Tables of texts exist only if the target has texts."""
+    """Return all constant tables of a package, in the order of the C header. Tables of strings, such as joint names,
+    are left out if `with_texts` is false (small machines)."""
     lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
     lengths |= {"frames": f"{robot}_FRAMES", "joints": f"{robot}_JOINTS"}
 
@@ -80,9 +82,11 @@ def _cpp_number(value: float | None, real: str) -> str:
 
 
 def number(value: float | None, real: str) -> str:
-    """Return C text of a real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the
-    infinity or zero to which it rounds. Minus infinity is written as a product, because tcc does not accept a minus
-    before INFINITY."""
+    """Return C text of a real constant. None (unknown) is written as NaN. A number outside the range of the C type
+    `real` is written as the infinity or zero to which it rounds.
+
+    Minus infinity is written as a product, because the compiler tcc does not accept a minus before INFINITY.
+    """
     if value is None or math.isnan(value):
         return f"({real})NAN"
     value = rounded_out(value, real)

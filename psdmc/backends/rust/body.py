@@ -1,6 +1,7 @@
-"""Translation of a PROGRAM to statements of Rust.
+"""Translates a PROGRAM (the list of operations to generate) to Rust statements.
 
-A value that is used once is written at its use. A product that is only added becomes a fused multiply-add.
+A value that is used once is written at its use. A product that is used once, as a term of a sum, becomes a fused
+multiply-add.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _SYMBOL = {Op.ADD: ("+", _SUM), Op.SUB: ("-", _SUM), Op.MUL: ("*", _PRODUCT), Op
 
 
 class Text(NamedTuple):
-    """Rust text of an expression, with the binding strength of its outermost operator and its depth."""
+    """Rust text of an expression, with the precedence of its outermost operator and the depth of its nested brackets."""
 
     text: str
     binding: int = _ATOM
@@ -42,7 +43,7 @@ class Text(NamedTuple):
 
 
 def place(slot: Slot, shapes: Mapping[str, Sequence[int]]) -> str:
-    """Rust text of an entry of a vector or matrix, such as `m[1][2]`; for a scalar, its name."""
+    """Return the Rust text of one entry of a vector or matrix, such as `m[1][2]`. For a scalar, return its name."""
     index, found = slot.index, ""
     for length in reversed(shapes[slot.vector]):
         index, own = divmod(index, length)
@@ -62,8 +63,11 @@ def number(value: float) -> str:
 def statements(
     program: Program, shapes: Mapping[str, Sequence[int]], stored: Sequence[Quantity]
 ) -> list[str]:
-    """Return the Rust statements that compute a PROGRAM. All outputs begin as zeros, and each entry is stored when it
-    is known."""
+    """Return the Rust statements that compute a PROGRAM (the list of operations to generate). All outputs are first set
+    to zero, and each entry is stored when its value is known.
+
+    stored  the outputs
+    """
     return [*(_declared(q.name, program, shapes) for q in stored), *_Writer(program, shapes).lines()]
 
 

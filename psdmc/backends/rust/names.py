@@ -26,7 +26,8 @@ def _is_reserved(word: str) -> bool:
 
 
 def variable(name: str) -> str:
-    """Return the name of a quantity or function, followed by an underscore if Rust uses the name itself."""
+    """Return the Rust name of a quantity or function. An underscore is added if the name is a Rust keyword or another
+    name that the Rust code uses."""
     return f"{name}_" if name in KEYWORDS or name == "fma" else name
 
 

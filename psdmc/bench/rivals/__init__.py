@@ -1,4 +1,4 @@
-"""The libraries that the benchmark compares, psdmc's own code included, in the order of its tables."""
+"""The libraries that the benchmark compares, including psdmc, in the order of the printed tables."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from psdmc.errors import PsdmcError
 
 
 class Builder(Protocol):
-    """A function that compiles one library's code for a robot with the given compiler flags, and returns its compared
-    functions."""
+    """A function that compiles the code of one library for a robot, with the given compiler flags. It returns the
+    compiled functions, ready to be compared, and those that are not available."""
 
     def __call__(self, case: Case, flags: tuple[str, ...]) -> Sequence[Contestant | Unavailable]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A library that takes part in the benchmark. counted: whether its instructions are counted."""
+    """A library that takes part in the benchmark. `counted` states whether the instructions of its functions are
+    counted."""
 
     name: str
     build: Builder
@@ -31,8 +32,8 @@ class Entrant:
     def contestants(
         self, case: Case, flags: tuple[str, ...] | None = None
     ) -> Sequence[Contestant | Unavailable]:
-        """Return the library's functions for this robot, compiled for this machine or with other flags; or why there are
-        none."""
+        """Return the library's functions for this robot, ready to be compared; if the library cannot be built, return
+        the reason. The functions are compiled with `flags`; None: with the flags for this machine."""
         try:
             return self.build(case, flags or native_flags())
         except (PsdmcError, OSError) as error:

@@ -1,4 +1,5 @@
-"""C code that CasADi generates from Pinocchio's algorithms: for one state per call, and for one state per SIMD lane."""
+"""C code that CasADi generates from Pinocchio's algorithms, in two variants. A call of the first computes one state; a
+call of the second computes several states, one per SIMD lane."""
 
 from __future__ import annotations
 
@@ -86,15 +87,16 @@ def _entered(
 
 
 def written(case: Case) -> tuple[str, dict[str, tuple[int, int]]]:
-    """Generate CasADi's C code for a robot; return it with the numbers of (multiplications, additions) of its
-    functions."""
+    """Return the C code that CasADi generates for a robot, with the numbers of (multiplications, additions) of each
+    function."""
     product = _generated(case)
     lines = (line.split() for line in product.with_suffix(".txt").read_text().splitlines())
     return product.read_text(), {name: (int(mul), int(add)) for name, mul, add in lines}
 
 
 def symbolic(case: Case) -> Any:
-    """Return Pinocchio's articulated-body algorithm on CasADi's symbols, as a casadi.Function (q, qd, tau) -> qdd."""
+    """Return Pinocchio's articulated-body algorithm as a casadi.Function (q, qd, tau) -> qdd. It was evaluated with
+    CasADi's symbols in place of numbers."""
     import casadi
 
     return casadi.Function.load(str(_generated(case).with_suffix(".casadi")))

@@ -1,5 +1,5 @@
-"""C code that CppADCodeGen generates from Pinocchio's algorithms, recorded by CppAD, as Pinocchio's own code generation
-does."""
+"""C code that CppADCodeGen generates. CppAD records the operations of Pinocchio's algorithms, as in Pinocchio's own
+code generation, and CppADCodeGen writes these operations as C."""
 
 from __future__ import annotations
 

@@ -25,8 +25,8 @@ OTHER_BIAS = "a free root's rates are along the world's axes there, which makes 
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
-    """Return MuJoCo's functions for one robot. Refuse drive inertia, as MuJoCo's Newton-Euler does not contain
-    armature."""
+    """Return MuJoCo's functions for one robot. A robot with drive inertia (motors and gears) is refused, because
+    MuJoCo's Newton-Euler recursion leaves drive inertia out. A robot with a link without mass is refused, too."""
     if case.has_drive_inertia:
         return [Unavailable(RIVAL, "its mj_rne leaves drive inertia out")]
     if np.any(case.chain.parameters[:, 0] <= 0.0):

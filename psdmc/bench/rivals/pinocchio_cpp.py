@@ -1,5 +1,5 @@
-"""Pinocchio in C++ in two builds: linked to its wheel's library, as users have it, and header-only for this
-processor."""
+"""Pinocchio in C++ in two builds. One is linked to the library of the Python wheel, as users have it; the other is
+compiled from the headers alone for this processor."""
 
 from __future__ import annotations
 
@@ -83,10 +83,13 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
 
 
 def ways_of(case: Case, ways: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """Return, for each function, the algorithms of a library that compute what psdmc computes for this robot.
+    """Return, by function, the algorithms of a library that compute what psdmc computes for this robot.
 
-    psdmc differentiates by rates, but a tool that differentiates C code does so by the entries of q. These derivatives
-    differ for joints with several coordinates, so such algorithms are left out.
+    ways  the algorithms of the library by function
+
+    Some tools differentiate C code by the entries of q, but psdmc differentiates by rates. Both derivatives differ for
+    joints with several coordinates, such as a floating base. For such a robot, the algorithms of these tools are left
+    out.
     """
     return {
         function: tuple(way for way in ways[function] if not (case.is_wide and way.endswith(BY_COORDINATES)))
@@ -100,24 +103,26 @@ BY_COORDINATES = ("_jacobian", "_vjp", "_vjp_aba", "_vjp_ldl")
 
 
 def variant_of(symbol: str, function: str) -> str:
-    """Return the algorithm's name for tables: the part of the C symbol's name that the function's name does not
-    contain."""
+    """Return the name of an algorithm for tables. It is the part of the C function's name that does not occur in the
+    name of psdmc's function."""
     return symbol.removeprefix(function).strip("_").upper()
 
 
 def outputs_of(case: Case, function: str) -> int:
-    """Number of output values per state of another library: as many as psdmc's, but regressors have standard
-    parameters."""
+    """Return the number of output values per state for a function of another library. It equals the number for psdmc
+    except for regressors, which have ten columns for each body instead of one for each base parameter."""
     return 10 * case.n * case.chain.nv if function == "regressor" else sum(output_sizes(function, case.sizes))
 
 
 def is_comparable(case: Case, function: str) -> bool:
-    """Whether another library's function computes the same as psdmc's for this robot."""
+    """Return whether another library's function computes the same result as psdmc's for this robot. A regressor does
+    not if the robot has drive inertia."""
     return function != "regressor" or not case.has_drive_inertia
 
 
 def incomparable(case: Case, rival: str) -> list[Unavailable]:
-    """Functions of a library that are left out for this robot, with the reason."""
+    """Return the functions of a library that are left out for this robot because they compute something else, with the
+    reason."""
     if not case.has_drive_inertia:
         return []
     return [Unavailable(f"{rival}, regressor", "it has no columns for drive inertia, which this robot has")]
@@ -176,6 +181,7 @@ def _library_flags(prefix: Path) -> tuple[str, ...]:
 
 
 def standard_parameters(case: Case) -> Array:
-    """Return the (10 n,) standard parameters about the joint frames, by which Pinocchio's regressor gives torques."""
+    """Return the vector (10 n,) of standard parameters of the n bodies, each about its joint frame. Pinocchio's
+    regressor times this vector gives the torques."""
     pairs = zip(case.chain.joints, case.chain.parameters, strict=True)
     return np.concatenate([joint_frame_map(joint.link_frame) @ row[:DRIVE] for joint, row in pairs])

@@ -1,5 +1,5 @@
-"""Springs and further friction in a fit, as read from the tables [[springs]] and [friction] of a log description. Each
-unknown value adds a column to the linear problem."""
+"""Springs and further friction of a fit, from the tables [[springs]] and [friction] of a log description. Each of their
+unknown values, such as a stiffness, adds one column to the linear least-squares problem."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ HINT = "docs/how-to/springs-and-friction.md describes these tables"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """The effects that a fit has in addition to rigid bodies and plain friction.
+    """The effects on torques, such as springs, that a fit has in addition to rigid bodies and plain joint friction.
 
-    content        the tables from which they were read, as plain values
-    plain_offsets  False: the plain friction of joints has no offsets, because some joints have an offset among these
+    effects        the effects, each with unknown values
+    content        the tables of the log description from which the effects were read, as plain values
+    plain_offsets  False: the plain friction of joints has no constant torques, because some joints have one among these
                    effects, or no joint has one
     """
 
@@ -55,7 +56,7 @@ class Columns:
 
     @property
     def of_springs(self) -> NDArray[np.bool_]:
-        """(m,) whether a value belongs to a spring; other values belong to joints."""
+        """Return, for each of the m unknown values, whether it belongs to a spring. The other values belong to joints."""
         own = [[isinstance(effect, Spring)] * len(effect.unknowns) for effect in self.effects]
         return np.array([is_own for each in own for is_own in each], dtype=bool)
 
@@ -69,17 +70,19 @@ class Columns:
 
     @property
     def start(self) -> Array:
-        """(m,) values that remain if the data do not determine them."""
+        """Return the m values that the unknowns keep if the data do not determine them."""
         return np.array([unknown.start for unknown in self.unknowns])
 
     def values(self, motion: Motion) -> Array:
-        """Return the motor torque (N, n, m) per unit of each unknown value, before any filter."""
+        """Return the motor torques per unit of each unknown value, before any filter: an array (N samples, n joints, m
+        values)."""
         if not self.effects:
             return np.zeros((*motion.q.shape, 0))
         return np.concatenate([effect.columns(motion) for effect in self.effects], axis=2)
 
     def without_load(self) -> Columns:
-        """The effects that do not depend on the torque of the rigid bodies."""
+        """Return the effects that remain when those are left out whose friction depends on the torque of the rigid
+        bodies."""
         kept = tuple(effect for effect in self.effects if not effect.by_load)
         return replace(self, effects=kept)
 
@@ -91,11 +94,13 @@ def read_columns(
     offsets: bool = True,
     folder: Path | None = None,
 ) -> Columns:
-    """Return the effects in the tables `springs` and `friction` of a log description; other tables are ignored.
+    """Return springs and further friction from the tables `springs` and `friction` of a log description. Other tables
+    are ignored.
 
-    where    name of the file, for messages
-    offsets  whether plain friction has offsets, unless the tables say otherwise
-    folder   folder of the Python files with users' own friction laws; None: no file is run, as for a model file's content
+    where    name of the log description, for messages
+    offsets  whether plain friction has a constant torque for each joint, unless the tables say otherwise
+    folder   folder of the Python files with users' own friction laws; None: no such file is run, for example when the
+             tables come from a model file
 
     Raises InputError with the first faults.
     """

@@ -1,4 +1,5 @@
-"""The effect of a spring in a fit: its tension at a reference length, its stiffness, and the friction of its rod."""
+"""The torques of a spring in a fit. The unknown values are the tension at a reference length, the stiffness, and the
+friction of the spring's rod."""
 
 from __future__ import annotations
 
@@ -16,22 +17,23 @@ SLIDING = 0.01
 
 
 def pull(length: Array, rate: Array, reference: float) -> Array:
-    """Return the tension per unit of a constant force that shortens the spring."""
+    """Return the tension per unit of an unknown constant force that shortens the spring: one at every sample."""
     return np.ones_like(length)
 
 
 def push(length: Array, rate: Array, reference: float) -> Array:
-    """Return the tension per unit of a constant force that lengthens the spring."""
+    """Return the tension per unit of an unknown constant force that lengthens the spring: minus one at every sample."""
     return -np.ones_like(length)
 
 
 def stretch(length: Array, rate: Array, reference: float) -> Array:
-    """Return the tension per unit of stiffness: it grows with the length, and is zero at the reference length."""
+    """Return the tension per unit of stiffness: the length of the spring minus the reference length, at every sample."""
     return length - reference
 
 
 def rub(length: Array, rate: Array, reference: float) -> Array:
-    """Return the tension per unit of rod friction, which acts against the motion of the rod."""
+    """Return the tension per unit of rod friction, which acts against the motion of the rod. It is about one while the
+    spring becomes longer, minus one while it becomes shorter."""
     return np.asarray(np.tanh(rate / SLIDING))
 
 
@@ -41,10 +43,12 @@ Law = Callable[[Array, Array, float], Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spring:
-    """A spring in a fit. Its tension is the sum of unknown values times laws; motors balance it with tau = tension * d
-    length / dq.
+    """A spring in a fit. Its tension is a sum of unknown values, each times a law. The motors balance the spring with
+    the joint torques tau = tension * d length / dq.
 
-    laws       one function for each unknown value
+    unknowns   the unknown values, such as the stiffness
+    laws       for each unknown value, the function that returns the tension per unit
+    way        function of the joint positions that returns the length of the spring
     reference  m (rad), the length at which `force` is the whole tension
     """
 

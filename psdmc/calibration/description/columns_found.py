@@ -43,11 +43,14 @@ USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A column of a log file: SI value = factor * (number - zero).
+    """A column of a log file that holds one quantity of one joint. The SI value is factor * (number in the column -
+    zero).
 
-    table, place  name of the table, and index of the column from 0
-    says          what the column's unit implies about the joint
-    entry         the entry of the log description about the column
+    table   name of the table that has the column
+    place   index of the column from 0
+    says    what the column's unit implies about the joint: that it rotates or slides, or nothing
+    delay   s by which the column lags behind the time column
+    entry   the entry of the log description about the column
     """
 
     table: str
@@ -73,8 +76,8 @@ class JointColumns:
 def joint_columns(
     description: LogDescription, joint_names: Sequence[str], tables: Mapping[str, Columns]
 ) -> tuple[JointColumns, ...]:
-    """Return the columns of every joint of the model, in its order. Raises InputError if a column is missing or
-    ambiguous."""
+    """Return the log columns of every joint, in the order of the model's joints. Raises InputError if a column is
+    missing or ambiguous."""
     said = {joint.name: joint for joint in description.part(JOINTS)}
     found = []
     for name in joint_names:
@@ -103,7 +106,8 @@ def _found(joint: JointEntry, what: What, entry: Entry, tables: Mapping[str, Col
 
 
 def replace_unit(entry: Entry, unit: str) -> Entry:
-    """Return the entry with this unit, or without a unit if `unit` is empty."""
+    """Return a copy of the entry with the unit `unit`. Fields about encoder ticks or currents that contradict this unit
+    are dropped. If `unit` is empty, the entry is returned unchanged."""
     return Entry(unit=unit or None).over(entry)
 
 
@@ -153,7 +157,7 @@ def _usual(
 def place_of(
     column: str | int, table: str | None, tables: Mapping[str, Columns], where: str
 ) -> tuple[str, int]:
-    """Return the table and the index (from 0) of a column from its name or number."""
+    """Return the table of a log and the index (from 0) of a column, from the name or number of the column."""
     if table is not None and table not in tables:
         known = f"expected one of {listed([quoted(t) for t in tables])}"
         said = known if tuple(tables) != ("",) else "but its log is one file: expected none"

@@ -1,6 +1,7 @@
-"""A log description (log.toml): it says what the columns of a user's logs are, and how to fit them.
+"""A log description (log.toml): the file says what the columns of a user's logs are, and how to fit them.
 
-Each top-level key of the file is a Table, with a module of its own; `tables.TABLES` lists them.
+Each top-level key of the file is described by an object of the class Table in a separate module; `tables.TABLES` lists
+these objects.
 """
 
 from __future__ import annotations
@@ -23,21 +24,21 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogDescription:
-    """The content of a log description, by top-level key.
+    """The content of a log description (log.toml), by top-level key.
 
     path   path of the file, for messages
-    parts  values by key, for the keys that the file has
+    parts  the value of each key that the file has
     """
 
     path: Path
     parts: Mapping[str, object]
 
     def part(self, table: Table[T]) -> T:
-        """Return the value of a table in the file, or its default if the file does not have the table."""
+        """Return the value of a top-level key in the file, or the default of this key if the file does not have it."""
         return cast(T, self.parts.get(table.key, table.default))
 
     def options(self, options: LinearOptions) -> LinearOptions:
-        """Return the options of the linear fit, changed as all tables of the description say."""
+        """Return the options of the linear fit, changed by the entries of the log description."""
         for table in TABLES:
             options = table.options(options, self.part(table))
         return replace(options, tables_from=str(self.path))

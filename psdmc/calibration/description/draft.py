@@ -49,8 +49,8 @@ class Draft:
 def drafted(
     paths: Sequence[Path], output: Path, joint_names: tuple[str, ...] | None, topic: str = ""
 ) -> Draft:
-    """Return the draft for logs with equal columns, to be written to `output`. The columns are guessed from the first
-    log.
+    """Return the draft of a log description that will be written to `output`, for logs with equal columns. The meaning
+    of the columns is guessed from the first log.
 
     joint_names  joints of the model; None: the names in the log
 
@@ -88,7 +88,8 @@ def toml_text(text: str) -> str:
 
 
 def quoted_word(text: str) -> str:
-    """Return a file's name for a comment: unchanged if it is printable, else quoted."""
+    """Return the name of a file as text for a TOML comment. The name is unchanged if all its characters are printable,
+    else it is quoted and escaped."""
     return text if text.isprintable() else quoted(text)
 
 
@@ -253,11 +254,12 @@ TIMES = (
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """Guessed columns, as indices from 0.
+    """A guess which columns of a log hold which quantities, as indices from 0.
 
-    time       None if no column resembles time
+    time       column of time; None if no column resembles time
     joints     columns by joint name, in the order of the model if it is known, else of the log
-    by_number  True: the guess follows only from the number of columns
+    by_number  True: the names of the columns gave no hint, and the guess follows only from the number of columns
+    other      columns without a guess
     """
 
     time: int | None
@@ -384,8 +386,12 @@ TIME_PERIODS = (("ns", 1e5), ("us", 100.0), ("ms", 0.9))
 
 
 def unit_of(what: What, names: Sequence[str], values: Array) -> str:
-    """Return a guessed unit for the columns (N, n) of a quantity. Positions beyond a full turn are taken for degrees,
-    unless their names state a unit."""
+    """Return a guessed unit for the columns `values` (N samples, n joints) of a position, velocity or effort. If the
+    names of the columns state a unit, it is returned.
+
+    Otherwise, efforts are taken for N m and velocities for rad/s. Positions are taken for rad if they stay within 1.1
+    revolutions, else for degrees.
+    """
     spelled = spelled_unit(what, names)
     if spelled:
         return spelled

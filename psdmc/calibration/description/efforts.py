@@ -13,10 +13,11 @@ from psdmc.calibration.logs.wording import listed, quoted
 
 
 def held_quantity(efforts: Sequence[tuple[str, Found]], coupled: bool) -> Quantity:
-    """Return the quantity of a log whose joints have these effort columns.
+    """Return the quantity (current, motor torque or joint torque) that a log holds in memory, from the effort columns
+    of its joints.
 
-    Currents remain currents if all joints have them and no motors are coupled; else they are converted to torques.
-    Raises InputError if torques of two kinds would mix, or if a torque constant is missing.
+    Currents remain currents if all joints have currents and no joint is driven by several motors. Otherwise, currents
+    are converted to torques. Raises InputError if torques of two kinds would mix, or if a torque constant is missing.
     """
     _require_motor_torques(efforts)
     held = {found.quantity for _, found in efforts}
@@ -71,8 +72,8 @@ def _require_known_gears(efforts: Sequence[tuple[str, Found]]) -> None:
 
 
 def torque_factor(found: Found, quantity: Quantity) -> float:
-    """Return the factor from a column to the log's quantity: the torque per ampere at the joint if currents become
-    torques."""
+    """Return the factor by which an effort column is multiplied. It is the torque per ampere at the joint if the column
+    holds currents and `quantity` is a torque; else 1."""
     if found.quantity != "current" or quantity == "current":
         return 1.0
     return (found.entry.torque_constant or 1.0) * (found.entry.gear_ratio or 1.0)

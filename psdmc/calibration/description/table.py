@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Data that all tables need while a log description is read.
+    """Data that are needed to read any table of a log description.
 
     folder       folder of the description: its paths are relative to it
     joint_names  joints of the model; None if no model is known, so that names cannot be checked
@@ -27,18 +27,21 @@ class Reading:
 
 
 def unchanged(options: LinearOptions, value: object) -> LinearOptions:
-    """Return the options of the fit unchanged, for tables that have no effect on them."""
+    """Return the options of the linear fit unchanged. Tables of a log description that do not affect the options use
+    this function."""
     return options
 
 
 @dataclass(frozen=True, slots=True)
 class Table(Generic[T]):
-    """One top-level key of a log description. Each has a module in this folder and an entry in `tables.TABLES`.
+    """How one top-level key of a log description (log.toml) is read. Each key has a module in this folder and an entry
+    in `tables.TABLES`.
 
     key      its name in the file
-    read     function that reads the TOML value; it never raises an error but adds faults to the reading's list
+    read     function that returns the value of the key from TOML. It raises no error: it adds a text about each fault
+             to the list `faults` of the Reading
     default  the value if the file does not have the key
-    options  function that returns the options of the linear fit, changed as the table says
+    options  function that returns the options of the linear fit, changed by the value of the key
     """
 
     key: str

@@ -26,8 +26,9 @@ class FitChoice:
     """Options of the linear fit from a log description or the command line. None means the default of LinearOptions.
 
     cutoff      cut-off of the filter, Hz
-    split       share of each log that is held out for validation, and number of blocks
-    exponents   exponents of the viscous friction terms;  offset  whether each joint has a constant torque
+    split       share of each log that is held out for validation, and number of blocks into which it is divided
+    exponents   exponents d of the viscous friction terms |qd|^d sign(qd)
+    offset      whether each joint has a constant torque
     sign_speed  speed over which Coulomb friction changes sign, rad/s (m/s)
     """
 
@@ -38,7 +39,7 @@ class FitChoice:
     sign_speed: float | None = None
 
     def by_flag(self) -> dict[str, object]:
-        """Return the chosen values by the command-line option that sets them."""
+        """Return the values that the user chose, by the command-line option that sets each value, such as --cutoff."""
         return {"--cutoff": self.cutoff, "--split": self.split, "--friction": self.exponents}
 
 
@@ -61,8 +62,9 @@ def _given(table: TomlTable, key: str, low: float, high: float) -> float | None:
 
 
 def split_of(shares: Sequence[float]) -> SplitOptions | str:
-    """Return the split for one number (the share) or two (share and number of blocks). Return a text if the numbers
-    are wrong."""
+    """Return how a log is split for validation, from one number or two. The first is the share that is held out, the
+    second the number of blocks into which it is divided. If the numbers are wrong, return a text that says what is
+    expected."""
     share, blocks = shares[0], shares[1] if len(shares) > 1 else 0.0
     if len(shares) > 2 or not 0.0 <= share <= LARGEST_HELD_OUT:
         return f"{', '.join(f'{x:g}' for x in shares)}: expected a share from 0 to {LARGEST_HELD_OUT:g}"
@@ -91,7 +93,7 @@ def _friction(table: TomlTable, faults: list[str]) -> tuple[tuple[float, ...], b
 
 
 def with_choice(options: LinearOptions, choice: FitChoice) -> LinearOptions:
-    """Return the options of the fit with every chosen value."""
+    """Return the options of the linear fit, in which the values that the user chose replace the defaults."""
     if choice.cutoff is not None:
         options = replace(options, filter=replace(options.filter, cutoff=choice.cutoff))
     plain = {

@@ -1,5 +1,5 @@
-"""The table `[[joint]]`: the columns of a joint, and what differs from `[position]`, `[velocity]` and `[effort]` for
-it."""
+"""The table `[[joint]]` of a log description: the columns of one joint. It may also change, for this joint alone, the
+entries `[position]`, `[velocity]` and `[effort]`, which apply to all joints."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEYS = ("name", "logged_as", *UNITS)
 
 @dataclass(frozen=True, slots=True)
 class JointEntry:
-    """The entry of one joint of the model.
+    """The entry of a log description about one joint of the model.
 
     logged_as  name of the joint in the log, if the names of columns contain it
     """
@@ -43,7 +43,10 @@ def _read(value: object, reading: Reading) -> tuple[JointEntry, ...]:
 
 
 def require_joints(names: list[str], where: str, reading: Reading) -> None:
-    """Add a fault if one of the names is not a joint of the model."""
+    """Add a text to the list of faults of a Reading if one of the names is not a joint of the model.
+
+    where  the table with the names, for the text
+    """
     known = reading.joint_names
     unknown = [quoted(name) for name in names if known is not None and name not in known]
     if unknown and known is not None:

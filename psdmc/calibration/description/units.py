@@ -16,7 +16,8 @@ TICKS = ("ticks", "ticks/s")
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit; `size` is its size in SI units (s, rad, m, rad/s, m/s, N m, N, A)."""
+    """A unit of a logged column. `size` is the factor to the SI unit (s, rad, m, rad/s, m/s, N m, N, A). `says` is what
+    the unit implies about the joint: that it rotates or slides, or nothing."""
 
     size: float
     says: Says

@@ -13,7 +13,8 @@ from psdmc.model.calibrated import Matrix
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coupling:
-    """The coupling matrix C of n motors and n joints. Motor k has the name of joint k. Rows of arrays are samples."""
+    """The matrix C in q_joint = C q_motor for n motors that drive n joints together, and its inverse. Motor k has the
+    name of joint k. In arrays of positions or torques, each row is one sample."""
 
     matrix: Array
     inverse: Array

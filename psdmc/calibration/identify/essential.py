@@ -1,8 +1,8 @@
-"""Finds the essential parameters of a fit: parameters that the data do not distinguish from the prior are set to the
-prior.
+"""Finds the essential parameters of a fit. Other parameters are dropped: they keep the values of the prior, from which
+the data do not differ significantly.
 
-They are dropped one after the other, the largest relative standard deviation first, while an F-test over all dropped
-parameters does not object (Khalil and Dombre 2002, section 12.4). The statistic is Wald's, with the reported
+Parameters are dropped one after the other, the largest relative standard deviation first. An F-test over all dropped
+parameters decides when to stop (Khalil and Dombre 2002, section 12.4). The statistic is Wald's, with the reported
 covariance, which takes correlated residuals into account.
 """
 
@@ -22,10 +22,10 @@ from psdmc.calibration.logs.log import Array
 
 @dataclass(frozen=True, slots=True)
 class EssentialOptions:
-    """How parameters are dropped.
+    """Options for dropping parameters that the data do not need.
 
     relative      relative standard deviation above which psdmc tries to drop a parameter
-    significance  of the F-test: the probability to keep parameters although all of them equal the prior
+    significance  significance level of the F-test: the probability that a parameter is kept although the prior is true
     """
 
     relative: float = 0.5
@@ -34,10 +34,11 @@ class EssentialOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Essential:
-    """An estimate in which some parameters are set to the prior and the others are refitted.
+    """An estimate in which some of the m parameters keep the values of the prior, and the others are fitted again.
 
-    dropped  (m,)  which parameters are set to the prior
-    f        F statistic over all of them;  limit  largest value that it may have, NaN if none was dropped
+    dropped  (m,) whether a parameter keeps the prior's value
+    f        F statistic over all dropped parameters
+    limit    largest value of f at which parameters are dropped; NaN if none was dropped
     """
 
     estimate: Estimate
@@ -49,9 +50,10 @@ class Essential:
 def essential(
     solved: Estimate, start: Array, samples: int, options: EssentialOptions, fit: FitOptions | None = None
 ) -> Essential:
-    """Return the estimate without the parameters that the data do not need.
+    """Return the estimate in which parameters that the data do not need keep the values of the prior.
 
-    start    (m,)  the prior's values, which dropped parameters get
+    solved   the estimate of all m parameters
+    start    (m,) the prior's values, which dropped parameters get
     samples  number of independent samples that were fitted, all joints together
     fit      options of the fit that found `solved`; None: the default ones
     """
@@ -84,7 +86,8 @@ class _Problem:
         self.information = whitening.T @ whitening
 
     def restricted(self, dropped: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Return the best values with the dropped parameters at the prior, and the standard deviations of the others."""
+        """Return the best values of all parameters if the dropped ones keep the prior's values, and the standard
+        deviations. Those of dropped parameters are zero."""
         covariance = self.covariance(dropped)
         free = ~dropped
         moved = np.where(dropped, self.start - self.values, 0.0)
@@ -93,8 +96,8 @@ class _Problem:
         return values, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def covariance(self, dropped: NDArray[np.bool_]) -> Array:
-        """Return the covariance (m, m) of the other parameters if the dropped ones are known; its entries for these
-        are zero."""
+        """Return the covariance (m, m) of the m parameters if the dropped ones are known exactly. Rows and columns of
+        dropped parameters are zero."""
         free = np.flatnonzero(~dropped)
         covariance = np.zeros_like(self.information)
         own = self.information[np.ix_(free, free)]
@@ -103,7 +106,8 @@ class _Problem:
         return covariance
 
     def f(self, dropped: NDArray[np.bool_]) -> float:
-        """Return the increase of the cost per dropped parameter, which is the F statistic."""
+        """Return the F statistic for the dropped parameters. It is the increase of the sum of squared residuals (in
+        variances) if they keep the prior's values, divided by their number."""
         if not dropped.any():
             return 0.0
         away = self.restricted(dropped)[0] - self.values

@@ -1,4 +1,4 @@
-"""Plausible sizes of spring and further friction values in a linear fit, and limits between such values."""
+"""Plausible sizes of the spring and friction values in a linear fit, and inequalities between these values."""
 
 from __future__ import annotations
 
@@ -18,8 +18,12 @@ from psdmc.robot.mechanism import Mechanism
 def motion_of(
     q: Array, qd: Array, sign_speed: float, load: Array | None = None, coupling: Coupling | None = None
 ) -> Motion:
-    """Return the Motion for these columns from positions, speeds and rigid-body torques (N, n) of the joints. If
-    motors are coupled, friction acts on the motors."""
+    """Return the motion from which the torques of springs and friction are computed. If several motors drive a joint,
+    friction acts on the motors.
+
+    q, qd  (N samples, n joints) positions and speeds
+    load   (N, n) torques of the rigid bodies; None if no friction depends on them
+    """
     if coupling is None:
         return Motion(q, qd, q, qd, sign_speed, load)
     of_motors = None if load is None else coupling.torque_of_motors(load)
@@ -28,10 +32,10 @@ def motion_of(
 
 
 def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Array) -> Array:
-    """Return a plausible size (m,) of each value: that with which its largest column explains the whole torque of a
-    joint.
+    """Return a plausible size (m,) of each of the m unknown values of springs and friction. With this size, the largest
+    torque of the value at some joint equals the whole torque of that joint.
 
-    sizes  (n,) N m, typical torques of the joints
+    sizes  (n,) N m, typical torques of the n joints
     """
     if not len(columns):
         return np.zeros(0)
@@ -46,10 +50,14 @@ def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Ar
 
 
 def limits_of(columns: Columns, plain: Sequence[tuple[str, str]], l: int) -> Array:
-    """Return rows (k, l + n f + m) whose products with the vector of unknowns may not be negative. They keep the
-    magnitude of a value below another value of the same joint.
+    """Return k rows of linear inequalities between the unknowns of a fit, an array (k, l + n f + m). The product of
+    each row with the vector of unknowns may not be negative. The rows keep the magnitude of a value below another value
+    of its joint.
 
-    plain  names of the n f values of plain friction, with their joints
+    The unknowns are l base parameters, f friction values of each of n joints, and m values of springs and further
+    friction.
+
+    plain  joint and name of each of the n f friction values
     """
     rows: list[Array] = []
     width = l + len(plain) + len(columns)

@@ -30,7 +30,7 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """All logs of a campaign, by the step that uses them."""
+    """All logs of a campaign, sorted by the calibration step that uses them: motor, gravity, friction, inertial."""
 
     motor: Sequence[MotorRun]
     gravity: Sequence[GravityRun]
@@ -55,7 +55,7 @@ class FourSteps:
 
 
 def checked_runs(chain: Mechanism, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
-    """Return all logs of a campaign after checking them. Raises InputError, before the fit, if there are too few runs
+    """Return all logs of a campaign after checking them. Raises InputError if there are too few runs (recorded motions)
     or if a log cannot be used."""
     _require_runs(runs)
     logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]
@@ -75,11 +75,13 @@ def calibrate_four_steps(
     torque_constants: Mapping[str, float] | None = None,
     file_theta: Array | None = None,
 ) -> FourSteps:
-    """Determine torque constants, gravity, friction and inertia. The last three steps are repeated as often as the
-    options say.
+    """Return torque constants, gravity parameters, friction and inertial parameters from the runs of a campaign. The
+    last three are determined repeatedly, as often as the options say.
 
-    torque_constants  N m/A by joint name, for joints on which no load acts (an axis along gravity)
-    file_theta        (l,)  the file's values, which remain in directions that no run shows; None: zero
+    torque_constants  N m/A by joint name, for joints on which the weight of the load does not act (an axis along
+                      gravity)
+    file_theta        (l,) the l base parameters of the robot file, which remain in directions (linear combinations)
+                      that no run determines; None: zero
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)

@@ -23,24 +23,26 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionResult:
-    """Friction by joint name, in the order of the robot's joints. Joints without a run are missing."""
+    """The identified friction by joint name, in the order of the robot's joints, and warnings. A joint without a
+    friction run has no entry."""
 
     joints: dict[str, JointFriction]
     warnings: tuple[str, ...]
 
     @property
     def delay(self) -> float:
-        """Time between position and current, s: the median over the joints."""
+        """Return the time in s by which the recorded position lags behind the recorded current: the median over the
+        joints."""
         return float(np.median([joint.delay for joint in self.joints.values()])) if self.joints else 0.0
 
 
 def calibrate_friction(
     runs: Mapping[str, JointRun], options: FrictionOptions, start: FrictionResult | None = None
 ) -> FrictionResult:
-    """Return the LuGre friction of every joint that has a run.
+    """Return the LuGre friction of every joint that has a friction run (a recording in which this joint alone moves).
 
     runs    runs by joint, from `prepared_runs`
-    start   result of an earlier pass as the start value; None: psdmc searches for a start value
+    start   friction from an earlier iteration, as start values; None: psdmc searches for start values
     """
     earlier = start.joints if start is not None else {}
     tasks = [(name, run, options, earlier.get(name)) for name, run in runs.items()]
@@ -70,7 +72,8 @@ def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:
-    """Return the quality of each joint's friction on its own run, after the gravity torque is subtracted."""
+    """Return how well each joint's identified friction predicts the motor torque of its friction run, after the gravity
+    torque is subtracted."""
     qualities, samples = {}, []
     for name, data in runs.items():
         if name in joints:
@@ -87,8 +90,8 @@ def prepared_runs(
     runs: Sequence[FrictionRun],
     options: StepOptions,
 ) -> dict[str, JointRun]:
-    """Return the friction runs by joint, in the order of the robot's joints, each with its gravity torque from
-    theta_b."""
+    """Return the friction runs (recordings in which one joint moves) by joint, in the order of the robot's joints. Each
+    has its gravity torque, which is computed from the base parameters theta_b."""
     places = {name: k for k, name in enumerate(chain.joint_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
     return {

@@ -1,9 +1,12 @@
-"""Fits the seven LuGre parameters of one joint, in the two steps of Denso-2022 and a final refinement.
+"""Fits the seven parameters of LuGre friction (a friction law with bristle deflection as its state) for one joint. The
+fit has the two steps of Denso-2022 and a final refinement.
 
-The first step fits F_c, F_v, d_v to fast samples, where bristles do not matter, by trust-region least squares. The
-second step fits the other parameters by Nelder-Mead over a simulation of the LuGre equation (12). The refinement fits
-all by trust region, which also gives the standard deviations. A run has three more unknowns: the joint's inertia in
-that pose (the paper neglects it), a constant torque, and the time between position and current.
+The first step fits F_c, F_v and d_v by trust-region least squares, to fast samples, for which bristles do not matter.
+The second step fits the other parameters by Nelder-Mead over a simulation of the LuGre equation (12). The refinement
+fits all parameters by trust region, which also gives the standard deviations.
+
+A run has three more unknowns: the joint's inertia in that pose (the paper neglects it), a constant torque, and the time
+between position and current.
 
 Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, inertia, offset, delay.
 """
@@ -43,7 +46,7 @@ class JointFriction:
     """The identified friction of one joint.
 
     friction     (7,)    values of the LuGre law, in the order of PARAMETERS
-    covariance   (7, 7)  of these from the fit alone, larger if residuals are correlated
+    covariance   (7, 7)  of these values from the fit alone, larger if residuals are correlated
     unseen       names of parameters that the data do not determine
     inertia      kg m^2, of the joint in the run's pose, not negative
     offset       constant torque, N m
@@ -69,7 +72,8 @@ class JointFriction:
 
 
 def unknowns_of(found: JointFriction) -> Array:
-    """Return the unknowns (10,) of a fit at its result: seven of the LuGre law, then inertia, offset and delay."""
+    """Return the ten unknowns of the friction fit at its result: seven of LuGre friction, then inertia, offset and
+    delay."""
     own = [found.inertia, found.offset, found.delay]
     return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 
@@ -231,7 +235,8 @@ def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
 
 
 def step_sizes(p: Array) -> Array:
-    """Return for each unknown the size of a step that counts as significant."""
+    """Return, for each of the ten unknowns p, the size of a change that has a clear effect on the torque. The fit uses
+    these sizes as units."""
     viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
     return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
 
@@ -245,7 +250,8 @@ def _covariance(jac: Array, residual: Array) -> Array:
 
 
 def to_seven(friction: Array) -> Array:
-    """Return the derivatives (7, 10) of the LuGre values by the unknowns."""
+    """Return the derivatives (7, 10) of the seven LuGre values by the ten unknowns of the fit. The last three unknowns
+    (inertia, offset, delay) do not affect these values."""
     return np.hstack([STATE_LAW.slopes(friction), np.zeros((7, 3))])
 
 

@@ -1,4 +1,4 @@
-"""Prepares the friction run of one joint and predicts its motor torque."""
+"""Prepares the friction run of one joint, a recording in which this joint alone moves, and predicts the motor torque."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ MOST_KEPT = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRun:
-    """The friction run of one joint, filtered and with its gravity torque.
+    """The recording of the friction run of one joint, filtered and with its gravity torque.
 
-    kept  the latest simulated friction torques, by the bytes of their seven unknowns
+    fit, out  samples that are fitted, and samples that are held out for validation
+    kept      the latest simulated friction torques, by the bytes of the seven unknowns with which they were simulated
     """
 
     time: Array
@@ -46,12 +47,15 @@ class JointRun:
         return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
 
     def torque(self, p: Array) -> Array:
-        """Return the predicted motor torque for the unknowns (friction_fit.UNKNOWNS), before the low-pass filter."""
+        """Return the predicted motor torque at all samples of the run, before the low-pass filter.
+
+        p  (10,) the unknowns in the order of friction_fit.UNKNOWNS
+        """
         return self.delayed(self.friction(p) + self.gravity + p[7] * self.qdd + p[8], p[9])
 
     def friction(self, p: Array) -> Array:
-        """Return the predicted friction torque. It depends on the first seven unknowns only, and is simulated once for
-        equal values."""
+        """Return the predicted friction torque at all samples of the run. It depends on the first seven of the unknowns
+        p only. The simulation is skipped if its result for equal values is stored."""
         key = p[:7].tobytes()
         if key not in self.kept:
             if len(self.kept) >= MOST_KEPT:
@@ -60,7 +64,8 @@ class JointRun:
         return self.kept[key]
 
     def delayed(self, torque: Array, delay: float) -> Array:
-        """Shift a torque in time: the value at time t becomes that at t + delay."""
+        """Return a torque that is shifted in time: the result at time t is the given torque at time t + delay, by
+        interpolation."""
         return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
 
     def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:

@@ -34,13 +34,11 @@ DEPENDENT = 1e-8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravitySplit:
-    """Splits theta_b into combinations phi that affect gravity torques and other entries psi, in the order of the
-    model.
+    """A split of theta_b (the l base parameters) into two groups. phi are r combinations that affect gravity torques;
+    psi are the l - r other entries of theta_b.
 
-    There are l base parameters and r gravity parameters phi.
-
-    pivots      (r,)    entries of theta_b that phi consists of, together with multiples of psi
-    rest        (l-r,)  the other entries, psi
+    pivots      (r,)     indices of the entries of theta_b that phi consists of, together with multiples of psi
+    rest        (l-r,)   indices of the other entries, psi
     dependence  (r, l-r) phi = theta_b[pivots] + dependence @ theta_b[rest]
     """
 
@@ -49,13 +47,15 @@ class GravitySplit:
     dependence: Array
 
     def from_phi(self) -> Array:
-        """Derivatives (l, r) of theta_b by phi at constant psi."""
+        """Return the derivatives (l, r) of theta_b (the l base parameters) by phi at constant psi. phi are the r
+        combinations that affect gravity torques, psi the other entries."""
         matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.pivots)))
         matrix[self.pivots] = np.eye(len(self.pivots))
         return matrix
 
     def from_psi(self) -> Array:
-        """Derivatives (l, l-r) of theta_b by psi at constant phi."""
+        """Return the derivatives (l, l-r) of theta_b (the l base parameters) by psi at constant phi. phi are the r
+        combinations that affect gravity torques, psi the other entries."""
         matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.rest)))
         matrix[self.rest] = np.eye(len(self.rest))
         matrix[self.pivots] = -self.dependence
@@ -67,8 +67,13 @@ class GravitySplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityResult:
-    """The gravity parameters phi with their uncertainty. `considered` is d phi per relative change of each torque
-    constant, (r, n)."""
+    """The gravity parameters phi (the combinations of base parameters that affect gravity torques), with their
+    uncertainty.
+
+    split     how the base parameters are split into phi and other entries
+    estimate  phi. Its field `considered` is d phi per relative change of each torque constant, (r values of phi, n
+              joints)
+    """
 
     split: GravitySplit
     estimate: Estimate
@@ -76,8 +81,9 @@ class GravityResult:
 
 
 def gravity_split(chain: Mechanism, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
-    """Return the split of theta_b. A column of the gravity regressor becomes a pivot if it is independent of the
-    earlier ones."""
+    """Return the split of theta_b (the base parameters) into combinations that affect gravity torques and other
+    entries. Entry j is a pivot (part of a combination) if column j of the gravity regressor is linearly independent of
+    the earlier columns."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (max(4 * l, 40), len(chain)))
     columns = gravity_regressor(model, q).reshape(-1, l)
@@ -109,10 +115,13 @@ def calibrate_gravity(
     theta_b: Array | None = None,
     file_theta: Array | None = None,
 ) -> GravityResult:
-    """Return phi by linear least squares over samples that are averaged over both directions, which cancels friction.
+    """Return the gravity parameters phi (combinations of base parameters that affect gravity torques) by linear least
+    squares. The torques are averaged over both directions of motion, which cancels friction.
 
-    theta_b     from an earlier pass: its velocity and acceleration torques are subtracted
-    file_theta  the file's values, which remain in directions that no run shows; None: zero
+    theta_b     base parameters from an earlier iteration: their velocity and acceleration torques are subtracted; None:
+                none
+    file_theta  the base parameters of the robot file. They remain in directions (linear combinations) that no run
+                determines; None: zero
     """
     q, target, use, currents = _even_parts(chain, model, motors, runs, options, theta_b)
     columns = gravity_regressor(model, q)[:, :, split.pivots]
@@ -133,7 +142,8 @@ def judge_gravity(
     options: StepOptions,
     theta_b: Array,
 ) -> StepQuality:
-    """Return the quality of the gravity torques of theta_b, compared with torques averaged over both directions."""
+    """Return how well the base parameters predict gravity torques. The measured torques are averaged over both
+    directions of motion, which cancels friction."""
     q, target, use, _ = _even_parts(chain, model, motors, runs, options, theta_b)
     out = held_out(len(q), options.split)
     predicted = gravity_regressor(model, q) @ theta_b

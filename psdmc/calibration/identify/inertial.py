@@ -1,7 +1,7 @@
-"""Step four: determines the inertial parameters from fast motion, after the results of the earlier steps are
-subtracted. Source: Denso-2022, (21).
+"""Step four of the calibration: determines the inertial parameters from fast motion, after the torques of gravity and
+friction are subtracted. Source: Denso-2022, (21).
 
-Every prediction gets the same filter and the same delay as the measurement.
+Every predicted torque is filtered and delayed in time as the measured torque is.
 """
 
 from __future__ import annotations
@@ -35,13 +35,14 @@ FRICTION_STEP = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InertialResult:
-    """The complete theta_b after step four.
+    """All l base parameters after step four, theta_b.
 
     theta_b       (l,)    gravity and inertial parameters together
     covariance    (l, l)  with the uncertainty of torque constants, gravity and friction
     identifiable  (l,)    whether the data determine the parameter by itself
-    estimate      of psi, the parameters that do not affect gravity torques
-    unseen        (l, k)  directions of theta_b that no run shows, SI, each with a plausible length
+    estimate      estimate of the parameters that do not affect gravity torques
+    unseen        (l, k)  k directions (combinations of parameters) that no run determines, in SI units. The length of
+                          each is a plausible change
     scale         (l,)    plausible size of each base parameter
     """
 
@@ -55,7 +56,8 @@ class InertialResult:
 
     @property
     def prior_covariance(self) -> Array:
-        """Covariance (l, l) of the prior in the directions that no run shows."""
+        """Return the covariance (l, l) of the l base parameters that comes from the prior, in directions (linear
+        combinations) that no run determines."""
         return np.asarray(self.estimate.prior_std**2 * self.unseen @ self.unseen.T)
 
     @property
@@ -87,9 +89,11 @@ def calibrate_inertial(
     options: StepOptions,
     file_theta: Array | None = None,
 ) -> InertialResult:
-    """Return psi by linear least squares, combined with the gravity parameters to theta_b.
+    """Return the parameters that do not affect gravity torques, by linear least squares, and combine them with the
+    gravity parameters to all l base parameters.
 
-    file_theta  the file's values, which remain in directions that no run shows; None: zero
+    file_theta  (l,) the base parameters of the robot file. They remain in directions (linear combinations) that no run
+                determines; None: zero
     """
     split = gravity.split
     rows = _stacked([_rows(chain, model, motors, friction, run, options) for run in runs])
@@ -129,8 +133,8 @@ def judge_inertial(
     runs: Sequence[InertialRun],
     options: StepOptions,
 ) -> tuple[StepQuality, StepQuality]:
-    """Return two qualities on the fast motion: of the inertial torque after gravity and friction are subtracted, and
-    of the whole torque."""
+    """Return how well the base parameters predict the torques of the fast motion. The first result is for inertial
+    torques alone, after gravity and friction are subtracted; the second is for the whole torques."""
     split = gravity_split(chain, model, len(theta_b))
     rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
     still = split.from_phi() @ split.phi(theta_b)
@@ -196,7 +200,8 @@ def _late_columns(model: Regressor, late: Late, motion: tuple[Array, Array, Arra
 
 
 class Late:
-    """Converts a prediction to what a log would contain: delayed, filtered, one row per independent sample."""
+    """A function that converts predicted torques to what a log would contain. The torques are delayed and filtered, and
+    only the rows `at` are kept, which count as independent samples."""
 
     def __init__(self, states: States, delay: float, at: NDArray[np.intp]) -> None:
         self.states, self.delay, self.at = states, delay, at

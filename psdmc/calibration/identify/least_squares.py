@@ -1,5 +1,5 @@
-"""Linear least squares for all steps: weights, outliers, standard deviations, and directions that the data do not
-show."""
+"""Linear least squares for all steps of the calibration. It weights joints and outliers, computes standard deviations,
+and finds directions (combinations of unknowns) that the data do not determine."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ def estimate(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """Return the least-squares solution of target = columns @ values.
+    """Return the least-squares solution of target = columns @ values for l unknown values.
 
-    columns  (N, n, l), target (N, n): samples that count as independent (filter.thinned)
-    use      (N, n)  entries that are used; None: all
-    prior    None: zero, with the columns' units and without a plausible size of values
+    columns  (N, n, l) torques of n joints per unit of each unknown, at N samples that count as independent
+             (filter.thinned)
+    target   (N, n) measured torques
+    use      (N, n) whether an entry is used; None: all are
+    prior    values before the fit, with a plausible size of each; None: zero, and sizes follow from the columns
     """
     noise = None if prior is None else prior.noise
     rows = [Block(columns, noise, None if consider is None else consider.columns)]
@@ -40,10 +42,14 @@ def estimate_rows(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """Return the same solution as `estimate` for columns that come in blocks, so that not all of them are in memory.
+    """Return the least-squares solution of target = columns @ values, for columns that are read in blocks of samples.
+    So not all blocks have to be in memory at once.
 
-    considered  (k, k)  covariance of the quantities that belong to the blocks' `consider` columns
-    prior       without noise, which the blocks contain
+    rows        the blocks, with their noise columns
+    target      (N samples, n joints) measured torques
+    considered  (k, k) covariance of k results of earlier steps, on which the blocks' `consider` columns depend
+    use         (N, n) whether an entry is used; None: all are
+    prior       values before the fit, with a plausible size of each; the noise columns are in the blocks
     """
     options = options or FitOptions()
     use = np.ones(target.shape, dtype=bool) if use is None else use
@@ -145,9 +151,9 @@ class _Solved:
         )
 
     def estimate(self, covariance: Array | None) -> Estimate:
-        """Return the solution with its covariance.
+        """Return the solution of the least-squares problem with its covariance.
 
-        covariance  (k, k) of the uncertain quantities in Consider; None if there are none
+        covariance  (k, k) of the k results of earlier steps (Consider); None if there are none
         """
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights

@@ -1,4 +1,4 @@
-"""Options of a linear fit: filter, validation split, friction terms, and the tables of a log description."""
+"""Options of a linear fit: filter, split for validation, friction terms, and the tables of a log description."""
 
 from __future__ import annotations
 
@@ -24,13 +24,17 @@ from psdmc.robot.mechanism import Mechanism
 class LinearOptions:
     """Options of the linear fit of plain logs.
 
-    exponents   of the viscous terms |qd|^d sign(qd), each with its own coefficient
+    filter      low-pass filter of the logs
+    split       share of each log that is held out for validation
+    exponents   exponents d of the viscous terms |qd|^d sign(qd), each with its own coefficient
     sign_speed  rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
     offset      whether each joint has a constant torque
+    coupling    matrix C of q_joint = C q_motor if several motors drive a joint; friction then acts on the motors.
+                Empty: none
     stretch     number of rows of a log that are filtered at once
-    coupling    C of q_joint = C q_motor if motors drive several joints: friction acts on the motors; empty: none
-    held_bytes  most bytes of columns in memory; more of them go to a temporary file
-    tables      of a log description, as TOML gives them: springs, friction (docs/how-to/springs-and-friction.md, priors.md)
+    held_bytes  largest number of bytes of columns in memory; more of them go to a temporary file
+    tables      springs and friction of a log description, as TOML gives them (docs/how-to/springs-and-friction.md,
+                priors.md)
     tables_from  name of the file with these tables, for messages
     columns     springs and further friction of a robot, made from these tables; each value is one more unknown
     """
@@ -55,8 +59,8 @@ class LinearOptions:
         return every_joint_s(self.exponents, self.offset)
 
     def for_robot(self, chain: Mechanism) -> LinearOptions:
-        """Return the options with the springs and friction in the tables for this robot. Raises InputError if the
-        tables are wrong."""
+        """Return the options with the springs and friction of one robot, which are made from `tables`. Raises
+        InputError if the tables are wrong."""
         folder = Path(self.tables_from).parent
         columns = read_columns(self.tables, chain, self.tables_from, self.offset, folder)
         return replace(self, columns=columns, offset=self.offset and columns.plain_offsets)

@@ -28,9 +28,10 @@ SMALLEST_SHARE = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorResult:
-    """Torque constants by joint; NaN if the load does not act on the joint, or if there is no run.
+    """Torque constants of n joints. A value is NaN if the weight of the known load does not act on the joint. It is
+    also NaN if there is no recording for the joint.
 
-    torque_constant, std  (n,)  N m/A (N/A for sliding joints)
+    torque_constant, std  (n,) value and standard deviation, N m/A (N/A for sliding joints)
     """
 
     torque_constant: Array
@@ -43,10 +44,11 @@ class MotorResult:
 
 
 def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
-    """Return torque constants from pairs of sweeps without and with the load. Raises InputError if a run is no sweep
-    of its joint.
+    """Return torque constants from pairs of slow sweeps of one joint, without and with a known load. Raises InputError
+    if a recording is no sweep of its joint.
 
-    The current is fitted to the load's torque, which is known exactly. So noise does not bias the slope.
+    The added current is fitted as a linear function of the load's torque, and the torque constant is the inverse of the
+    slope. The load's torque is known exactly, so noise in the current does not bias the slope.
     """
     n = len(chain)
     constant, std = np.full(n, np.nan), np.full(n, np.nan)
@@ -69,7 +71,7 @@ def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOp
 
 
 def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str, ...]:
-    """Return a warning for each torque constant (N m/A, NaN: none) that is negative."""
+    """Return a warning for each joint whose torque constant is negative. A constant (N m/A) is NaN if it is unknown."""
     return tuple(
         Remark(
             f"joint {name}: torque constant is negative: the current's sign is against the joint's",
@@ -83,8 +85,11 @@ def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str
 def judge_motors(
     chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
 ) -> StepQuality:
-    """Return the quality of the known load's torque, compared with the added current times these constants (N m/A, by
-    joint name)."""
+    """Return, for each joint, how well the added current times the torque constant agrees with the torque of the known
+    load.
+
+    constants  N m/A by joint name
+    """
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []
     for k, joint in enumerate(chain.joints):

@@ -34,7 +34,8 @@ def require_constants(constants: Mapping[str, float], joint_names: Sequence[str]
 
 
 def one_quantity(logs: Sequence[AnyLog]) -> Quantity:
-    """Return the quantity (current or torque) of all logs. Raises InputError with the logs that have another one."""
+    """Return the quantity that all logs record as effort: current or torque. Raises InputError with the names of the
+    logs if they record different quantities."""
     by_quantity: dict[Quantity, list[str]] = {}
     for log in logs:
         by_quantity.setdefault(log.quantity, []).append(log.name)
@@ -50,9 +51,9 @@ def one_quantity(logs: Sequence[AnyLog]) -> Quantity:
 def motors_of_logs(
     joint_names: Sequence[str], logs: Sequence[AnyLog], constants: Mapping[str, float] | None
 ) -> Motors:
-    """Return the motors of plain logs, with their torque per logged unit.
+    """Return the motors that convert the effort in plain logs to torques.
 
-    constants   N m/A by joint name, for logs of currents
+    constants   N m/A by joint name, for logs of currents; None for logs of torques
 
     Raises InputError if constants are given for torques or missing for currents, or if the logs have different
     quantities.

@@ -1,7 +1,7 @@
 """Coulomb friction that differs between the directions: coulomb + asymmetry forward, coulomb - asymmetry backward.
 
-Its column in a fit is the magnitude of the smooth sign. This column differs from that of a constant offset only near
-rest, so a fit with both determines little more than their sum.
+In a linear fit, the torque per unit of `asymmetry` is the magnitude of the smooth sign. It differs from a constant
+torque only near rest. A fit of an asymmetry and a constant torque therefore determines little more than their sum.
 """
 
 import math

@@ -23,7 +23,7 @@ def bent(p: Sequence[Scalar], v: Scalar) -> Scalar:
 
 
 def rate(p: Sequence[Scalar], v: Scalar, z: Scalar) -> Scalar:
-    """Return dz/dt, the rate at which the deflection of the bristles changes. Source: Denso-2022, (12)."""
+    """Return dz/dt, the rate of change of the deflection z of the bristles. Source: Denso-2022, (12)."""
     return v - absolute(v) * z / bent(p, v)
 
 
@@ -31,9 +31,10 @@ def step(p: Sequence[Scalar], v0: Scalar, v1: Scalar, z: Scalar, dt: Scalar) -> 
     """Return the deflection of the bristles after a time dt in which the speed changes linearly from v0 to v1 (same
     sign).
 
-    The differential equation (12) is dz/dt = lambda (target - z) with lambda = |v| / g(v) and target = sign(v) g(v).
-    The step solves it exactly for a target that changes linearly and for the mean of lambda (Simpson). Any dt is
-    stable. In steady sliding the lag is exact to first order.
+    The differential equation (12) of Denso-2022 is dz/dt = lambda (target - z). Here lambda is |v| / g(v), target is
+    sign(v) g(v), and g(v) is the deflection in steady sliding. The step solves the equation exactly for a target that
+    changes linearly with time. For lambda it takes the mean over the step by Simpson's rule. The solution is stable for
+    any dt. In steady sliding, the lag of z behind the target is exact to first order.
     """
     middle = 0.5 * (v0 + v1)
     g0, g1 = bent(p, v0), bent(p, v1)
@@ -48,22 +49,28 @@ def step(p: Sequence[Scalar], v0: Scalar, v1: Scalar, z: Scalar, dt: Scalar) -> 
 
 
 def pieces(p: Sequence[Scalar], v0: Scalar, v1: Scalar) -> Scalar:
-    """Return the number of steps, less one, from speed v0 to v1. In each step the speed changes by at most a quarter
-    of the Stribeck velocity, up to 64 steps. At higher speeds one step is enough."""
+    """Return the number of additional steps in which the speed changes from v0 to v1; 0 means a single step.
+
+    In each step the speed changes by at most a quarter of the Stribeck velocity, in up to 64 steps. If both speeds
+    exceed four times the Stribeck velocity, one step is enough.
+    """
     slowest = smaller(absolute(v0), absolute(v1))
     return select(4.0 * p[2], slowest, 0.0, smaller(4.0 * absolute(v1 - v0) / p[2], 63.0))
 
 
 def torque(p: Sequence[Scalar], at: At) -> Scalar:
-    """Return the friction torque, N m (N), from the speed and the deflection of the bristles. Source: Denso-2022,
-    (14)."""
+    """Return the friction torque, N m (N for a sliding joint), from the fitted values p, the speed and the deflection
+    of the bristles. Source: Denso-2022, (14)."""
     viscous = p[3] * power(absolute(at.v), p[4])
     return p[5] * at.z + p[6] * rate(p, at.v, at.z) + select(at.v, 0.0, -viscous, viscous)
 
 
 def line(p: Sequence[float], number: float, top: float) -> tuple[float, float, str]:
-    """Return the constant torque and the damping nearest to LuGre friction: the Coulomb torque, and the line that is
-    nearest to the viscous torque up to the speed `top`. Also return in words what they lack."""
+    """Return a constant torque and a damping that approximate LuGre friction, and in words what they leave out.
+
+    The constant is the Coulomb torque. The damping is the slope of the line nearest to the viscous torque, for speeds
+    from 0 to `top`.
+    """
     slope = 3.0 / (p[4] + 2.0) * top ** (p[4] - 1.0)
     return (
         p[0],

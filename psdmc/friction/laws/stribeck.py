@@ -1,7 +1,8 @@
 """The Stribeck effect: friction that is larger near rest.
 
-The law is linear in its values: the Stribeck velocity is a number that the user gives. So the fit remains a convex
-problem. If you do not know the velocity, give several: the sum of their terms approximates any falling curve.
+The user gives the Stribeck velocity, so that the law is linear in its fitted values and the fit remains a convex
+problem. If you do not know the velocity, give several. The sum of the terms, one for each velocity, approximates any
+falling curve.
 """
 
 from psdmc.friction.law import Law, Number, Value

@@ -7,7 +7,12 @@ from psdmc.friction.scalars import absolute, power
 
 
 def line(p: Sequence[float], exponent: float, top: float) -> tuple[float, float, str]:
-    """Return the damping s for which s v is nearest to v^exponent for speeds from 0 to `top` (least squares)."""
+    """Return the constant torque (zero) and the damping that approximate the viscous friction, and in words what they
+    leave out.
+
+    The damping is the fitted value times the slope s for which s v is nearest to v^exponent, by least squares for
+    speeds from 0 to `top`.
+    """
     slope = 3.0 / (exponent + 2.0) * top ** (exponent - 1.0)
     return (
         0.0,

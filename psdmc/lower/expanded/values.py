@@ -1,5 +1,5 @@
-"""Evaluation of a diagram's polynomials on values of its rows. The values are symbols, which record the PROGRAM, or
-numbers."""
+"""Evaluation of nested Horner forms (diagram.py). The values of the variables are numbers, or symbols that record the
+operations as a PROGRAM."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from psdmc.program.trace import Tracer
 
 
 def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
-    """Return a symbol for each row of the terms' exponents: q, sin q, cos q, qd, qdd, then theta_b if that is an input."""
+    """Return a symbol for each variable of the polynomials: q, sin q, cos q, qd, qdd of all joints, then theta_b if
+    `theta`. The symbols record operations."""
     n = model.n
     q = tracer.symbols("q", n)
     sincos = [
@@ -25,7 +26,7 @@ def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scala
 
 
 def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
-    """Evaluate the diagram's polynomials on the rows' values, and return the values by output number."""
+    """Return the value of each polynomial of the diagram by its number, from the values of the variables (rows)."""
     nodes: dict[int, Scalar] = {NOTHING: 0.0, ONE: 1.0}
     for level in diagram.levels:
         _compute_level(nodes, level, rows[level.row])

@@ -6,7 +6,7 @@ from psdmc.program.program import Instr, Program
 
 
 def drop_unused(program: Program) -> Program:
-    """Keep only the instructions that some output depends on.
+    """Return the PROGRAM (list of operations to generate) with only those instructions on which some output depends.
 
     Needs:  every argument precedes its use.
     Keeps:  output values, bit for bit; the order of the remaining instructions.

@@ -1,5 +1,5 @@
-"""A pass of the code generator: it orders instructions over the whole PROGRAM so that values are needed for a short
-time."""
+"""A pass of the code generator: it orders the instructions of a PROGRAM (list of operations to generate). In the new
+order, each value is needed for few instructions after it is computed."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ TIES: tuple[Tie, ...] = (
 
 
 def free_registers(program: Program) -> Program:
-    """Order instructions so that few values are alive, that is, computed and still needed.
+    """Return the PROGRAM (list of operations to generate) in an order in which few values are alive at a time. A value
+    is alive if it is computed and still needed.
 
     Of all instructions whose arguments are known, the next one is the one that leaves the fewest values alive. An
-    instruction that is the last to read two values comes before one that reads values which are needed later. This is
-    repeated while it helps. The given order is kept if the new one would hold more values alive over the whole PROGRAM.
-    The pass `schedule` orders instructions output by output instead, and keeps values alive that later outputs share
-    with the first.
+    instruction that is the last to read two values comes before one that reads values which are needed later. The
+    reordering is repeated as long as it lowers the number of values alive.
+
+    The given order is kept if the new one would hold more values alive over the whole PROGRAM. The pass `schedule`
+    orders instructions output by output instead, and keeps values alive that later outputs share with the first.
 
     Needs:  every argument precedes its use; every instruction is needed.
     Keeps:  output values, bit for bit; output names and order; the set of instructions.

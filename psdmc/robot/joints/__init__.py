@@ -38,7 +38,7 @@ URDF_TYPES: dict[str, JointType] = {
 
 
 def joint_type(word: str) -> JointType:
-    """Return the joint type with this name. Raises ValueError if there is none."""
+    """Return the joint type with this name, such as 'revolute'. Raises ValueError if no type has this name."""
     known = JOINT_TYPES | WIDE_TYPES
     if word not in known:
         raise ValueError(f"joint kind {word!r}")

@@ -1,5 +1,5 @@
-"""The functions 1, sin q, cos q, q ... of a joint's coordinate. The torques are polynomials in products of these
-functions, which the derivation finds by interpolation."""
+"""The functions 1, sin q, cos q, q ... of a joint's coordinate q, of which torques consist. The derivation finds the
+torques as polynomials in these functions of all joints, by interpolation."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Exponents = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """The functions of one coordinate that occur in torques. Their numbers are called digits; digit 0 is the constant
-    1.
+    """The functions of one joint coordinate q that occur in torques, such as 1, sin q, cos q. The number of a function
+    is called a digit; digit 0 is the constant 1.
 
-    exponents    for each digit, the exponents of q, sin q and cos q. The first `linear` functions have degree one at most,
-                 all have degree two at most. A product of two functions of degree one is a sum of functions of the basis
-    derivatives  for each digit, its derivative by q as a sum: digits and factors
+    exponents    for each digit, the exponents of q, sin q and cos q. The first `linear` functions have degree one at
+                 most, all others degree two. A product of two of the first is a sum of functions of the basis
+    derivatives  for each digit, the derivative of the function by q: a sum, as pairs of a digit and a factor
     nodes        values of q, one per digit, at which torques are sampled. They make the interpolation well conditioned
     """
 
@@ -37,7 +37,7 @@ class Basis:
 
     @property
     def has_sincos(self) -> bool:
-        """Whether the sine or cosine of the coordinate occurs in the basis."""
+        """Return whether the sine or cosine of the coordinate occurs in the basis."""
         return any(sine or cosine for _, sine, cosine in self.exponents)
 
 

@@ -1,4 +1,4 @@
-"""The planar joint, which moves in its xy plane and turns about its z axis."""
+"""The planar joint, which moves in the xy plane and turns about the z axis of the joint frame."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
 class Planar(WideJoint):
     """The planar joint. q is x and y (m), and the cosine and sine of the angle about z.
 
-    Rates are the velocity of the moved frame's origin along its own x and y axes (m/s) and the angular velocity about
-    z (rad/s).
+    Rates are the velocity of the moved frame's origin (m/s) and the angular velocity about z (rad/s). The velocity is
+    along the x and y axes of the moved frame.
     """
 
     __slots__ = ()
@@ -49,7 +49,7 @@ class Planar(WideJoint):
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return q after one second at constant rates.
 
-        The origin moves on a circular arc. Its displacement is the linear velocity times sin(h)/h, rotated by h, where
+        The origin moves on a circular arc. The displacement is the linear velocity times sin(h)/h, rotated by h, where
         h is half of the angle of rotation.
         """
         (x, y, *pair), (vx, vy, angle) = q, step

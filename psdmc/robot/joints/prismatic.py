@@ -1,4 +1,4 @@
-"""The prismatic joint, which slides along its z axis."""
+"""The prismatic joint, which slides along the z axis of the joint frame."""
 
 from __future__ import annotations
 

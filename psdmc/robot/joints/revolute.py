@@ -1,4 +1,4 @@
-"""The revolute joint, which turns about its z axis."""
+"""The revolute joint, which turns about the z axis of the joint frame."""
 
 from __future__ import annotations
 

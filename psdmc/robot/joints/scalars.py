@@ -1,7 +1,8 @@
-"""Sine, cosine, square root and sign for floats, arrays and symbols. The maps of joint coordinates consist of them.
+"""Sine, cosine, square root and sign for floats, arrays and symbols (which record code). The functions of joint
+coordinates, such as those of quaternions, consist of these operations.
 
-A PROGRAM (list of operations) has no branches, so these functions do not test whether an angle is small. To avoid 0/0
-they add a number to numerator and denominator that is too small to change any other result.
+A PROGRAM (list of operations) has no branches, so these functions do not test whether an angle is small. To avoid 0/0,
+the functions add a number to numerator and denominator that is too small to change any other result.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ FAINTER = 1e-54
 
 
 def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
-    """Return (sin, cos) of an angle in rad, a float, an array or a symbol."""
+    """Return (sin, cos) of an angle in rad. The angle is a float, an array or a symbol (which records code)."""
     if hasattr(angle, "sincos"):
         s, c = angle.sincos()
         return s, c
@@ -36,12 +37,12 @@ def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def root(value: Scalar) -> Scalar:
-    """Return the square root of a float, an array or a symbol."""
+    """Return the square root of a float, an array or a symbol (which records code)."""
     return value.root() if hasattr(value, "root") else np.sqrt(value)
 
 
 def sign(value: Scalar) -> Scalar:
-    """Return 1 for a positive value or zero, and -1 for a negative value, without a branch."""
+    """Return 1 for a positive value or zero, and -1 for a negative value. The code has no branch."""
     moved = value + FAINT
     return moved / root(moved * moved + FAINTER)
 

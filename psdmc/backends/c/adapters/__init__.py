@@ -1,6 +1,6 @@
 """Adapters: files through which other programs, such as CasADi, call the generated C functions.
 
-Users choose adapters with `emit-c --with`. Each adapter is one module of this folder.
+Users choose adapters with `emit-c --with`. Each adapter is written by one module of this folder.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ REMARKS = dict.fromkeys((casadi.FIRST, casadi.BY_THETA, casadi.HESSIANS), casadi
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the chosen adapters' names without duplicates, in the order of ADAPTERS. Raises InputError for an unknown
-    name."""
+    """Return the names of the adapters that the user chose, without duplicates, in the order of the table ADAPTERS.
+    Raises InputError for an unknown name."""
     for name in names:
         if name not in ADAPTERS:
             raise InputError(f"there is no adapter {name!r}", f"choose from {', '.join(ADAPTERS)}")
@@ -47,7 +47,11 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -> list[str]:
-    """Return the given functions, followed by further functions that the chosen adapters call."""
+    """Return the functions that a package must contain: the given functions, followed by further functions that the
+    code of the adapters calls.
+
+    wide  whether q has more entries than qd (quaternions)
+    """
     found = dict.fromkeys(functions)
     for adapter in adapters:
         found |= dict.fromkeys(NEEDS[adapter](functions, wide) if adapter in NEEDS else ())
@@ -57,7 +61,8 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
 def remarks(
     robot: Mechanism, adapters: Sequence[str], functions: Sequence[str], l: int = 0
 ) -> tuple[str, ...]:
-    """Return the remarks of these adapters for users, one clause each, such as how CasADi treats quaternions.
+    """Return remarks for users about the chosen adapters, one clause each. An example says how CasADi treats the
+    quaternions of this robot.
 
     l  number of base parameters
     """

@@ -1,12 +1,15 @@
 """The adapter that makes the generated functions external functions of CasADi, with exact derivatives.
 
 The calling convention is in CasADi's user guide ("Using the generated code") and in the reference of
-Function::jacobian. For a function f, a library exports f itself and what f_n_in, f_sparsity_out and so on return. The
-function jac_f computes one block per output and input; its inputs are those of f and then the outputs of f, which are
-not read (empty patterns). Matrices are stored column by column, without their zeros.
+Function::jacobian. For a function f, the library exports f, and helper functions such as f_n_in and f_sparsity_out.
 
-CasADi differentiates by the entries of q. If q has quaternions, CasADi's f normalizes them before it calls the
-generated function. The generated derivative is along the tangent; the adapter multiplies it by d tangent / dq.
+The library also exports jac_f, which computes one matrix of derivatives for each pair of an output and an input. The
+inputs of jac_f are the inputs and then the outputs of f. The outputs of f are not read, and CasADi is informed of this
+by empty sparsity patterns. Matrices are stored column by column, without their zeros.
+
+CasADi differentiates by the entries of q. If q contains quaternions, CasADi's f normalizes them before it calls the
+generated function. The generated derivative is by the rates (the tangent vector). The adapter multiplies this
+derivative by d tangent / dq.
 
 casadi_kernels.py makes the derivatives that no generated function computes from PROGRAMs: Jacobians of other functions, and
 second derivatives. For these, CasADi looks for jac_adj1_f, the Jacobian of the gradient adj1_f.
@@ -59,10 +62,11 @@ MAP, REGRESSOR = "tangent_map", "regressor"
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A sparsity pattern in CasADi's form: number of rows, number of columns, and the positions of the nonzeros.
+    """A sparsity pattern in CasADi's form: number of rows, number of columns, then the positions of the nonzero
+    entries.
 
-    For a dense matrix, the positions are the number 1. Otherwise, they are where each column starts, and the row of
-    each nonzero.
+    The positions are an offset for the start of each column, and then the row of each nonzero. For a dense matrix,
+    CasADi expects the single number 1 in place of the positions.
     """
 
     name: str
@@ -71,7 +75,8 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output of a CasADi function; `at` is the offset of an output in the work vector, counted in reals."""
+    """An input or output of a CasADi function: its name and its sparsity pattern. For an output, `at` is where the
+    result begins in the work vector, as an index of real numbers."""
 
     name: str
     pattern: str
@@ -80,18 +85,19 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class External:
-    """One external function of CasADi.
+    """One external function of CasADi, with the C text of its definition.
 
     name      the name by which CasADi finds the function
-    inputs    all inputs of the function
-    called    the generated function that it calls
-    given     C text of the arguments of this call
-    work      number of reals for results and intermediate values
-    fails     whether the generated function returns a status
-    restored  positions that are normalized before the call: C text of q, and of the place for the result
+    inputs    all inputs of the CasADi function
+    outputs   all outputs of the CasADi function
+    called    the generated function that computes the results
+    given     C text of the arguments of the call of `called`
+    work      number of real numbers in the work vector, which holds results and intermediate values
+    fails     whether `called` returns a status
+    restored  positions q that are normalized before the call: C text of q, and of the place for the normalized q
     before    C statements before the call
     after     C statements after the call
-    symbols   all generated functions that are called, `called` first
+    symbols   all generated functions that the CasADi function calls, `called` first
     """
 
     name: str
@@ -111,15 +117,15 @@ class External:
 class CasadiView:
     """The data that the template adapters/casadi.c.jinja prints.
 
-    robot    identifier with which every symbol starts
+    robot    identifier with which every C name starts
     library  ending of the library's name
     hidden   generated functions that have the same name as a CasADi function; they are compiled under other names
-    zeros    length of the longest input: an input that the caller omits is read as zeros
-    units    slices (start, end) of q that are normalized to length one
+    zeros    length of the longest input: CasADi may omit an input, which is then read as this many zeros
+    units    index ranges (start, end) of q that must have length one (quaternions)
     nq       length of q
-    nv       number of rates
-    map      (row, column) of each entry of d tangent / dq that may differ from zero
-    spoils   whether results become NaN if a function fails
+    nv       number of rates, the length of qd
+    map      (row, column) of each entry of d tangent / dq (from dq to the rates) that may differ from zero
+    spoils   whether all results become NaN if a generated function fails
     helpers  C functions of casadi_calls.h.jinja that are called
     """
 
@@ -139,10 +145,10 @@ class CasadiView:
 
 
 def needed(functions: Sequence[str], wide: bool, theta: bool = False) -> list[str]:
-    """Return the functions that compute the derivatives of the given functions.
+    """Return the names of the functions that the derivatives of the given functions need in the package.
 
-    wide   q is longer than the rates
-    theta  derivatives by theta_b are needed, too
+    wide   whether q has more entries than qd (quaternions)
+    theta  whether derivatives by theta_b (the base parameters) are needed, too
     """
     found = [name + DERIVATIVES for name in functions if _has_blocks(name)]
     return found + [MAP] * wide + [REGRESSOR] * (theta and bool(found))
@@ -201,10 +207,10 @@ def _is_of(adapter: str, kernel: Kernel | KernelView) -> bool:
 
 
 def files_of(adapter: str) -> Callable[[PackageView], dict[str, str]]:
-    """Return the function that makes the C file of an adapter, by path.
+    """Return the function that makes the C file of an adapter, as a mapping from its path to its text.
 
-    The file includes the library's sources and is compiled to a separate shared library. The function raises InputError if
-    CasADi cannot call the package.
+    The file includes the C files of the package and is compiled to a separate shared library. The function raises
+    InputError if CasADi cannot call the functions of the package.
     """
 
     def files(package: PackageView) -> dict[str, str]:
@@ -216,7 +222,8 @@ def files_of(adapter: str) -> Callable[[PackageView], dict[str, str]]:
 
 
 def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
-    """Return a remark about CasADi's functions of this robot. None if q has exactly one entry for each rate.
+    """Return a text for users that says how the CasADi functions of this robot treat quaternions and which lack
+    derivatives. Return None if q has exactly one entry for each rate.
 
     l  number of base parameters
     """
@@ -232,9 +239,10 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
 
 
 def casadi_view(package: PackageView, adapter: str = FIRST) -> CasadiView:
-    """Return what the template of one of CasADi's adapters prints for a package.
+    """Return what the template of a CasADi adapter prints for a package.
 
-    Raises InputError if the package is in float, or if theta_b is unknown and no argument.
+    Raises InputError if the package computes in float. Also raises InputError if the base parameters are unknown and
+    not an input.
     """
     info, theta = package.info, adapter == BY_THETA
     if package.real != "double":
@@ -287,8 +295,8 @@ class _Patterns:
         self._names: dict[tuple[int, ...], str] = {}
 
     def of(self, shape: Sequence[int], zero: Iterable[int] = ()) -> str:
-        """Return the name of the sparsity pattern of a row-major array. The entries `zero` of the array are always
-        zero."""
+        """Return the C name of the sparsity pattern of an array that is stored row by row. `zero` are the indices of
+        entries that are always zero."""
         return self._named(_numbers(shape, frozenset(zero)))
 
     def unread(self, shape: Sequence[int]) -> str:
@@ -321,8 +329,8 @@ class _Externals:
         self.helpers: set[str] = set()
 
     def of(self, kernel: KernelView) -> Iterable[External]:
-        """Yield CasADi's external functions for one kernel: the function itself, and its Jacobian, reverse mode and
-        forward mode if the package has kernels for these."""
+        """Yield the CasADi functions for one generated function. These are the function itself and, if the package has
+        code for them, its Jacobian, reverse derivative and forward derivative."""
         patterns, name, call = self.patterns, kernel.function.name, _Call(kernel, kernel, self)
         own = [(output.name, call.at(output.name), patterns.of(output.shape)) for output in kernel.outputs]
         yield call.external("", self._inputs(kernel), own)
@@ -449,12 +457,13 @@ class _Call:
             of.helpers.add("restore")
 
     def is_wide(self, k: int) -> bool:
-        """Whether input k of the function is a position with quaternions."""
+        """Return whether input k of the function is a vector q that contains quaternions."""
         inputs = self.kernel.function.inputs
         return bool(self.of.info.units) and k < len(inputs) and inputs[k].axes == Q.axes
 
     def read(self, k: int) -> str:
-        """Return C text of input k as the called function reads it: a position may have to be normalized first."""
+        """Return C text of input k, as the argument of the generated function. If q must be normalized before the call,
+        the text names the normalized copy."""
         if k in self.restored and not self.called.function.normalizes:
             return self.restored[k]
         return f"given(arg[{k}])"
@@ -463,9 +472,12 @@ class _Call:
         return self.starts[output]
 
     def by_entries(self, block: OutputView, k: int) -> tuple[int, tuple[int, ...], frozenset[int]]:
-        """Convert derivatives along the tangent to derivatives by the entries of input k.
+        """Add C statements that convert derivatives by the rates to derivatives by the entries of input k, a vector q.
 
-        Returns the offset of the result in the work vector, its shape, and its entries that are always zero.
+        block  output of the generated function with the derivatives by the rates
+
+        Returns where the result begins in the work vector, the shape of the result, and its entries that are always
+        zero.
         """
         info, place = self.of.info, self._map(k)
         rows = prod(block.shape[:-1])
@@ -479,8 +491,9 @@ class _Call:
         return _offset(to), (*block.shape[:-1], info.nq), frozenset(range(rows * info.nq)) - kept
 
     def by_theta(self) -> tuple[int, tuple[int, ...]]:
-        """Add the call that computes derivatives by theta_b, and return the offset and shape of its result. Derivatives
-        of torques by theta_b are the entries of the regressor."""
+        """Add the C call that computes derivatives of the function by theta_b (the base parameters). Returns where the
+        result begins in the work vector, and the shape of the result. The derivative of torques by theta_b is the
+        regressor."""
         info, regressor = self.of.info, self.of.kernels[REGRESSOR]
         names = {vector.name: self.read(k) for k, vector in enumerate(self.kernel.inputs)}
         names |= {output.name: f"w + {self.at(output.name)}" for output in self.called.outputs}
@@ -498,8 +511,11 @@ class _Call:
         return _offset(found), (info.nv, info.l)
 
     def direction(self, k: int, given: str) -> str:
-        """Return C text of a direction of input k, converted to the tangent if the input is a position with
-        quaternions."""
+        """Return C text of a direction vector for a derivative along input k. If input k is a vector q with
+        quaternions, the direction is converted from changes of q to rates.
+
+        given  C text of the direction that CasADi passes
+        """
         if not self.is_wide(k):
             return given
         place, to = self._map(k), self._room(self.of.info.nv)
@@ -514,11 +530,12 @@ class _Call:
         shown: Sequence[tuple[str, int, str]],
         seeds: Sequence[str] = (),
     ) -> External:
-        """Return the external function of this call.
+        """Return the external function of CasADi that makes the C call of this object.
 
-        prefix  of CasADi's name for the function, such as jac_
-        shown   name, offset and pattern of each output
-        seeds   C text of arguments after the function's own inputs
+        prefix  beginning of CasADi's name for the function, such as jac_
+        inputs  all inputs of the CasADi function
+        shown   of each output: name, place in the work vector, and name of the sparsity pattern
+        seeds   C text of further arguments after the inputs of the generated function
         """
         own = [self.read(k) for k in range(len(self.kernel.inputs))]
         theta = [f"given(arg[{len(own)}])"] * self.called.theta

@@ -1,8 +1,9 @@
-"""The adapter that writes an FMU (FMI 3.0, model exchange and co-simulation). The states are q and qd, the inputs are
-torques, and the outputs are accelerations.
+"""The adapter that writes an FMU, a model for simulation tools (FMI 3.0, model exchange and co-simulation). The states
+are q and qd, the inputs are torques, and the outputs are accelerations.
 
-The template declares the types of FMI that the C code needs, so that the package can keep its licence. All values are
-in one array of doubles, and a value reference is an index into this array.
+The template declares the data types of the FMI standard itself. So the package contains no file of the standard and
+keeps its licence. All values are in one array of doubles, and the value reference of a variable is an index into this
+array.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ FILES = {
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Several neighbouring variables of the FMU: name, index of the first one, their number, and common XML attributes."""
+    """Several variables of the FMU with consecutive value references, such as all entries of q. The data are the name,
+    the index `at` of the first variable, the number of variables, and XML attributes that all of them share."""
 
     name: str
     at: int

@@ -1,9 +1,9 @@
 """The adapter that makes a Python module of the generated functions. `pip install DIR` compiles the module, which then
 needs NumPy only.
 
-An extension in CPython's stable ABI reads arrays as buffers. A Python file converts arguments, checks shapes and
-allocates results. Only batch functions are called: the result for one state then has the same bits alone and in a
-batch.
+A compiled extension in CPython's stable ABI reads arrays as buffers. A Python file converts arguments, checks shapes
+and allocates results. The extension calls only the C functions for many states. So the result for one state has exactly
+equal bits, alone or as part of a batch.
 """
 
 from __future__ import annotations
@@ -31,13 +31,14 @@ FILES = {
 
 @dataclass(frozen=True, slots=True)
 class WheelKernel:
-    """A generated C function for many states, as the Python extension calls it.
+    """A generated C function for many states, as the Python extension module calls it.
 
-    name, call  name of the kernel; C text of the call with arrays a[0], a[1], ...
-    fails       whether the call returns a status
-    sizes       reals per state of each array; for theta_b, all its reals
-    inputs      number of arrays that are read; these come first
-    theta       index of theta_b, whose reals are the same for all states; -1 if no array is theta_b
+    name    name of the generated function with its variant
+    call    C text of the call, in which the arrays are a[0], a[1], ...
+    fails   whether the call returns a status
+    sizes   for each array, how many real numbers belong to one state; for theta_b, its whole length
+    inputs  number of input arrays, which precede the output arrays
+    theta   index of the array theta_b (base parameters), which is shared by all states; -1 if there is none
     """
 
     name: str
@@ -50,8 +51,8 @@ class WheelKernel:
 
 @dataclass(frozen=True, slots=True)
 class WheelArray:
-    """An input or output array of a Python function, with its meaning and two shapes per state: in memory, and as a
-    caller sees it."""
+    """An input or output array of a Python function: its name, its meaning `means`, and its shape. `tail` is the shape
+    for one state. `shape` is text that shows users the shape, with leading axes for many states."""
 
     name: str
     tail: tuple[int, ...]
@@ -63,11 +64,12 @@ class WheelArray:
 class WheelFunction:
     """One function of the Python module.
 
-    meaning      a line of ASCII without quotation marks
-    result       class of the result if there are several outputs; else empty
-    kernels      Python text of the extension's functions without and with theta_b; None for one that does not exist
-    takes_theta  whether a function with theta_b exists
-    positions    numbers of the inputs whose quaternions must have length one
+    meaning      description in one line of ASCII without quotation marks
+    result       name of the class that holds the outputs if there are several; else empty
+    kernels      Python text of the two C functions, without and with the input theta_b; None for a missing function
+    takes_theta  whether the package has the function with the input theta_b (base parameters)
+    needs_theta  whether the package has only the function with the input theta_b
+    positions    indices of the inputs that contain quaternions, which must have length one
     """
 
     name: str

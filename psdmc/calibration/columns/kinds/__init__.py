@@ -1,4 +1,4 @@
-"""The kinds of springs that a fit supports. Each file in this folder describes one kind by an object KIND."""
+"""The kinds of springs that a fit supports. Each file in this folder describes one kind, in its object KIND."""
 
 from __future__ import annotations
 

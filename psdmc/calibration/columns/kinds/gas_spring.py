@@ -1,5 +1,5 @@
-"""A gas spring between two points of two links. Its nearly constant force pushes, and grows as the spring becomes
-shorter."""
+"""A gas spring between two points of two links. Its nearly constant force pushes the points apart, and grows as the
+spring becomes shorter."""
 
 from __future__ import annotations
 
