@@ -263,7 +263,8 @@ def casadi_view(package: PackageView, adapter: str = FIRST) -> CasadiView:
             "calibrate the model first, or write --with casadi_theta, which takes theta_b as an input",
         )
     made = _Externals(kernels, info)
-    externals = tuple(one for name, kernel in kernels.items() if name in RECIPES for one in made.of(kernel))
+    own = {function.name for function in package.functions}
+    externals = tuple(one for name, kernel in kernels.items() if name in own for one in made.of(kernel))
     tangent = kernels[MAP].outputs[0] if info.units else None
     longest = (vector.size for kernel in kernels.values() for vector in kernel.inputs)
     return CasadiView(
