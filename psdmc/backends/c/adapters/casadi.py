@@ -344,8 +344,7 @@ class _Externals:
             yield self._jacobian(kernel, other)
         gradient = self.kernels.get(name + GRADIENT + PARAMETERS * kernel.theta)
         adjoint, second = (self.kernels.get(name + ending) for ending in (ADJOINT, SECOND))
-        is_of_vectors = len(kernel.outputs) == 1 and all(len(one.shape) < 2 for one in kernel.inputs)
-        if gradient is not None and is_of_vectors:
+        if gradient is not None and len(kernel.outputs) == 1:
             yield self._reverse(kernel, gradient)
         elif adjoint is not None:
             yield self._by_program("adj1_", kernel, adjoint)
