@@ -1,7 +1,7 @@
 """Python's search for reference cycles, made rarely while a stage makes millions of small objects.
 
-PROGRAMs are tuples of tuples and have no cycles, but Python counts how many tuples there are, and looks through all of them
-again each time that 700 more are alive: a fifth of the time that a humanoid's C takes.
+PROGRAMs and traces have no cycles, but Python counts how many tuples there are, and looks through all of them again each
+time that 700 more are alive: a fifth of the time that a humanoid's C takes.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
 
-RARELY = 500_000
-"""Objects made, beyond those that are gone again, before Python looks for cycles: some 50 MB."""
+RARELY = 5_000_000
+"""Objects made, beyond those that are gone again, before Python looks for cycles: some 500 MB."""
 
 _lock = Lock()
 _stages = 0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar, cast
+from collections.abc import Callable, Hashable
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,3 +28,49 @@ class Choices:
 
 
 PLAIN = Choices()
+
+_T = TypeVar("_T")
+
+
+class _Watched:
+    """Choices that note which of them are read."""
+
+    def __init__(self, choices: Choices) -> None:
+        self.choices = choices
+        self.read: dict[str, bool] = {}
+
+    def __getattr__(self, name: str) -> bool:
+        value: bool = getattr(self.choices, name)
+        self.read[name] = value
+        return value
+
+
+class ByChoices(Generic[_T]):
+    """What is made of choices and a key, made once for all choices that it does not tell apart.
+
+    What has read some of the choices is the same for all choices in which these are the same: without a fold, nothing asks
+    how a fold's angle is doubled.
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[Hashable, list[tuple[dict[str, bool], _T]]] = {}
+
+    def known(self, key: Hashable, choices: Choices) -> _T | None:
+        """What was made before; None if nothing was. The same object for all choices that are not told apart."""
+        return next(
+            (
+                made
+                for read, made in self._made.get(key, ())
+                if all(getattr(choices, name) == value for name, value in read.items())
+            ),
+            None,
+        )
+
+    def made(self, key: Hashable, choices: Choices, make: Callable[[Choices], _T]) -> _T:
+        """What was made before, or is made now by `make`. Nothing that is None is kept."""
+        found = self.known(key, choices)
+        if found is None:
+            watched = _Watched(choices)
+            found = make(cast(Choices, watched))
+            self._made.setdefault(key, []).append((watched.read, found))
+        return found

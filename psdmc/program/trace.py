@@ -72,7 +72,7 @@ class SumsOverLimbs(Protocol):
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
 
-    __slots__ = ("_places", "constants", "known", "lane_constants", "limb_sums", "steps")
+    __slots__ = ("__weakref__", "_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
     def __init__(self) -> None:
         self.steps: list[Step] = []
