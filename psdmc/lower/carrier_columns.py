@@ -83,7 +83,8 @@ def _lifted(reframed: Reframed, representative: Array) -> Long:
     lift = np.zeros((PARAMETERS_PER_LINK * len(reframed.frames), representative.shape[1]), np.longdouble)
     for k, place in enumerate(reframed.link_frames):
         rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
-        lift[rows] = times(link_map(place).astype(np.longdouble), representative[rows])
+        filled = np.flatnonzero(representative[rows].any(axis=0))
+        lift[rows, filled] = times(link_map(place).astype(np.longdouble), representative[rows, filled])
     return lift
 
 
@@ -94,19 +95,26 @@ def _in_their_span(columns: Array) -> Array:
     Not LAPACK's: it shares such small matrices among all cores, which takes longer than one core needs.
     """
     rest, order = columns.copy(), np.arange(columns.shape[1])
+    left = lengths(rest)
     rank, least = 0, 0.0
     for j in range(min(columns.shape)):
-        remaining = lengths(rest[j:, j:])
-        pivot = j + int(np.argmax(remaining))
-        left = remaining[pivot - j]
-        least = least or RANK * left
-        if left <= least:
+        pivot = j + int(np.argmax(left[j:]))
+        longest = left[pivot]
+        least = least or RANK * longest
+        if longest <= least:
             break
-        rest[:, [j, pivot]], order[[j, pivot]] = rest[:, [pivot, j]], order[[pivot, j]]
+        for each in (rest.T, order, left):
+            each[[j, pivot]] = each[[pivot, j]]
         normal = rest[j:, j].copy()
-        normal[0] += math.copysign(left, normal[0])
-        along = combined(normal, rest[j:, j:]) * (2.0 / times(normal, normal))
-        rest[j:, j:] -= normal[:, None] * along
+        normal[0] += math.copysign(longest, normal[0])
+        rows = np.flatnonzero(normal)  # a tree's columns have few rows in common, and zeros change nothing
+        normal = normal[rows]
+        rows += j
+        along = combined(normal, rest[rows, j:]) * (2.0 / times(normal, normal))
+        moved = np.flatnonzero(along)
+        rest[rows[:, None], j + moved] -= normal[:, None] * along[moved]
+        moved = j + np.union1d(moved, np.flatnonzero(rest[j, j:]))  # the pivot's, too: NumPy adds one column otherwise
+        left[moved] = lengths(rest[j + 1 :].take(moved, axis=1))
         rank = j + 1
     coordinates = np.zeros((rank, len(order)))
     coordinates[:, order] = np.triu(rest[:rank])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import chain
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +25,12 @@ class Slot(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.vector}[{self.index}]"
+
+
+@lru_cache(maxsize=128)
+def slots_of(vector: str, count: int) -> tuple[Slot, ...]:
+    """The entries of a vector, which each trace of a search names again."""
+    return tuple(Slot(vector, index) for index in range(count))
 
 
 class Instr(NamedTuple):
@@ -79,7 +87,7 @@ class Program:
     def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """(k,) the arguments of all instructions in their order, and (k,) the instruction of each; found once."""
         if not self._arguments:
-            given = [args for _, args, _, _ in self.body]
+            given = list(map(itemgetter(1), self.body))
             counts = np.fromiter(map(len, given), np.intp, len(given))
             flat = np.fromiter(chain.from_iterable(given), np.intp, int(counts.sum()))
             self._arguments.append((flat, np.repeat(np.arange(len(given)), counts)))

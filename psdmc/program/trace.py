@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
-from psdmc.program.program import Instr, Op, Program, Slot, operation
+from psdmc.program.program import Instr, Op, Program, Slot, operation, slots_of
 
 Number = float | int
 Constant = Number | Lanes
@@ -84,7 +84,7 @@ class Tracer:
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
         """Inputs vector[0] ... vector[count - 1]."""
-        return [self.symbol(Slot(vector, i)) for i in range(count)]
+        return [self.symbol(slot) for slot in slots_of(vector, count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
         """Inputs that stand for values until these are put in their place (replay.py)."""

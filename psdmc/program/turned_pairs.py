@@ -9,6 +9,7 @@ cosine: one product instead of two, and one sum.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 from psdmc.program.program import Op
@@ -57,17 +58,22 @@ class TurnedPairs:
     def __init__(self, tracer: Tracer, needed: Sequence[bool]) -> None:
         self._tracer, self._needed = tracer, needed
         self._uses = _uses(tracer, needed)
+        self._is_product = _are_products(tracer, needed)
 
     def of(self, index: int) -> Turned | None:
         """Value `index` as one of a turned pair; None where it is none, or its slope is not recorded."""
         op, a, b = self._tracer.steps[index]
         if op is Op.MUL:
+            if not self._is_product[index]:
+                return None
             for product in self._products(index):
                 slope = self._slope_of_product(product)
                 if slope is not None and self._needed[slope.index]:
                     return Turned(product.angle, slope, (self._part(product),))
             return None
-        if op not in _SUMS or self._uses[a] != 1 or self._uses[b] != 1:
+        if op not in _SUMS or not (self._is_product[a] and self._is_product[b]):
+            return None
+        if self._uses[a] != 1 or self._uses[b] != 1:
             return None
         for first in self._products(a):
             for second in self._products(b):
@@ -111,6 +117,15 @@ class TurnedPairs:
         if index is None or index >= len(self._needed) or not self._needed[index]:
             return None
         return Symbol(self._tracer, index, signs[low])
+
+
+def _are_products(tracer: Tracer, needed: Sequence[bool]) -> list[bool]:
+    """Of each value whether it is a product with a sine or cosine."""
+    steps = tracer.steps
+    return [
+        op is Op.MUL and (steps[a][0] in _SLOPE or steps[b][0] in _SLOPE)
+        for op, a, b in islice(steps, len(needed))
+    ]
 
 
 def _uses(tracer: Tracer, needed: Sequence[bool]) -> list[int]:
