@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from psdmc.errors import InternalError
 from psdmc.program.interpret import evaluated
@@ -31,11 +31,13 @@ def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequen
     known = dict(zip((symbol.index for symbol in inputs), given, strict=True))
     changed = {index: value for index, value in known.items() if not _is_value(value, index)}
     roots = [value.index for value in values if isinstance(value, Symbol)]
-    for index, arguments in _computed_from(tracer, roots, known):
-        if not changed.keys().isdisjoint(arguments):
-            value = _replaced(tracer, index, arguments, changed)
-            if not _is_value(value, index):
-                changed[index] = value
+    for index, is_needed in enumerate(tracer.needed(roots, known)):
+        if is_needed and index not in known:
+            arguments = tracer.arguments(index)
+            if not changed.keys().isdisjoint(arguments):
+                value = _replaced(tracer, index, arguments, changed)
+                if not _is_value(value, index):
+                    changed[index] = value
     return [
         _signed(changed[value.index], value)
         if isinstance(value, Symbol) and value.index in changed
@@ -47,24 +49,6 @@ def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequen
 def _is_value(value: Value, index: int) -> bool:
     """Whether this is the recorded value of that index, without a sign."""
     return isinstance(value, Symbol) and value.index == index and not value.negative
-
-
-def _computed_from(
-    tracer: Tracer, roots: Sequence[int], known: Collection[int]
-) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """What the roots are computed from, and they themselves, in their order, with their arguments; nothing that is known
-    already."""
-    needed = [False] * (max(roots, default=-1) + 1)
-    for root in roots:
-        needed[root] = True
-    found = []
-    for index in reversed(range(len(needed))):
-        if needed[index] and index not in known:
-            arguments = tracer.arguments(index)
-            found.append((index, arguments))
-            for argument in arguments:
-                needed[argument] = True
-    return reversed(found)
 
 
 def _replaced(

@@ -10,7 +10,7 @@ which become instructions only in `finish`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import compress
 from typing import Any, Protocol
 
@@ -139,6 +139,22 @@ class Tracer:
         if self.limb_sums is not None and index in self.limb_sums.summed:
             return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
+
+    def needed(self, roots: Collection[int], known: Collection[int]) -> list[bool]:
+        """For each value up to the last root, whether a root is computed from it. What known values are computed from does
+        not count."""
+        needed = [False] * (max(roots, default=-1) + 1)
+        for root in roots:
+            needed[root] = True
+        for index in range(len(needed) - 1, -1, -1):
+            if needed[index] and index not in known:
+                _, a, b = self.steps[index]
+                if b is not None:  # as in nearly all
+                    needed[a] = needed[b] = True
+                else:
+                    for argument in self.arguments(index):
+                        needed[argument] = True
+        return needed
 
     def finish(self, outputs: Outputs) -> Program:
         """The PROGRAM that stores the given values; a negative one costs a negation. Steps that no output needs are left

@@ -9,7 +9,7 @@ cosine: one product instead of two, and one sum.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import islice
+from itertools import compress
 from typing import NamedTuple
 
 from psdmc.program.program import Op
@@ -57,8 +57,7 @@ class TurnedPairs:
 
     def __init__(self, tracer: Tracer, needed: Sequence[bool]) -> None:
         self._tracer, self._needed = tracer, needed
-        self._uses = _uses(tracer, needed)
-        self._is_product = _are_products(tracer, needed)
+        self._uses, self._is_product = _uses(tracer, needed)
 
     def of(self, index: int) -> Turned | None:
         """Value `index` as one of a turned pair; None where it is none, or its slope is not recorded."""
@@ -119,20 +118,17 @@ class TurnedPairs:
         return Symbol(self._tracer, index, signs[low])
 
 
-def _are_products(tracer: Tracer, needed: Sequence[bool]) -> list[bool]:
-    """Of each value whether it is a product with a sine or cosine."""
-    steps = tracer.steps
-    return [
-        op is Op.MUL and (steps[a][0] in _SLOPE or steps[b][0] in _SLOPE)
-        for op, a, b in islice(steps, len(needed))
-    ]
-
-
-def _uses(tracer: Tracer, needed: Sequence[bool]) -> list[int]:
-    """How often each value is an argument of a needed one."""
-    uses = [0] * len(needed)
-    for index in range(len(needed)):
-        if needed[index]:
+def _uses(tracer: Tracer, needed: Sequence[bool]) -> tuple[list[int], list[bool]]:
+    """How often each value is an argument of a needed one, and whether it is needed and a product with a sine or cosine."""
+    uses, is_product = [0] * len(needed), [False] * len(needed)
+    product, steps = Op.MUL, tracer.steps
+    for index in compress(range(len(needed)), needed):
+        op, a, b = steps[index]
+        if b is None:
             for argument in tracer.arguments(index):
                 uses[argument] += 1
-    return uses
+            continue
+        uses[a] += 1
+        uses[b] += 1
+        is_product[index] = op is product and (steps[a][0] in _SLOPE or steps[b][0] in _SLOPE)
+    return uses, is_product

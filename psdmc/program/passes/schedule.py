@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from psdmc.program.program import Program
@@ -19,14 +21,20 @@ def schedule(program: Program) -> Program:
     Gives:  a sum of live values over all instructions that is no larger than before.
     """
     order = _depth_first(program)
-    candidate = reordered(program, order)
-    return candidate if live_values(candidate) < live_values(program) else program
+    return reordered(program, order) if live_values(program, order) < live_values(program) else program
 
 
-def live_values(program: Program) -> int:
-    """Sum over all instructions of the values alive behind it; loads and constants do not count."""
+def live_values(program: Program, order: Sequence[int] | None = None) -> int:
+    """Sum over all instructions of the values alive behind it, in the PROGRAM's order or another one; loads and constants do
+    not count."""
     arguments, users = program.arguments()
     here = np.arange(len(program.body))
+    if order is not None:
+        place = np.empty_like(here)
+        place[list(order)] = here
+        arguments, users = place[arguments], place[users]
+        ascending = np.argsort(users, kind="stable")
+        arguments, users = arguments[ascending], users[ascending]
     last = here.copy()
     last[arguments] = users  # ascending: the last one stays
     computed = np.zeros(len(here), bool)
