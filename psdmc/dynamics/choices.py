@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Generic, TypeVar, cast
-from collections.abc import Callable, Hashable
 
 
 @dataclass(frozen=True, slots=True)

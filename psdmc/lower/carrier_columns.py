@@ -95,26 +95,19 @@ def _in_their_span(columns: Array) -> Array:
     Not LAPACK's: it shares such small matrices among all cores, which takes longer than one core needs.
     """
     rest, order = columns.copy(), np.arange(columns.shape[1])
-    left = lengths(rest)
     rank, least = 0, 0.0
     for j in range(min(columns.shape)):
-        pivot = j + int(np.argmax(left[j:]))
-        longest = left[pivot]
-        least = least or RANK * longest
-        if longest <= least:
+        remaining = lengths(rest[j:, j:])
+        pivot = j + int(np.argmax(remaining))
+        left = remaining[pivot - j]
+        least = least or RANK * left
+        if left <= least:
             break
-        for each in (rest.T, order, left):
-            each[[j, pivot]] = each[[pivot, j]]
+        rest[:, [j, pivot]], order[[j, pivot]] = rest[:, [pivot, j]], order[[pivot, j]]
         normal = rest[j:, j].copy()
-        normal[0] += math.copysign(longest, normal[0])
-        rows = np.flatnonzero(normal)  # a tree's columns have few rows in common, and zeros change nothing
-        normal = normal[rows]
-        rows += j
-        along = combined(normal, rest[rows, j:]) * (2.0 / times(normal, normal))
-        moved = np.flatnonzero(along)
-        rest[rows[:, None], j + moved] -= normal[:, None] * along[moved]
-        moved = j + np.union1d(moved, np.flatnonzero(rest[j, j:]))  # the pivot's, too: NumPy adds one column otherwise
-        left[moved] = lengths(rest[j + 1 :].take(moved, axis=1))
+        normal[0] += math.copysign(left, normal[0])
+        along = combined(normal, rest[j:, j:]) * (2.0 / times(normal, normal))
+        rest[j:, j:] -= normal[:, None] * along
         rank = j + 1
     coordinates = np.zeros((rank, len(order)))
     coordinates[:, order] = np.triu(rest[:rank])

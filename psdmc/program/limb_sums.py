@@ -26,7 +26,9 @@ class LimbSums:
     """
 
     def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
-        self.tracer: Tracer = proxy(tracer)  # which owns this: a cycle would keep each trace until Python looks for it
+        self.tracer: Tracer = proxy(
+            tracer
+        )  # which owns this: a cycle would keep each trace until Python looks for it
         self.counts = counts
         self.partials: list[dict[int, int]] = [{} for _ in counts]
         self.summed: dict[int, int] = {}

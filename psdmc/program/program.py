@@ -83,6 +83,7 @@ class Program:
     _arguments: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
+    _uses: list[list[int]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """(k,) the arguments of all instructions in their order, and (k,) the instruction of each; found once."""
@@ -97,12 +98,14 @@ class Program:
         """Slots read, each once, in order of vector name and index."""
         return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
 
-    def uses(self) -> list[int]:
-        """How often each value is an argument or an output."""
-        count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
-        for _, index in self.outputs:
-            count[index] += 1
-        return count
+    def uses(self) -> Sequence[int]:
+        """How often each value is an argument or an output; counted once."""
+        if not self._uses:
+            count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
+            for _, index in self.outputs:
+                count[index] += 1
+            self._uses.append(count)
+        return self._uses[0]
 
     def __iter__(self) -> Iterator[Instr]:
         return iter(self.body)

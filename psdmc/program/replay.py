@@ -51,9 +51,7 @@ def _is_value(value: Value, index: int) -> bool:
     return isinstance(value, Symbol) and value.index == index and not value.negative
 
 
-def _replaced(
-    tracer: Tracer, index: int, arguments: tuple[int, ...], changed: Mapping[int, Value]
-) -> Value:
+def _replaced(tracer: Tracer, index: int, arguments: tuple[int, ...], changed: Mapping[int, Value]) -> Value:
     """A value from what its arguments have become."""
     own = [changed[each] if each in changed else Symbol(tracer, each) for each in arguments]
     sums = tracer.limb_sums
