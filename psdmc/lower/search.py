@@ -261,7 +261,9 @@ class Search:
         for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):
             new: list[Recording] = []
             costs[k] = self._recorded(recipe, choices[k], new)
-            new += [recorded[j] for j in recorded if costs[j] is costs[k]]  # of choices that are not told apart
+            new += [
+                recorded[j] for j in recorded if costs[j] is costs[k]
+            ]  # of choices that are not told apart
             if new:
                 recorded[k] = new[0]
             best = {min(sorted(costs), key=lambda k: target.weight(costs[k])) for target in targets}

@@ -25,15 +25,15 @@ def schedule(program: Program) -> Program:
 
 
 def live_values(program: Program, order: Sequence[int] | None = None) -> int:
-    """Sum over all instructions of the values alive behind it, in the PROGRAM's order or another one; loads and constants do
-    not count."""
+    """Sum over all instructions of the values alive behind it, in the PROGRAM's order or in another one, of some of them;
+    loads and constants do not count."""
     arguments, users = program.arguments()
-    here = np.arange(len(program.body))
+    here = np.arange(len(program.body) if order is None else len(order))
     if order is not None:
-        place = np.empty_like(here)
+        place = np.full(len(program.body), -1)
         place[list(order)] = here
         arguments, users = place[arguments], place[users]
-        ascending = np.argsort(users, kind="stable")
+        ascending = np.argsort(users, kind="stable")[np.count_nonzero(users < 0) :]
         arguments, users = arguments[ascending], users[ascending]
     last = here.copy()
     last[arguments] = users  # ascending: the last one stays
