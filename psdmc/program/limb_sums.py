@@ -26,9 +26,8 @@ class LimbSums:
     """
 
     def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
-        self.tracer: Tracer = proxy(
-            tracer
-        )  # which owns this: a cycle would keep each trace until Python looks for it
+        # The tracer owns its sums. A cycle would keep each trace until Python looks for cycles.
+        self.tracer: Tracer = proxy(tracer)
         self.counts = counts
         self.partials: list[dict[int, int]] = [{} for _ in counts]
         self.summed: dict[int, int] = {}
