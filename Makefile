@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-learning bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -155,6 +155,22 @@ LEGS ?=
 bench-legged: $(READY) ## time derivatives and matrices of seven legged robots, on an idle machine; LEGS='hyq go1' for some
 	$(RUN)/python -m psdmc.bench.legged $(LEGS) --json $(GENERATED)/bench-legged.json
 
+LEARNING := .venv-learning
+ONLY ?=
+
+$(LEARNING)/ready: pyproject.toml
+	$(PYTHON) -m venv --clear $(LEARNING)
+	$(PYTHON) -m venv --clear $(LEARNING)/adam
+	$(LEARNING)/bin/python -m pip install --quiet --disable-pip-version-check '$(TORCH)' \
+	  || $(LEARNING)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url $(TORCH_INDEX) '$(TORCH)'
+	$(LEARNING)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --editable '.[jax,torch]' example-robot-data adam-robotics frax jaxsim mujoco-mjx
+	$(LEARNING)/adam/bin/python -m pip install --quiet --disable-pip-version-check 'adam-robotics[jax]'
+	@touch $@
+
+bench-learning: $(LEARNING)/ready ## time forward dynamics and its gradient in JAX and PyTorch beside frax, adam, jaxsim and MJX; ONLY='psdmc in JAX,frax' for some
+	$(LEARNING)/bin/python benchmarks/learning.py --adam $(LEARNING)/adam/bin/python --only '$(ONLY)'
+
 bench-save: $(READY) ## rewrite benchmarks/baseline.json: operations and instructions, not times
 	$(RUN)/python -m psdmc.bench.gate save
 
@@ -193,6 +209,6 @@ mutate: $(READY) ## put faults into program/ and lower/ and list those that no f
 	$(RUN)/mutmut results
 
 clean: ## remove the environment and all generated files but the reference robot
-	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) $(LEARNING) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
 	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

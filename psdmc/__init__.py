@@ -1,4 +1,4 @@
-"""psdmc: a compiler for robot dynamics. A robot in; small, fast, verified C out."""
+"""psdmc is a compiler for robot dynamics: it reads a robot file and writes small, fast and verified C code."""
 
 from __future__ import annotations
 

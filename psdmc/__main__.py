@@ -1,4 +1,4 @@
-"""python -m psdmc"""
+"""Runs the command line of psdmc as `python -m psdmc`."""
 
 from psdmc.cli import main
 

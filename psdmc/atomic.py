@@ -1,9 +1,8 @@
-"""Files written whole or not at all: the one way in which psdmc writes.
+"""Functions that write a file completely or not at all. psdmc writes all its files with these functions.
 
-A file is written under a temporary name in its own folder, put to disk, and renamed into place: a reader sees
-the old content or the new, whatever happens in between. A process that is killed leaves its temporary file,
-which is known by its name and by the lock that died with the process; the next process that writes into that folder
-removes it.
+psdmc writes a file under a temporary name in the folder of the file, flushes it to disk, and renames it. A reader sees
+the old content or the new, even if the writing is interrupted. A process that is killed leaves its temporary file. The
+next process that writes into the folder recognises that file by its name and its released lock, and removes it.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ _THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, er
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write one file, text as UTF-8 with the line ends that it has.
+    """Write `content` to one file. Text is encoded as UTF-8, and its line ends stay as they are.
 
-    An existing file's mode is kept, a new one's is the umask's; a symbolic link's target is replaced, not the link;
-    what is no regular file, such as /dev/null, is written to. InputError where no file can be made at the path,
-    ToolchainError where the disk fails.
+    An existing file keeps its mode; a new file gets the mode that the umask allows. If `path` is a symbolic link, the
+    target of the link is replaced. A path that is no regular file, such as /dev/null, is written to directly. Raises
+    InputError if no file can be made at `path`, ToolchainError if the disk fails.
     """
     with whole_file(path) as temporary:
         _fill(temporary, content)
@@ -48,7 +47,9 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A name to write to, renamed to `path` at the end and removed after an error; errors as write_whole."""
+    """Give a temporary path for the `with` statement of the caller, who writes one file there. After the statement, the
+    temporary file is renamed to `path`; after an error, the temporary file is removed. Raises the same errors as
+    write_whole."""
     with system_errors_at(path):
         target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         if _is_stream(target):
@@ -62,8 +63,9 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_together(root: Path, files: Mapping[str, str] | Mapping[str, str | bytes]) -> None:
-    """Write files (path under root -> content) that belong together: all content is on disk before any is renamed,
-    in the given order. Errors as write_whole."""
+    """Write several files that belong together. `files` maps each path, relative to the folder `root`, to the content
+    of that file. The content of all files is on disk before the first file is renamed to its final name. The renames
+    follow the order of `files`. Raises the same errors as write_whole."""
     with system_errors_at(root), contextlib.ExitStack() as all_of_them:
         ready = []
         for path, text in files.items():
@@ -80,13 +82,14 @@ def write_together(root: Path, files: Mapping[str, str] | Mapping[str, str | byt
 
 
 def make_folder(path: str | os.PathLike[str]) -> None:
-    """Make a folder and those above it where they are missing; errors as write_whole."""
+    """Make a folder and its missing parent folders. Raises the same errors as write_whole."""
     with system_errors_at(path):
         Path(path).mkdir(parents=True, exist_ok=True)
 
 
 def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
-    """InputError where a folder holds anything but dot files, or is no folder. One that is missing or empty is free."""
+    """Raise InputError if `path` is not a folder, or a folder with files other than dot files. A missing folder is
+    accepted."""
     with system_errors_at(path):
         try:
             found = sorted(name for name in os.listdir(path) if not name.startswith("."))
@@ -101,9 +104,10 @@ def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
 
 
 def refuse_foreign_file(path: str | os.PathLike[str], mark: str, remedy: str) -> None:
-    """InputError if a file is at `path` that psdmc did not write: its first HEAD bytes lack the mark of psdmc's own.
+    """Raise InputError if psdmc did not write the file at `path`. psdmc wrote the file if its first HEAD (1 MiB) bytes
+    contain `mark`, a text that psdmc puts into all files of this kind.
 
-    For files that a command writes beside the one that its user named.
+    Commands call this function for files that they write in addition to the file that the user named.
     """
     with system_errors_at(path):
         if not os.path.isfile(path):
@@ -115,7 +119,8 @@ def refuse_foreign_file(path: str | os.PathLike[str], mark: str, remedy: str) ->
 
 
 def check_place(path: str | os.PathLike[str]) -> None:
-    """InputError where no file can be written at `path`, so that it is reported before hours of work."""
+    """Raise InputError if no file can be written at `path`. A command that computes for hours calls this function
+    first, so that a wrong path is found at once."""
     target = Path(path)
     with system_errors_at(path):
         if target.is_dir():
@@ -129,7 +134,8 @@ def check_place(path: str | os.PathLike[str]) -> None:
 
 @contextlib.contextmanager
 def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn an OSError into psdmc's error with the remedy; its message names `path`, not a temporary file."""
+    """Turn an OSError that is raised inside the `with` statement into an error of psdmc, whose hint suggests a remedy.
+    The message names `path`, not a temporary file."""
     try:
         yield
     except OSError as error:
@@ -137,7 +143,7 @@ def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def unwritable(path: str | os.PathLike[str], error: OSError) -> PsdmcError:
-    """The error for a `path` that cannot be written; its hint is another place or another disk."""
+    """Return the error for a `path` that cannot be written. Its hint suggests another path or another disk."""
     what = f"{os.fspath(path)}: cannot be written: {error.strerror or error}"
     if error.errno in _THE_DISK:
         return ToolchainError(what, "make room there, or write to another disk")
@@ -180,7 +186,11 @@ def _locked_new_file(target: Path) -> tuple[int, Path]:
 
 
 def lock(handle: int, wait: bool = True) -> bool:
-    """Lock an open file or folder until it is closed or the process ends; returns whether that was possible."""
+    """Lock the open file or folder `handle` against other processes. The lock lasts until the file is closed or the
+    process ends. Return True if the lock was obtained.
+
+    wait  True: wait while another process holds the lock; False: return False in this case
+    """
     if sys.platform == "win32":
         return False
     try:
@@ -191,7 +201,8 @@ def lock(handle: int, wait: bool = True) -> bool:
 
 
 def can_lock(handle: int) -> bool:
-    """Whether files of this handle's file system can be locked at all: another process may hold this one."""
+    """Return whether the file system of the open file `handle` supports locks. The answer is also True if another
+    process holds a lock on this file."""
     if sys.platform == "win32":
         return False
     try:
@@ -205,14 +216,15 @@ def can_lock(handle: int) -> bool:
 
 
 def unlock(handle: int) -> None:
-    """Give a lock back, also for processes that were forked meanwhile and have the handle, too."""
+    """Release the lock of the open file `handle`. Child processes that were forked after the lock was taken also lose
+    the lock."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_UN)
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that have ended, no other files; errors are ignored."""
+    """Remove the temporary files that ended processes of psdmc left in a folder. Other files stay; errors are ignored."""
     with contextlib.suppress(OSError):
         for name in os.listdir(folder):
             if _TEMPORARY.fullmatch(name):

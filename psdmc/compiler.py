@@ -1,7 +1,8 @@
-"""The whole pipeline: `derive`, `emit_c` and `compile`, each from top to bottom. Start reading here.
+"""The whole compiler: the functions `derive`, `emit_c` and `compile`. The table lists the steps in the order in which
+they run. Start to read the source code of psdmc here.
 
-stage        in                                         out
-robot        robot file, options                        LoadedRobot: a Mechanism and where it comes from
+step         in                                         out
+robot        robot file, options                        LoadedRobot: a Mechanism and the file that it comes from
 derivation   Mechanism                                  DynamicsModel: E, P, theta_b, certificate (the MODEL)
 lower        DynamicsModel, names of functions, costs   Kernels: each function as a PROGRAM for one state and for lanes
 backends     Emission: Kernels, facts, reference states the text of each file of a package, in C or another language
@@ -203,11 +204,12 @@ def emit(
     target: str | Target = NATIVE,
     **own: Any,
 ) -> Changes:
-    """Write the model's package in the language of a back end (psdmc.backends.protocol); returns what `emit_c` returns.
+    """Write the package of a model in the language of a back end (psdmc.backends.protocol). Return what `emit_c`
+    returns.
 
-    own  further options of `emit_c`, by the command line's names
+    own  further options of `emit_c`, by their names on the command line
 
-    InputError for an option that the back end does not have.
+    Raises InputError for an option that the back end does not have.
     """
     require_own_folder(directory, force)
     files = _files(model_of(model), backend, lowering, functions, real, name, progress, trig, target, **own)
@@ -221,11 +223,13 @@ def compare_emitted(
     given: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Differences:
-    """Compare the package in a folder with the one that `emit` would write with the options that its manifest records.
+    """Compare the package in a folder with the package that `emit` would write with the options in the folder's
+    manifest.
 
-    given  options of `emit`, by the command line's names, that must agree with the recorded ones
+    given  options of `emit`, by their names on the command line, that must agree with the options in the manifest
 
-    Writes nothing. InputError where the folder holds no package, or `given` contradicts what it records.
+    This function writes no file. Raises InputError if the folder holds no package, or if `given` contradicts the
+    manifest.
     """
     model, recorded = model_of(model), recorded_options(directory)
     for option, value in (given or {}).items():
@@ -386,12 +390,12 @@ class _Request:
 
     @property
     def key(self) -> str:
-        """The same for equal requests."""
+        """Text that is the same for equal requests: a hash of the model and of the options of the compilation."""
         parts = (self.model_hash, self.lowering, self.functions, self.real, self.trig, self.target)
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     def compiled(self, progress: Progress = silent) -> CompiledRobot[Any]:
-        """The robot that was asked for."""
+        """Compile the robot that this request describes, or get it from the cache."""
         options = _options(self.lowering, self.real, self.trig, self.target)
         machine = options.target
         if not machine.has_batches:
@@ -419,7 +423,7 @@ class _Request:
         return robot
 
     def opened(self) -> DynamicsModel:
-        """The model."""
+        """Return the model of this request, which a pickled request stores as compressed bytes."""
         if isinstance(self.model, bytes):
             return load_bytes(zlib.decompress(self.model), Path("(model of a pickled robot)"))
         return self.model

@@ -1,7 +1,7 @@
-"""psdmc's errors: three that users can cause, and one for faults of psdmc itself.
+"""The errors that psdmc raises: three that a user can cause, and one for faults of psdmc itself.
 
-Every error that a user can cause has what and where in its message and, where there is one, the remedy in `hint`. The
-command line prints both on one line each and ends with `exit_status`; only `--debug` shows a traceback.
+The message of an error says what is wrong and where, and its `hint` gives the remedy, if there is one. The command
+line prints each on one line and ends with the error's `exit_status`. It shows a traceback only with `--debug`.
 """
 
 from __future__ import annotations
@@ -70,9 +70,12 @@ class InternalError(Exception):
 
 
 def exit_status_of(action: Callable[[], int | None]) -> int:
-    """Run `action`, for `python -m` modules; returns its status (None: 0), or that of its PsdmcError, whose message and
-    hint are printed to standard error, a line each. Ctrl-C and a full standard output are reported in a line, too; a closed
-    one is not."""
+    """Run `action`, the main function of a `python -m` module, and return its exit status (None counts as 0).
+
+    If `action` raises a PsdmcError, this function prints its message and hint to standard error, one line each, and
+    returns the status of that error. Ctrl-C also gives one line, and so does a full disk to which standard output is
+    written. If standard output is closed, nothing is printed.
+    """
     discard_output_if_closed()
     try:
         status = action() or 0
@@ -93,7 +96,8 @@ def exit_status_of(action: Callable[[], int | None]) -> int:
 
 
 def discard_output_if_closed() -> None:
-    """Write to nowhere where the caller has closed standard output (`psdmc derive robot.urdf >&-`)."""
+    """If the caller has closed standard output, as in `psdmc derive robot.urdf >&-`, let print write to the null
+    device."""
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 

@@ -1,7 +1,9 @@
-"""Python's search for reference cycles, made rarely while a stage makes millions of small objects.
+"""Makes Python search less often for reference cycles (unused objects that refer to each other), while psdmc creates
+millions of small objects.
 
-PROGRAMs and traces have no cycles, but Python counts how many tuples there are, and looks through all of them again each
-time that 700 more are alive: a fifth of the time that a humanoid's C takes.
+The PROGRAMs (lists of operations) of psdmc are tuples of tuples, and neither they nor traces have cycles. By default Python
+searches for cycles each time 700 more tuples exist. For a humanoid this search takes a fifth of the time to generate the C
+code.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ _usual = (0, 0, 0)
 
 @contextmanager
 def collecting_rarely() -> Iterator[None]:
-    """Let Python look for cycles every RARELY objects. The process's own thresholds are set again when the last of the
-    stages that run at a time, in each other or in several threads, has ended. A process that looks for cycles more rarely,
-    or never, is left as it is."""
+    """Within the `with` block, let Python search for reference cycles only each time RARELY more objects exist.
+
+    Blocks can be nested or run in several threads. After the last block ends, Python's settings from before the first
+    block are restored. If Python already searches less often, or never, nothing is changed.
+    """
     global _stages, _usual
     with _lock:
         if _stages == 0:

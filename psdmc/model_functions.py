@@ -1,7 +1,7 @@
-"""Every generated function of a model in NumPy, from E, P and theta_b or by its recipe's reference: slow, and with nothing
-lowered or compiled.
+"""Evaluates every generated function of a model in NumPy, without compiled code. Torques and similar functions use E, P
+and theta_b; others use the function's reference in NumPy. A compiled robot is faster.
 
-Broadcasting, results, refusals and NaN are those of compiled robots.
+Broadcasting, results, errors and NaN are as for compiled robots.
 """
 
 from __future__ import annotations
@@ -49,12 +49,13 @@ _ADMITTED: WeakKeyDictionary[DynamicsModel, set[str]] = WeakKeyDictionary()
 
 
 def provider() -> Provider:
-    """The answers of models."""
+    """Return the object from which models get the generated functions, computed in NumPy."""
     return Provider(lambda: SIGNATURES, function_of)
 
 
 def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
-    """A function of the model by name, as a compiled robot has it."""
+    """Return the function of the model with this name. It has the arguments of the compiled robot's method with this
+    name."""
     recipe = RECIPES[name]
 
     def function(*given: Any, **named: Any) -> Any:
@@ -78,7 +79,13 @@ def evaluated(
     theta_b: ArrayLike | None = None,
     out: Any = None,
 ) -> Any:
-    """The output, or a named tuple of the outputs, of a function at these states; `out`: arrays to write it to."""
+    """Compute a generated function (such as forward dynamics) at the given states in NumPy. Return its output, or a
+    named tuple if it has several outputs.
+
+    inputs   arrays of states, with leading axes that broadcast
+    theta_b  base parameters that replace the model's; optional
+    out      arrays into which the results are written; optional
+    """
     signature = recipe.signature
     axes = _axes(model, recipe)
     tails = [axes.sizes.shape(output.axes) for output in signature.outputs]

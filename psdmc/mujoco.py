@@ -1,10 +1,11 @@
-"""Positions and rates between psdmc's conventions, which are Pinocchio's, and MuJoCo's. MuJoCo need not be installed.
+"""Converts positions and rates between the conventions of psdmc and of MuJoCo. psdmc follows Pinocchio. MuJoCo need
+not be installed.
 
                        psdmc, Pinocchio                          MuJoCo
 quaternion             x, y, z, w                                w, x, y, z
 linear rate of a base  along the base's axes                     along the world's axes
 angular rate           along the body's axes                     along the body's axes
-joint that follows     no entry of its own                       entries of its own
+mimic joint            no entry of its own                       entries of its own
 order of joints        the model's `joint_names`                 that of the MjModel
 
 Arrays may have any leading axes, which broadcast.
@@ -42,9 +43,9 @@ OF_QUATERNION = {"free": (0, 1, 2, 4, 5, 6, 3), "ball": (1, 2, 3, 0)}
 def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = None) -> Array:
     """Return MuJoCo's qpos (..., nq of MuJoCo) of positions q (..., nq).
 
-    model     the model, or the path of its file, whose joints q is of
-    mj_model  MuJoCo's MjModel of the robot, whose joints are found by name. Its other joints are where qpos0 has them.
-              None: MuJoCo has the joints of the model, in the model's order
+    model     the model that q belongs to, or the path of its file
+    mj_model  MuJoCo's MjModel of the robot. Joints are matched by name. Joints that only the MjModel has get their values
+              from qpos0. None: MuJoCo has the joints of the model, in the model's order
 
     Raises InputError if an array has another shape, or if MuJoCo has no such joint.
     """
@@ -57,18 +58,19 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
 
 
 def from_qpos(model: DynamicsModel | str | Path, qpos: ArrayLike, mj_model: Any = None) -> Array:
-    """Return positions q (..., nq) of MuJoCo's qpos (..., nq of MuJoCo). The arguments are those of `to_qpos`.
+    """Return the positions q (..., nq) for MuJoCo's qpos (..., nq of MuJoCo). `to_qpos` explains the other arguments.
 
-    Entries of joints that follow others, and of joints that the model has not, are not read.
+    Entries of qpos for mimic joints, and for joints that the model does not have, are ignored.
     """
     layout = _Layout.of("from_qpos", model, mj_model)
     return np.asarray(layout.checked("qpos", qpos, len(layout.rest))[..., layout.places[layout.own_places]])
 
 
 def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_model: Any = None) -> Array:
-    """Return MuJoCo's qvel (..., nv of MuJoCo) of rates qd (..., nv) at positions q (..., nq), in psdmc's convention.
+    """Return MuJoCo's qvel (..., nv of MuJoCo) for rates qd (..., nv) at positions q (..., nq), both in psdmc's
+    convention.
 
-    The other arguments are those of `to_qpos`. Joints of MuJoCo that the model has not are at rest.
+    `to_qpos` explains the other arguments. Joints that only MuJoCo has get the rate zero.
     """
     layout = _Layout.of("to_qvel", model, mj_model)
     rates = layout.checked("qd", qd, layout.nv)
@@ -82,9 +84,10 @@ def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_m
 def from_qvel(
     model: DynamicsModel | str | Path, q: ArrayLike, qvel: ArrayLike, mj_model: Any = None
 ) -> Array:
-    """Return rates qd (..., nv) of MuJoCo's qvel (..., nv of MuJoCo) at positions q (..., nq), in psdmc's convention.
+    """Return the rates qd (..., nv) for MuJoCo's qvel (..., nv of MuJoCo) at positions q (..., nq), both in psdmc's
+    convention.
 
-    The other arguments are those of `to_qpos`. For a state of MuJoCo's, q = from_qpos(model, qpos).
+    `to_qpos` explains the other arguments. For a state of MuJoCo, first compute q = from_qpos(model, qpos).
     """
     layout = _Layout.of("from_qvel", model, mj_model)
     here, rates = layout.broadcast(
@@ -153,7 +156,8 @@ class _Layout:
         return len(self.own_speeds)
 
     def checked(self, name: str, values: ArrayLike, size: int) -> Array:
-        """The values as an array (..., size)."""
+        """Return the values as an array of floats, (..., size). Raises InputError if the last axis has another
+        length."""
         array = real_array(f"{self.what}: {name}", values)
         if array.shape[-1:] != (size,):
             raise InputError(
@@ -173,7 +177,8 @@ class _Layout:
         return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
-        """Rates with the base's linear ones along the world's axes instead of the base's, or back."""
+        """Rotate the linear rates of a floating base from the base's axes to the world's axes. If `back` is true,
+        rotate them from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

@@ -1,4 +1,4 @@
-"""Independent jobs in processes of their own, which end quietly on Ctrl-C."""
+"""Runs independent jobs in separate processes, which end without a traceback on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Result = TypeVar("Result")
 
 
 def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """The results of `work` for each job, in order. They are computed in this process where there is one worker or one
-    job.
+    """Yield the result of `work` for each job, in the order of the jobs, computed in up to `workers` processes. With
+    one worker or one job, no other process is started.
 
-    Where the caller stops early, by an error or by Ctrl-C, the workers are ended.
+    If the caller stops early, by an error or by Ctrl-C, the worker processes are ended.
     """
     if workers <= 1 or len(jobs) <= 1:
         yield from map(work, jobs)
@@ -30,7 +30,8 @@ def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: in
 
 
 def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
-    """The result of `work` for one job, computed in a new process, which ends with this one on Ctrl-C."""
+    """Return the result of `work` for one job, computed in a new process. Ctrl-C in this process ends the new one,
+    too."""
     (result,) = _elsewhere(work, [job], 1)
     return result
 

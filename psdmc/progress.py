@@ -1,4 +1,4 @@
-"""Progress of long work, told step by step."""
+"""Reports the progress of long computations to the user, one step at a time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Progress = Callable[[str], None]
 
 
 class Step(str):
-    """A step's text that also says which share of its stage's work is done, 0 to 1."""
+    """The text of a step of a computation, and the share of the work that is done then, from 0 to 1."""
 
     __slots__ = ("share",)
     share: float
@@ -24,12 +24,13 @@ class Step(str):
         return step
 
     def within(self, stage: str) -> Step:
-        """The same share under a longer text, `stage: text`."""
+        """Return a step with the text `stage: text`. The share of the work that is done stays unchanged."""
         return Step(f"{stage}: {self}", self.share)
 
 
 def within(stage: str, progress: Progress) -> Progress:
-    """Progress whose steps are told as `stage: step`."""
+    """Return a progress function (called with the text of each step) that puts the name of a stage before the text, as
+    `stage: step`."""
 
     def tell(step: str) -> None:
         progress(step.within(stage) if isinstance(step, Step) else f"{stage}: {step}")
@@ -38,9 +39,9 @@ def within(stage: str, progress: Progress) -> Progress:
 
 
 def silent(step: str) -> None:
-    """Ignore progress: the default where none is asked for."""
+    """Do nothing with the text of a step. This function is the default if the caller asks for no progress."""
 
 
 def on_standard_error(step: str) -> None:
-    """Print the step, after the seconds since this module was loaded."""
+    """Print the text of a step to standard error, preceded by the number of seconds since psdmc was loaded."""
     print(f"{time.monotonic() - START:6.0f} s  {step}", file=sys.stderr, flush=True)

@@ -1,6 +1,7 @@
-"""Content that others wrote, read up to a stated limit: the one way in which psdmc reads a file whole.
+"""Reads files of other programs up to a stated size. psdmc reads every whole file with these functions.
 
-A device or a pipe may never end, and a file may grow while it is read: sizes that the system states are not relied on.
+A device or a pipe may never end, and a file may grow while psdmc reads it. So psdmc counts the bytes itself and does
+not rely on the size that the operating system states.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ PIECE = 1 << 20
 def read_file(
     path: str | os.PathLike[str], most: int, hint: str, begins: bytes = b"", name: str | None = None
 ) -> bytes:
-    """The content of a file, pipe or device; arguments and errors as of read_rest, and OSError where it cannot be read."""
+    """Return the content of a file, pipe or device. Arguments and other errors are those of read_rest. Raises OSError
+    if the file cannot be read."""
     with Path(path).open("rb") as file:
         named = name or os.fspath(path)
         if os.fstat(file.fileno()).st_size > most:
@@ -27,11 +29,11 @@ def read_file(
 
 
 def read_rest(file: BinaryIO, most: int, name: str, hint: str, begins: bytes = b"") -> bytes:
-    """What is left in an open file; at most one byte beyond `most` is read.
+    """Return the bytes that are left in an open file. The function reads at most one byte more than `most`.
 
-    begins   its first bytes: where they are others, these others alone are returned
+    begins   expected first bytes; if the file begins with other bytes, only the first bytes of the file are returned
 
-    InputError, which calls the file `name`, where there are more bytes than `most`.
+    Raises InputError, which calls the file `name`, if more than `most` bytes are left.
     """
     found = bytearray(_up_to(file, len(begins)))
     if found != begins:
@@ -57,7 +59,7 @@ def _up_to(file: BinaryIO, count: int) -> bytes:
 
 
 def in_words(size: int) -> str:
-    """A limit in bytes as people read it."""
+    """Return a size in bytes as a text for messages, such as '64 MiB'."""
     for unit, bits in (("GiB", 30), ("MiB", 20), ("KiB", 10)):
         if size >= 1 << bits and size % (1 << bits) == 0:
             return f"{size >> bits} {unit}"

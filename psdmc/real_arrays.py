@@ -1,7 +1,8 @@
-"""Numbers that a caller gives, as arrays of reals; what is none is refused by name.
+"""Turns a caller's numbers into arrays of real numbers. A value that is no array of real numbers gives an error that
+names the argument.
 
-Data frames are matched with the robot by the names of their columns. They are known by what they offer, so that nothing is
-imported for them.
+The columns of data frames are matched with the robot's joints by name. psdmc recognises a data frame by its attributes,
+so it does not import pandas or another library for this.
 """
 
 from __future__ import annotations
@@ -34,13 +35,14 @@ def real_array(
     axes: Sequence[str] = (),
     names: AxisNames = _NO_NAMES,
 ) -> NDArray[Any]:
-    """The values as an array of this dtype, copied only where they are not.
+    """Return the values as an array with the NumPy type `dtype`. Values are copied only if they are not yet an array of
+    this type.
 
-    axes   words of the last axes; labels that a data frame has along these are put in the order of
-    names  what each word's axis runs over
+    axes   words for the last axes, such as nq; entries with labels, as in a data frame, are put in the robot's order
+    names  for each word, the robot's names of the entries along the axis
 
-    InputError, beginning with `what`, for complex numbers, texts, dates, masked entries, lists that are no array, and
-    labels that are other names. Integer labels that ascend, as pandas gives by default, are positions.
+    Raises InputError, which begins with `what`, for complex numbers, texts, dates, masked entries, ragged lists, and
+    labels that are not the robot's names. Ascending integer labels, the default of pandas, count as positions.
     """
     if type(values) is np.ndarray and values.dtype == dtype:
         return values
@@ -90,9 +92,10 @@ def _in_order(
 
 
 def order_of(what: str, labels: Sequence[Any], names: Sequence[str]) -> list[int] | None:
-    """The places of the names among the labels; None where the labels are ascending integers: positions.
+    """Return for each name the position of the equal label, which a data frame gives. Return None if the labels are
+    ascending integers.
 
-    InputError, beginning with `what`, where the labels are not the names in any order.
+    Raises InputError, which begins with `what`, if the labels are not the names in some order.
     """
     if all(isinstance(label, int | np.integer) for label in labels) and list(labels) == sorted(labels):
         return None

@@ -1,9 +1,11 @@
 """Arithmetic that gives the same digits on every processor and with any number of threads.
 
-BLAS, LAPACK and einsum choose the order of their sums, and whether products and sums are fused, by the processor. Vectorised
-elementary functions choose their approximations by it. What is written into a model or a package is computed by the
-functions of this module instead: each is made of NumPy's elementwise operations, which IEEE 754 defines to the last bit, in
-an order that shapes and zeros alone decide. Arrays keep their precision.
+BLAS, LAPACK and einsum order their sums, and fuse products with sums, differently on different processors. Vectorised
+sines and exponentials differ, too.
+
+So psdmc computes all numbers in models and packages with the functions of this module. These functions use only NumPy's
+elementwise operations, which IEEE 754 defines to the last bit. The order of operations depends on shapes and zeros
+alone. Results have the precision of the arguments.
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ _any_order: ContextVar[bool] = ContextVar("any order", default=False)
 
 @contextmanager
 def in_any_order() -> Iterator[None]:
-    """Products and sines inside the block are BLAS's and NumPy's: several times as fast, for values that nothing writes."""
+    """Within the block, use the products of BLAS and the sines of NumPy, which are several times faster than this
+    module's. The last digits of results then depend on the processor. Use the block only for values that are not
+    written to a file."""
     before = _any_order.set(True)
     try:
         yield
@@ -38,7 +42,8 @@ def in_any_order() -> Iterator[None]:
 
 
 def times(a: Array, b: Array) -> Any:
-    """a @ b for matrices, vectors and stacks of matrices (..., m, n) and (..., n, k), terms added one after the other."""
+    """Return the matrix product a @ b of matrices and vectors, or of stacks of matrices (..., m, n) and (..., n, k).
+    The terms of each entry are added in order."""
     if _any_order.get():
         return a @ b
     if b.ndim > 2:
@@ -77,28 +82,30 @@ def _stacked(a: Array, b: Array) -> Array:
 
 
 def combined(weights: Array, rows: Array) -> Array:
-    """(k,) sum of (m, k) rows times their weights (m,), one after the other; for many rows."""
+    """Return the weighted sum (k,) of the m rows of an array (m, k), with one weight per row, (m,). The rows are added
+    in order."""
     return np.asarray(np.add.reduce(weights[:, None] * rows, axis=0))
 
 
 def lengths(rows: Array) -> Array:
-    """(k,) Euclidean lengths of the columns of (m, k) rows."""
+    """Return the Euclidean lengths (k,) of the columns of an array (m, k)."""
     return np.asarray(np.sqrt(np.add.reduce(rows * rows, axis=0)))
 
 
 def length(v: Array) -> float:
-    """Euclidean norm of a vector."""
+    """Return the Euclidean norm of a vector."""
     return math.sqrt(times(v, v))
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a x b of two vectors: NumPy's takes ten times as long, for it asks which way arrays lie."""
+    """Return the cross product a x b of two vectors. It is ten times faster than NumPy's, which accepts more shapes."""
     (a0, a1, a2), (b0, b1, b2) = a, b
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
 def solved(matrices: Array, right: Array) -> Array:
-    """(..., n, k) solutions x of matrices (..., n, n) @ x = right (..., n, k), by elimination with partial pivoting.
+    """Return the solutions x (..., n, k) of linear systems `matrices` @ x = `right`, by elimination with partial
+    pivoting. The n x n systems have k right sides (..., n, k).
 
     A singular matrix gives numbers that are not finite.
     """
@@ -120,14 +127,17 @@ def solved(matrices: Array, right: Array) -> Array:
 
 
 def inverse(matrices: Array) -> Array:
-    """(..., n, n) inverses of matrices; numbers that are not finite where one is singular."""
+    """Return the inverses of n x n matrices (..., n, n). A singular matrix gives numbers that are not finite."""
     unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)
     return solved(matrices, np.broadcast_to(unit, matrices.shape))
 
 
 def triangle_solved(triangle: Array, right: Array) -> Array:
-    """(l, k) solution x of triangle (l, l) @ x = right (l, k). What is below the diagonal of `triangle` is not read: it is
-    rounding, which is nothing in a row of length one and much in a row of 1e-13."""
+    """Return the solution x (l, k) of `triangle` @ x = `right`, for an upper triangular matrix (l, l) and k right sides
+    (l, k).
+
+    Entries below the diagonal are rounding errors and are not read. They would matter in a row of length 1e-13.
+    """
     solution = right.copy()
     for r in reversed(range(len(triangle))):
         solution[r] /= triangle[r, r]
@@ -137,45 +147,46 @@ def triangle_solved(triangle: Array, right: Array) -> Array:
 
 
 def sine(angle: Any) -> Any:
-    """sin of a float or an array in rad, in its precision.
+    """Return sin of a float or an array in rad, in the precision of the argument.
 
-    Doubles are rounded from the C library's long double, which no instruction set decides.
+    The value is computed with the C library's long double and rounded to double, so the value is the same on all
+    processors.
     """
     return _rounded(np.sin, angle)
 
 
 def cosine(angle: Any) -> Any:
-    """cos of a float or an array in rad, as `sine`."""
+    """Return the cosine of a float or an array in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.cos, angle)
 
 
 def arcsine(value: Any) -> Any:
-    """asin of a float or an array in rad, as `sine`."""
+    """Return the arcsine of a float or an array, in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.arcsin, value)
 
 
 def angle_of(y: Any, x: Any) -> Any:
-    """atan2 of floats or arrays in rad, as `sine`."""
+    """Return the angle atan2(y, x) of floats or arrays, in rad, with equal digits on all processors (see `sine`)."""
     return _rounded(np.arctan2, y, x)
 
 
 def exponential(value: Any) -> Any:
-    """exp of a float or an array, as `sine`."""
+    """Return the exponential of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.exp, value)
 
 
 def hyperbolic_tangent(value: Any) -> Any:
-    """tanh of a float or an array, as `sine`."""
+    """Return the hyperbolic tangent of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.tanh, value)
 
 
 def logarithm(value: Any) -> Any:
-    """Natural logarithm of a float or an array, as `sine`."""
+    """Return the natural logarithm of a float or an array, with equal digits on all processors (see `sine`)."""
     return _rounded(np.log, value)
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """base^exponent of floats or arrays, as `sine`."""
+    """Return base^exponent of floats or arrays, with equal digits on all processors (see `sine`)."""
     return _rounded(np.power, base, exponent)
 
 

@@ -1,8 +1,8 @@
-"""Sampling: states of a robot within its limits and its functions' values there, as Parquet files.
+"""Draws random states of a robot within its limits and writes them with the values of functions to Parquet files.
 
-A folder holds a manifest, which fixes what is sampled, and parts. What a part holds follows from the manifest and its
-number alone, and a part is written whole: a sampling that was interrupted goes on with the parts that are missing. Memory
-does not grow with the number of states.
+The output folder has a manifest (settings of the sampling) and numbered parts, each a file. The manifest and the number
+of a part determine the part's content. Each part is written as a whole, so an interrupted run continues with the
+missing parts. The memory that psdmc needs does not grow with the number of states.
 """
 
 from __future__ import annotations
@@ -83,16 +83,18 @@ LEAST = 2.0**-53
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """What is sampled.
+    """The settings of a sampling: which states to draw and which functions to evaluate.
 
     states     number of states
-    functions  names, as `--functions` has them
-    draw       'uniform': independent states; 'sobol': states that fill the limits more evenly, by a scrambled Sobol sequence
-    seed       states differ with it
+    functions  names of the functions, as for the option `--functions`
+    draw       'uniform': independent states; 'sobol': states that fill the limits more evenly, by a scrambled Sobol
+               sequence
+    seed       seed of the random states
     real       precision of states and values
-    spread     0 to 1: masses and inertias of each link, all by one factor from 1 - spread to 1 + spread, are drawn per state
-    given      by the words of LIMITS: plus and minus this is the range of joints whose limit the robot's file lacks
-    rows       states of a part; None: as many as PART_BYTES and PART_STATES allow
+    spread     0 to 1: for each state, the mass and inertia of each link are multiplied by a random factor between 1 -
+               spread and 1 + spread
+    given      ranges, plus and minus, for joints without a limit in the robot file: word of LIMITS -> range
+    rows       number of states per part; None: as many as PART_BYTES and PART_STATES allow
     """
 
     states: int
@@ -124,8 +126,8 @@ def _range(option: str, value: float, least: float, most: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """What a folder holds then: states, parts and their bytes; how many of the parts were there before; and the length of
-    each column."""
+    """The content of an output folder after sampling: number of states, parts (output files) and bytes. It also has the
+    number of parts that were there before, and the length of each column."""
 
     states: int
     parts: int
@@ -141,13 +143,13 @@ def sample(
     progress: Progress = silent,
     scheduler: str | None = None,
 ) -> Sampled:
-    """Write the parts that the folder lacks.
+    """Draw random states, evaluate the functions, and write the parts (output files) that are missing in the folder.
 
-    scheduler  address of a scheduler of Dask's, whose workers compute the parts; None: this process does
+    scheduler  address of a Dask scheduler, whose workers compute the parts; None: this process computes them
 
-    Raises InputError if the folder holds another sampling or files that psdmc did not write, if a joint has no limit, or if
-    a function reads what cannot be drawn. Raises ToolchainError if the disk is full, or too small for the missing parts, or
-    if the scheduler does not answer.
+    Raises InputError if the folder holds another sampling or files that psdmc did not write. The error is also raised
+    if a joint has no limit, or if a function needs an input that psdmc cannot sample. Raises ToolchainError if the disk
+    is full or too small for the missing parts, or if the scheduler does not answer.
     """
     if find_spec("pyarrow") is None:
         raise InputError("psdmc sample needs pyarrow", "pip install 'psdmc[sample]'")
@@ -312,7 +314,8 @@ class _Plan:
 
     @cached_property
     def functions(self) -> tuple[Signature, ...]:
-        """InputError where one is unknown, or reads what is not drawn."""
+        """Return the functions whose values are sampled. Raises InputError if a function is unknown, or needs an input
+        that psdmc cannot sample."""
         names = [name for name in wanted(self.what.functions, self.model.mechanism) if name not in BY_ROWS]
         found = tuple(SIGNATURES[name] for name in names)
         for function in found:
@@ -328,13 +331,14 @@ class _Plan:
 
     @cached_property
     def reads(self) -> tuple[Quantity, ...]:
-        """The quantities that are drawn."""
+        """Return the input quantities that are drawn at random for the sampled functions, such as q and qd."""
         read = {quantity.name: quantity for function in self.functions for quantity in function.inputs}
         return tuple(read[name] for name in LIMITS if name in read)
 
     @cached_property
     def columns(self) -> dict[str, tuple[int, ...]]:
-        """Name -> axes of one state, of what is drawn and then of each function's outputs."""
+        """Return the columns of the Parquet files: name -> shape for one state. The inputs come first, then the outputs
+        of the sampled functions."""
         model = self.model
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
         found = {quantity.name: sizes.shape(quantity.axes) for quantity in self.reads}
@@ -349,12 +353,13 @@ class _Plan:
 
     @property
     def row_bytes(self) -> int:
-        """Bytes of one state."""
+        """Return the number of bytes that one state takes in a part (one output file)."""
         return (8 if self.what.real == "float64" else 4) * sum(map(math.prod, self.columns.values()))
 
     @cached_property
     def rows(self) -> int:
-        """States of a whole part: a power of two, as Sobol's points are evenest."""
+        """Return the number of states in a full part (one output file). It is a power of two, because such numbers of
+        Sobol points are spread most evenly."""
         fit = max(PART_BYTES // self.row_bytes, 1)
         return self.what.rows or min(1 << (fit.bit_length() - 1), PART_STATES)
 
@@ -363,12 +368,13 @@ class _Plan:
         return -(-self.what.states // self.rows)
 
     def count(self, part: int) -> int:
-        """States of a part."""
+        """Return the number of states in the part (output file) with this number."""
         return min(self.rows, self.what.states - part * self.rows)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[Array, Array]]:
-        """Give the lower and upper bounds of each entry by quantity; InputError where a joint has none."""
+        """Return the lower and upper bounds of the random values of each quantity: name -> two arrays. Raises
+        InputError if a joint has no limits."""
         robot, found, lacking = self.model.mechanism, {}, {}
         for quantity in self.reads:
             word, _ = LIMITS[quantity.name]
@@ -385,7 +391,7 @@ class _Plan:
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """All that the parts follow from, as JSON has it."""
+        """Return the settings that determine the content of all output files, as JSON values."""
         model, what = self.model, self.what
         found = {
             "generator": "psdmc sample",
@@ -412,17 +418,20 @@ class _Plan:
         return plain
 
     def described(self, part: int) -> bytes:
-        """The metadata of a part."""
+        """Return the metadata of a part (one output file) as bytes: the settings, the part's number and the states in
+        the part."""
         own = {"part": part, "first_state": part * self.rows, "states_of_part": self.count(part)}
         return json.dumps({**self.manifest, **own}).encode()
 
     def files(self, progress: Progress) -> Callable[[int], bytes]:
-        """Compile the functions; the result makes a part's file by its number."""
+        """Compile the sampled functions. Return a function that computes the bytes of an output file from the number of
+        the part."""
         columns = self.evaluated(progress)
         return lambda part: _file(columns(part), self.described(part))
 
     def evaluated(self, progress: Progress) -> Callable[[int], dict[str, Array]]:
-        """Compile the functions; the result computes a part's columns by its number."""
+        """Compile the sampled functions. Return a function that computes the columns of an output file from the number
+        of the part."""
         by_rows = {function.name for function in self.functions if function.theta and self.what.spread}
         names = [
             f"{function.name}{THETA_ROWS}" if function.name in by_rows else function.name
@@ -444,11 +453,12 @@ class _Plan:
 
     @property
     def links(self) -> int:
-        """Factors that are drawn for links."""
+        """Return the number of links whose masses and inertias are multiplied by a random factor, which may be zero."""
         return len(self.model.mechanism) if self.what.spread else 0
 
     def drawn(self, shares: Array) -> dict[str, Array]:
-        """States, and theta_b where it is drawn, from shares between 0 and 1."""
+        """Return states within the limits, made from random numbers between 0 and 1. If masses and inertias are
+        sampled, return base parameters theta_b, too."""
         robot, found = self.model.mechanism, {}
         for name, (lower, upper) in self.ranges.items():
             own, shares = shares[:, : len(lower)], shares[:, len(lower) :]

@@ -1,4 +1,4 @@
-"""psdmc's own version, as files and packages record it."""
+"""The version of psdmc, as psdmc writes it into files and packages."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ longer than reading a model."""
 
 
 def psdmc_version() -> str:
-    """The version."""
+    """Return the version of psdmc as text."""
     return VERSION

@@ -1,4 +1,8 @@
-"""What the function that computes theta_b from all bodies of a robot needs: its map, and bodies for its self-test."""
+"""The data for the generated function that computes theta_b (the vector of base parameters) from the masses and
+inertias of all bodies.
+
+The data are the linear map from body parameters to theta_b, and example bodies for the self-test of the package.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +26,16 @@ INERTIA = np.array([[0.03, 0.003, -0.002], [0.003, 0.04, 0.001], [-0.002, 0.001,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesMap:
-    """theta_b = constant + columns @ (ten standard parameters of each body), n bodies and l base parameters.
+    """The linear map theta_b = constant + columns @ p. theta_b are the l base parameters. p (10 n,) are the ten
+    standard parameters (mass, first moments, inertia) of each of the n bodies.
 
-    links     n names, untrusted text
-    columns   (l, 10 n)
-    constant  (l,) the share of the drive inertias
-    masses, coms, inertias, theta_b   (n,), (n, 3), (n, 6), (l,) one robot's, for the self-test
+    links     n names of bodies, untrusted text
+    columns   (l, 10 n) factors of p
+    constant  (l,) the part of theta_b that comes from drive inertias (motors and gears)
+    masses    (n,) kg, of the example robot in the self-test
+    coms      (n, 3) m, centres of mass of the example robot
+    inertias  (n, 6) kg m^2, of the example robot
+    theta_b   (l,) expected result for the example robot
     """
 
     links: tuple[str, ...]
@@ -40,7 +48,11 @@ class BodiesMap:
 
 
 def bodies_map(model: DynamicsModel) -> BodiesMap:
-    """The map of a model; InputError where its assumptions exclude a parameter of a body, or a drive inertia is unknown."""
+    """Return the linear map from the parameters of all bodies to theta_b (the base parameters) for one model.
+
+    Raises InputError if the model was derived under an assumption that excludes some bodies, such as a link without
+    mass. Also raises InputError if a drive inertia is unknown.
+    """
     n = model.n
     each = [np.tile(row, n) for row in np.eye(PARAMETERS_PER_LINK)[:BODY_PARAMETERS]]
     refuse_outside(model.mechanism, each, f"{model.mechanism.name}: theta_from_bodies takes bodies whose")

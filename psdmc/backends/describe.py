@@ -1,4 +1,4 @@
-"""The robot in words, for the first lines of a package."""
+"""The description of the robot at the top of a generated package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from psdmc.target.target import Target
 
 
 def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
-    """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still unescaped."""
+    """Return the facts about a robot as lines of text: joints, limits, gravity, base parameters, model and options.
+    Names from the robot file are not escaped yet."""
     gx, gy, gz = info.gravity
     return (
         f"Robot: {info.name}, {_extent(info)}",
@@ -66,17 +67,18 @@ def _target(target: Target) -> tuple[str, ...]:
 
 
 def uses_frames(signatures: Iterable[Signature]) -> bool:
-    """Whether some of these functions is about the named frames."""
+    """Return whether one of the functions has an input or output for the named frames of the robot."""
     return any("frames" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def uses_contacts(signatures: Iterable[Signature]) -> bool:
-    """Whether some of these functions is about the contacts."""
+    """Return whether one of the functions has an input or output for the contacts of the robot."""
     return any("contact_rows" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
-    """The user's choices by name; the target only where it is not the default."""
+    """Return the options of the package that the user chose, by name. The target machine is left out if it is the
+    default."""
     target = {} if options.target == NATIVE else {"target": options.target.name}
     return {"real": options.real, "trig": options.trig, **info.options, **target}
 
@@ -97,7 +99,7 @@ def _places(vector: str, first: int, count: int) -> str:
 
 
 def joint_line(joint: JointInfo) -> str:
-    """A joint and its limits; unknown limits are left out."""
+    """Return one line of text about a joint with its limits; unknown limits are left out."""
     parts = [f"{joint.name} ({joint.kind}{': ' if joint.coordinates else ''}{joint.coordinates})"]
     if math.isfinite(joint.lower) or math.isfinite(joint.upper):
         parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")

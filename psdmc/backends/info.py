@@ -1,4 +1,4 @@
-"""The facts about its robot in the emitted package, other than arithmetic."""
+"""The robot's metadata in the generated package: everything except the arithmetic."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from psdmc.version import psdmc_version
 
 @dataclass(frozen=True, slots=True)
 class JointInfo:
-    """A joint's name, its type's word and units, and its limits in these (infinite where unknown).
+    """A joint's name, type, units and limits. Unknown limits are infinite.
 
-    nq, nv       its coordinates and its rates, and
-    coordinates  what these are, where there are several
-    parent       the link that it hangs on, untrusted text; empty in a serial chain
+    nq           number of its entries in q
+    nv           number of its entries in qd
+    coordinates  names of the entries in q if there are several
+    parent       link to which the joint is attached, untrusted text; empty in a serial chain
     """
 
     name: str
@@ -47,26 +48,27 @@ class JointInfo:
 
 @dataclass(frozen=True, slots=True)
 class PackageInfo:
-    """One robot's metadata for header, manifest and README.
+    """The metadata of one robot for the C header, manifest.json and README.
 
     name        the robot's own name, untrusted text
-    joints      n, from base to tip; a tree's parents before their children
+    joints      n joints, from base to tip; in a tree, parents before their children
     gravity     m/s^2 in the base frame
-    base, tip   link names
+    base, tip   names of links
     parameters  l base parameters, in the order of theta_b
-    model_hash  content hash of the MODEL
-    options     what the user chose, as printed in header and manifest
+    model_hash  content hash of the model file
+    options     options that the user chose, as printed in header and manifest
     frames      names of the named frames, untrusted text; empty: the tip alone
-    contacts    those at which there can be contacts, with their rows; empty: all, as points
-    payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
-                frame; empty where the package has no function for loads
-    units       parts of q, from an entry to before another, whose length must be one
-    bodies      links and the map of their bodies to theta_b; None where the package has no function for it
-    friction    what a calibration from plain logs found; None where the package has no function for it
-    q_names     nq names of q's entries, untrusted text, and
-    v_names     nv names of rates' and torques'
-    base_frame  the frame that gravity, frames and velocities are given in, in words
-    followers   sentences about joints that follow others, untrusted text: they are not among `joints`
+    contacts    names of the frames that can touch the world, each with the number of its rows in the contact Jacobian;
+                empty: all frames, as points
+    payload     (l, 10) maps from the ten parameters of a load to the change of the l base parameters: for a load at the
+                tip, then at each named frame. Empty if the package has no function that adds loads
+    units       index ranges (start, end) of q whose length must be one (quaternions)
+    bodies      map from the parameters of all bodies to theta_b; None if the package has no function for the map
+    friction    joint friction from a calibration with plain logs; None if the package has no function for friction
+    q_names     names of the nq entries of q, untrusted text
+    v_names     names of the nv entries of rates and torques
+    base_frame  in words, the frame in which gravity, frames and velocities are given
+    followers   sentences about mimic joints, untrusted text; mimic joints are not among `joints`
     """
 
     name: str
@@ -112,7 +114,8 @@ class PackageInfo:
 
     @property
     def is_wide(self) -> bool:
-        """Whether some joint has several coordinates, so that q, rates and tables of joints differ in length."""
+        """Return whether some joint has several coordinates. Then q, the rates and the tables of joints have different
+        lengths."""
         return any(joint.nq > 1 for joint in self.joints)
 
     @property
@@ -122,7 +125,8 @@ class PackageInfo:
 
     @property
     def sizes(self) -> Sizes:
-        """What the words of signatures mean for this robot."""
+        """Return the lengths of array axes for this robot: numbers of joints, entries of q, rates, base parameters,
+        frames and contacts."""
         rows = tuple(rows for _, rows in self.contacts)
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames), rows_of_contacts=rows)
 
@@ -140,9 +144,12 @@ def package_info(
     friction: bool = False,
     bodies: bool = False,
 ) -> PackageInfo:
-    """Metadata of a MODEL. `name` replaces the robot's own. With `payload` it has what functions for loads need, with
-    `friction` and `bodies` what those for friction and bodies need; InputError where the model's assumptions do not admit
-    every load or body, or it was not calibrated from plain logs."""
+    """Return the metadata of a model for a package. `name` replaces the name of the robot. The options `payload`,
+    `friction` and `bodies` add the data for further functions: adding loads, friction, and base parameters from bodies.
+
+    Raises InputError if the model was derived under an assumption that excludes some loads or bodies. Also raises
+    InputError if friction is wanted and the model was not calibrated from plain logs.
+    """
     chain = model.mechanism
     joints = tuple(
         JointInfo(

@@ -1,7 +1,9 @@
-"""Templates' compiled code, kept where Python keeps that of modules: in `__pycache__` beside them.
+"""A cache of compiled templates (text patterns for the generated files), in the folder `__pycache__` next to the
+templates.
 
-Jinja makes Python of a template and Python makes code of that, which takes longer than filling it. As with modules, code is
-kept once per installation, where its folder can be written to, and belongs to one source, one Python and one Jinja.
+Jinja translates a template to Python, and Python compiles this to bytecode. Both steps take longer than filling the
+template. So the bytecode is stored once per installation if the folder is writable. A stored file is valid for one
+template text, one version of Python and one version of Jinja.
 """
 
 from __future__ import annotations
@@ -24,18 +26,18 @@ made again."""
 
 
 class CodeBesideTemplates(BytecodeCache):
-    """The store in which Jinja looks for a template's code before it compiles it, and into which it puts the code
-    afterwards."""
+    """Jinja's cache of compiled templates in `__pycache__`. Jinja looks for the bytecode of a template there before it
+    compiles the template, and stores the bytecode there afterwards."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def get_cache_key(self, name: str, filename: str | None = None) -> str:
-        """The file that a template's code is kept in."""
+        """Return the path of the file in which a template's compiled code is cached."""
         return cache_from_source(str(self.folder / name))
 
     def load_bytecode(self, bucket: Bucket) -> None:
-        """The template's code, if some is kept that belongs to it."""
+        """Load the template's cached code, if there is any that belongs to the template."""
         with contextlib.suppress(OSError):
             kept = Path(bucket.key).read_bytes()
             seal, code = kept[:SEAL], kept[SEAL:]
@@ -43,7 +45,8 @@ class CodeBesideTemplates(BytecodeCache):
                 bucket.code = marshal.loads(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep the template's code where Python would keep a module's; do nothing where that cannot be written."""
+        """Write the compiled code of a template to a file in the cache. Nothing is written if the folder is not
+        writable."""
         if sys.dont_write_bytecode:
             return
         code = marshal.dumps(bucket.code)

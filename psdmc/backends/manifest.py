@@ -1,4 +1,4 @@
-"""manifest.json: what the package is and what its files were when psdmc wrote them."""
+"""The file manifest.json, which describes a package and lists the SHA-256 of each file as psdmc wrote it."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def manifest(
     functions: Sequence[Mapping[str, Any]],
     files: Mapping[str, str],
 ) -> str:
-    """JSON text; `own` is what only this back end says, `files` are all others of the package, which it lists with their
-    SHA-256."""
+    """Return the JSON text of manifest.json, which describes the package. `own` are entries for the language of the
+    package, such as C. `files` are all other files of the package, which the manifest lists with their SHA-256."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "generator": GENERATOR,
@@ -53,8 +53,11 @@ def manifest(
 
 
 def renamed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Symbols of one manifest's package and their names in another's: of all, `R_*`, where the robot has another name, and
-    of functions that have one. The first manifest may be forged."""
+    """Return the C names that changed from an older package to the new one, as pairs (old name, new name).
+
+    If the robot's name changed, one pair such as (`old_*`, `new_*`) represents all C names. Further pairs are functions
+    that psdmc itself renamed. The older manifest may be forged.
+    """
     old, new = before.get("robot"), after["robot"]
     if not isinstance(old, str) or not NAME.fullmatch(old):
         return []

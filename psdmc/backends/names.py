@@ -1,4 +1,4 @@
-"""Untrusted names on their way into any language: they become identifiers, or are refused as words of the language."""
+"""Conversion of untrusted names to identifiers that are valid in a target language and not reserved there."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ DEVICE = re.compile(r"con|prn|aux|nul|conin|conout|com\d|lpt\d", re.IGNORECASE)
 
 
 def identifier_of(name: str, is_reserved: Callable[[str], bool]) -> str:
-    """An identifier for `name`: ASCII letters, digits and single underscores, never a reserved word.
+    """Return an identifier for `name`: ASCII letters, digits and single underscores, never a reserved word.
 
-    Names that are free identifiers already stay as they are; a reserved one gets robot_ before it; one that loses all
-    its characters, or is too long, ends with a digest of the original, so that different names stay apart.
+    A name that is already a valid identifier does not change. A reserved word gets the prefix robot_. A name that would
+    lose all its characters, or is too long, ends with a digest of the original, so that different names stay different.
     """
     cleaned = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     if not cleaned:

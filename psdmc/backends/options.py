@@ -1,4 +1,4 @@
-"""What a user may choose about an emitted package."""
+"""The options of a generated package that a user can choose, such as its precision and target."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from psdmc.target.vectors import LANE_BLOCK_BYTES
 
 @dataclass(frozen=True, slots=True)
 class EmitOptions:
-    """Choices of emission.
+    """The options with which a package is generated.
 
     real    precision of the whole package
-    trig    'inline': psdmc's own branch-free vector sincos, the library's for angles beyond its range; 'freestanding':
-            the same without a library, NaN beyond; 'libm': the library's sin and cos
-    target  the machine; its own precision and sines are what the two above default to for users
+    trig    code of sine and cosine. 'inline': code without branches for SIMD vectors, and the C library for very large
+            angles; 'freestanding': no C library, very large angles give NaN; 'libm': the C library only
+    target  the target machine; some targets have their own defaults of `real` and `trig`
     """
 
     real: Real = "float64"
@@ -25,7 +25,8 @@ class EmitOptions:
 
     @property
     def lanes(self) -> int:
-        """States per block of the lane-by-lane layout, the same for every target."""
+        """Return how many states one block holds in the batch layout [block][entry][lane]. The number is equal for all
+        target machines."""
         return LANE_BLOCK_BYTES // self.real_bytes
 
     @property

@@ -1,7 +1,8 @@
-"""Which files of a folder psdmc wrote: by its manifest, or by the journal of an emission that was killed.
+"""Finds out which files of a folder psdmc wrote, from the manifest of the package. If `emit-c` was interrupted, it also
+reads the journal, a list of the files that were to be written.
 
-Both lists are files like any other and may be forged: names that psdmc would not give, and whatever lies
-behind a symbolic link, count as foreign.
+Both lists are ordinary files and may be forged. Names that psdmc would not give, and everything behind a symbolic link,
+count as foreign.
 """
 
 from __future__ import annotations
@@ -46,7 +47,8 @@ Digests = Mapping[str, frozenset[str]]
 
 
 def listed(path: Path) -> Digests:
-    """Path -> digests as listed in a manifest or journal; empty where there is none, or it is not psdmc's."""
+    """Return, by path, the SHA-256 digests of the files that a manifest or journal lists. Return an empty mapping if
+    there is no such list, or if psdmc did not write it."""
     return {
         name: frozenset([value] if isinstance(value, str) else map(str, value))
         for name, value in _entries(path).items()
@@ -55,7 +57,7 @@ def listed(path: Path) -> Digests:
 
 
 def digest_of(root: Path, path: str) -> str | None:
-    """SHA-256 of a file below root; None where there is none."""
+    """Return the SHA-256 of a file below root; None if there is no such file."""
     try:
         if link_in(root, path) or not stat.S_ISREG((root / path).lstat().st_mode):
             return NOT_REGULAR
@@ -72,9 +74,11 @@ def link_in(root: Path, path: str) -> bool:
 
 
 def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
-    """Paths of a package that are missing or differ from what psdmc wrote; None where the folder holds no package.
+    """Return the paths of files in a package that are missing or differ from what psdmc wrote. Return None if the
+    folder holds no package.
 
-    The manifest lists all files but itself. InputError where one cannot be read.
+    The manifest.json of the package lists the digests of all files except itself. Raises InputError if a file cannot be
+    read.
     """
     root = Path(directory)
     try:
@@ -92,12 +96,12 @@ def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
 
 
 def content_of(directory: str | os.PathLike[str]) -> dict[str, object]:
-    """What the manifest of a package says; empty where the folder holds no package."""
+    """Return the content of a package's manifest; empty if the folder holds no package."""
     return _content(Path(directory) / MANIFEST)
 
 
 def target_of(directory: str | os.PathLike[str]) -> str | None:
-    """The name of the machine that a package says it was made for; None where it names none."""
+    """Return the name of the target machine in a package's manifest; None if the manifest names none."""
     target = content_of(directory).get("target")
     name = target.get("name") if isinstance(target, dict) else None
     return name if isinstance(name, str) else None

@@ -1,6 +1,8 @@
-"""What a back end receives and returns: facts, arithmetic and values on one side, the text of files on the other.
+"""The interface of a back end, which writes packages in one language (C, Rust). A back end receives metadata,
+arithmetic and reference values, and returns the text of files.
 
-A back end is a room of this folder. Its module `back_end` has the constant BACK_END; nothing else of it is known above.
+Each back end is a folder next to this file. Other code uses only the constant BACK_END in the module `back_end` of the
+folder.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ BACK_ENDS = ("c", "rust")
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One function: `meaning` in words for this robot, and its kernels, with compiled-in parameters first."""
+    """One generated function: `signature` has its inputs and outputs, `meaning` describes it for this robot. `kernels`
+    are its variants without and with the base parameters as an input; the variant without comes first."""
 
     signature: Signature
     meaning: str
@@ -32,12 +35,12 @@ class Function:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Emission:
-    """What is emitted, in no language.
+    """The content of a package, independent of the language (such as C) in which it is written.
 
-    info        the robot's facts; its names are untrusted text
-    kernels     the functions' arithmetic, by name
-    references  states and the functions' values there, for the package's own test
-    adapters    other programs that the package is also for, by name
+    info        the robot's metadata; its names are untrusted text
+    kernels     the arithmetic of each function variant, by name
+    references  states and the functions' values there, for the package's self-test; None: no self-test
+    adapters    names of the other programs for which the package has files
     """
 
     info: PackageInfo
@@ -48,21 +51,22 @@ class Emission:
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """The functions that `kernels` hold, in the order of headers."""
+        """Return the generated functions of which the package has kernels (variants), in the order of the function
+        list."""
         return functions_of(self.kernels, self.info.base_frame)
 
 
 @dataclass(frozen=True, slots=True)
 class BackEnd:
-    """A language that packages are written in.
+    """A language in which psdmc can write packages.
 
-    language    its name for people
-    named       what is called by the robot's name
-    files       path -> text of every file of the package, manifest.json last
-    identifier  the robot's name in the language
-    entry       of that name: the file that a user opens first, and how it is used
-    next        of the package's folder: the command that follows
-    lacks       options of `emit` that it does not have
+    language    the name of the language for users
+    named       what a package is called in this language, such as crate
+    files       function that returns the text of every file of the package, by path, manifest.json last
+    identifier  function that converts the robot's name to a valid name in the language
+    entry       function that returns, for this valid name, the file that a user opens first, and how it is used
+    next        function that returns, for the package's folder, the next command to type
+    lacks       options of `emit` that this language does not support
     """
 
     language: str
@@ -75,7 +79,7 @@ class BackEnd:
 
 
 def back_end(name: str) -> BackEnd:
-    """By name; InputError where there is none of it."""
+    """Return the back end with this name. Raises InputError if there is none."""
     if name not in BACK_ENDS:
         raise InputError(f"there is no back end {name!r}", f"choose one of {', '.join(BACK_ENDS)}")
     found: BackEnd = import_module(f"psdmc.backends.{name}.back_end").BACK_END
@@ -83,8 +87,8 @@ def back_end(name: str) -> BackEnd:
 
 
 def functions_of(kernels: Mapping[str, Kernel], base_frame: str = BASE_FRAME) -> tuple[Function, ...]:
-    """The functions that kernels belong to, in the order of their signatures, whatever the mapping's order. `base_frame`:
-    what their meanings call it."""
+    """Return the functions to which the given kernels (variants of generated functions) belong, in the order of the
+    function list. `base_frame` is the name of the base frame in the functions' descriptions."""
     wrong = [name for name, kernel in kernels.items() if name != kernel.name]
     if wrong:
         raise InternalError(f"kernel {wrong[0]!r} is filed under a name that is not its own")

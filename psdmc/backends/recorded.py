@@ -1,4 +1,4 @@
-"""What a package on disk says that it was emitted with, and in which files it differs from what is emitted now."""
+"""The options with which a package on disk was generated, and in which files it differs from what psdmc writes now."""
 
 from __future__ import annotations
 
@@ -25,8 +25,10 @@ MORE_SOURCES = {name: f"src/{name}.c" for name in ("payload", "friction", "bodie
 class Differences:
     """How a package on disk differs from what psdmc writes now.
 
-    missing, added, changed  paths that the folder lacks, that psdmc no longer writes, and whose bytes differ
-    reasons                  what the manifests say about that, in words
+    missing  paths of files that the folder lacks
+    added    paths of files that psdmc no longer writes
+    changed  paths of files whose bytes differ
+    reasons  possible reasons, in sentences, from a comparison of the manifests
     """
 
     missing: tuple[str, ...]
@@ -39,9 +41,10 @@ class Differences:
 
 
 def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
-    """The options of psdmc.compiler.emit that a package was emitted with, from its manifest, which may be forged.
+    """Return the options of psdmc.compiler.emit with which a package was generated. They are read from the manifest of
+    the package, which may be forged.
 
-    InputError if the folder holds no package, or if the manifest lacks an option.
+    Raises InputError if the folder holds no package, or if the manifest lacks an option.
     """
     with system_errors_at(directory):
         content = content_of(directory)
@@ -78,7 +81,7 @@ def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def differences(directory: str | os.PathLike[str], files: Mapping[str, str]) -> Differences:
-    """How the package in a folder differs from `files` (path -> text). Writes nothing."""
+    """Return how the package in a folder differs from `files` (path -> text). Writes nothing."""
     root = Path(directory)
     with system_errors_at(root):
         before, after = content_of(root), json.loads(files[MANIFEST])

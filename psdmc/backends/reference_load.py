@@ -1,4 +1,5 @@
-"""One load, and what it adds to theta_b at every frame: for the self-test of the functions that add loads at run time."""
+"""A load, and the change of theta_b (the base parameters) that the load causes at every frame. The self-test of the
+package compares functions that add loads with these values."""
 
 from __future__ import annotations
 
@@ -21,13 +22,17 @@ INERTIA = np.array([[0.02, 0.003, -0.002], [0.003, 0.03, 0.001], [-0.002, 0.001,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceLoad:
-    """added  (1 + frames, l) what the load adds to theta_b: at the tip, then at each named frame."""
+    """The changes of the base parameters that the example load of the self-test causes.
+
+    added  (1 + number of named frames, l) change of the l base parameters: load at the tip, then at each named frame
+    """
 
     added: Array
 
 
 def reference_load(model: DynamicsModel) -> ReferenceLoad:
-    """The load on a model, by the way of DynamicsModel.with_payload."""
+    """Return the changes of theta_b (the base parameters) that the self-test's load causes at the tip and at each named
+    frame of a model."""
     chain = model.mechanism
     places = [(None, chain.tip_body), *((frame.name, frame.joint) for frame in chain.frames)]
     rows = [

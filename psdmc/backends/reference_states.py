@@ -1,6 +1,7 @@
-"""A few states and the values of every generated function there, by the functions' NumPy references, without lowering.
+"""A few states of a robot, and the values of every generated function there, computed by reference code in NumPy.
 
-An emitted package's self-test compares with them on the user's machine.
+The self-test of a generated package compares its results with these values on the user's machine. The reference code is
+separate from the generated code.
 """
 
 from __future__ import annotations
@@ -46,17 +47,17 @@ WORST_CONDITION = 1e7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceStates:
-    """k states, and the outputs that belong to them.
+    """k states of a robot, and the expected outputs of the generated functions there.
 
-    given     quantity's name -> (k, its size): q, qd, qdd and what else functions read; tau and tau_theta, the torques of
-              (q, qd, qdd) with the compiled-in parameters and with theta_b; thetas and tau_theta_rows, another theta_b at
-              each state and its torques, where functions read them
-    expected  Signature.label of an output (a kernel's name, where it has one) -> (k, its size), matrices row by row
-    theta_b   (l,) the run-time parameters of the _theta kernels; not the robot's own, so that the test notices a kernel
-              that ignores them
-    load      what a load adds to theta_b, where the package has functions that add loads
+    given     arrays (k, size) by name: q, qd, qdd and other inputs of functions. tau and tau_theta are the torques at
+              (q, qd, qdd) with the robot's base parameters and with theta_b. thetas are other base parameters for each
+              state, and tau_theta_rows the torques with them; both exist only if a function reads them
+    expected  arrays (k, size) by the name of the output; matrices are stored row by row
+    theta_b   (l,) base parameters for the function variants that take them as an input. They differ from those of the
+              robot, so that the test finds a function that ignores the input
+    load      what a load adds to theta_b, if the package has functions that add loads
 
-    Where M(q) is not positive definite at the states, forward dynamics has no entry.
+    If M(q) is not positive definite at the states, forward dynamics has no entry.
     """
 
     given: Mapping[str, Array]
@@ -80,7 +81,8 @@ class ReferenceStates:
 def reference_states(
     model: DynamicsModel, functions: Collection[str] = DEFAULT, count: int = COUNT
 ) -> ReferenceStates:
-    """States of a model and the values of these functions there; those that need the unknown theta_b are left out."""
+    """Return states of a model, and the values of the given functions there. If the base parameters of the model are
+    unknown, function variants that contain these parameters are left out."""
     given = _drawn(model)
     theta_b = _other_parameters(model)
     robots = {"_theta": RobotOnArrays.of(model, theta_b)}

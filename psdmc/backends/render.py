@@ -1,4 +1,4 @@
-"""The Jinja environment: undefined names are errors, and every template is read from the installed package."""
+"""The Jinja environment. Undefined names are errors, and all templates are read from the installed package."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def _kept() -> CodeBesideTemplates | None:
 
 
 def environment_with(**filters: Callable[..., str]) -> Environment:
-    """An environment with a language's filters, which make untrusted text safe in it."""
+    """Return a Jinja environment (settings for filling templates) with the filters of one language. The filters make
+    untrusted text safe in this language."""
     made = Environment(
         loader=FunctionLoader(_source),
         undefined=StrictUndefined,

@@ -1,4 +1,4 @@
-"""What a package's own test compares: labels, inputs and tolerances, the same in every language."""
+"""What the self-test of a package compares: names of outputs, inputs and tolerances, which are equal in all languages."""
 
 from __future__ import annotations
 
@@ -20,12 +20,17 @@ def tolerance(function: Signature, real: str) -> str:
 
 
 def compared_by_row(output: Quantity) -> bool:
-    """Whether each row is compared relative to its own largest value; else all are relative to the largest of all
-    entries."""
+    """Return whether the self-test compares each row of an output relative to the largest value of that row. Otherwise,
+    all entries are compared relative to the largest entry of the output."""
     return bool(output.axes) and output.axes[0] in _ROWS
 
 
 def given_name(vector: str, variant: str) -> str:
-    """The reference states' name of an input of a kernel: torques depend on its parameters. They have one name with the
-    compiled-in ones (''), one with theta_b (_theta) and one with theta_b by rows (THETA_ROWS)."""
+    """Return the name under which the reference states hold an input of a function.
+
+    Only the torques tau have several names, because they depend on the base parameters: tau for compiled-in parameters,
+    tau_theta for the input theta_b, and tau_theta_rows for one theta_b per state.
+
+    variant  ending of the function variant: '', '_theta' or THETA_ROWS
+    """
     return f"{vector}{variant}" if vector == TAU.name else vector

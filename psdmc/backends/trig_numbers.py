@@ -1,4 +1,5 @@
-"""The numbers of the inline sincos, in every language. tests/trig/minimax.py derives them, and a test compares."""
+"""The numbers of the sine and cosine code for all languages. tests/trig/minimax.py derives the numbers, and a test
+compares both."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ Real = Literal["double", "float"]
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """One precision's numbers; up to limit [rad], k times each part of pi/2 but the last is exact."""
+    """The numbers of the sine and cosine code for float or double. For angles up to `limit` (rad), k (the number of
+    quarter revolutions) times each part of pi/2 except the last is exact."""
 
     two_over_pi: float
     half_pi: tuple[float, ...]

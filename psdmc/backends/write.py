@@ -1,7 +1,8 @@
-"""Write a package to a folder of its own: only files that changed, and no file over one that psdmc did not write.
+"""Writes a package to its own folder. Only changed files are written, and no file that psdmc did not write is
+overwritten.
 
-A file is psdmc's own if the folder's manifest.json, or the journal of an emission that was killed, lists it with the
-digest that it has. Every other file is foreign: another program's, or psdmc's own but edited since.
+psdmc recognises its files by their SHA-256. The manifest.json of the folder lists these digests; so does the journal of
+an interrupted `emit-c`. Every other file is foreign: another program wrote it, or somebody edited it.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ from psdmc.errors import InputError
 
 
 class Changes(list[str]):
-    """Paths of a package's files that changed, those removed included.
+    """Paths of a package's files that changed, including removed files.
 
-    removed   files of the package that was there before, which this one does not have
-    kept      files of others that were in the way -> names under which they are kept
-    renamed   symbols of the package that was there before, and their names in this one
+    removed  files of the earlier package that the new package does not have
+    kept     foreign files that were in the way, and the new names under which they are kept
+    renamed  C names in the earlier package, and their new names
     """
 
     def __init__(
@@ -54,7 +55,8 @@ class Changes(list[str]):
 
 
 def require_own_folder(directory: str | os.PathLike[str], force: bool = False) -> None:
-    """InputError where a folder holds files, but no package of psdmc's nor the journal of one, and `force` is not set."""
+    """Raise InputError if a folder holds files, but neither a package of psdmc nor the journal of an interrupted
+    `emit-c`. With `force`, no folder raises an error."""
     root = Path(directory)
     with system_errors_at(root):
         own = force or bool(listed(root / MANIFEST) or listed(root / JOURNAL))
@@ -67,14 +69,17 @@ def require_own_folder(directory: str | os.PathLike[str], force: bool = False) -
 def write_package(
     directory: str | os.PathLike[str], files: Mapping[str, str], force: bool = False
 ) -> Changes:
-    """Write `files` (path -> text) under `directory`; returns the paths that changed.
+    """Write `files` (path -> text) under `directory`, and return the paths that changed.
 
-    Unchanged files are not touched; files of an earlier emission that are no longer part of it are removed. InputError
-    where the folder is another's or a foreign file is in the way and `force` is not set, where a symbolic link or
-    something else that is no file is in the way, and where the folder cannot take files; ToolchainError where the disk
-    fails. With `force`, a file that was never the package's is kept under another name. Nothing is written before all
-    files were checked; all content is on disk before the first file is replaced; an emission that is killed between two
-    files is recognized by its journal, and finished or replaced by the next one.
+    Unchanged files are not touched. Files that the package had before and no longer has are removed. With `force`, a
+    foreign file that is in the way is kept under another name.
+
+    Raises InputError if the folder is another program's, or if a foreign file is in the way, unless `force` is set.
+    Raises InputError also if a symbolic link or a folder is in the way, or if the folder cannot take files. Raises
+    ToolchainError if the disk fails.
+
+    Nothing is written before all files were checked, and all content is on disk before the first file is replaced. If
+    writing is interrupted between two files, the next call finds the journal and completes or replaces the package.
     """
     root = Path(directory)
     require_own_folder(root, force)

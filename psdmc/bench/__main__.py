@@ -1,4 +1,5 @@
-"""python -m psdmc.bench [NAME ...] [--rounds N] [--json FILE]: measure the standard robots."""
+"""python -m psdmc.bench [NAME ...] [--rounds N] [--json FILE]: time psdmc's functions and other libraries' on standard
+robots."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ SEED = 8
 
 
 def main() -> int:
-    """Run the benchmark as the command line says; the exit status."""
+    """Run the benchmark with the options of the command line, and return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench", description=__doc__)
     parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="trials that count (default %(default)s)")
@@ -61,7 +62,8 @@ def _measure(options: argparse.Namespace) -> int:
 def scaling_cases(
     joints: Sequence[int] = JOINTS, progress: Callable[[str], None] = lambda message: None
 ) -> Iterator[Case]:
-    """One case per number of joints, each derived in a process of its own."""
+    """Yield the KUKA LBR with different numbers of joints, as benchmark robots that show how times grow with the
+    joints. Each model is derived in a new process."""
     longest = generic_chain(eight_joints(bundled_chain("LBR7")), SEED)
     for n in joints:
         progress(f"LBR with {n} joints: deriving")
@@ -72,7 +74,7 @@ def scaling_cases(
 
 
 def eight_joints(lbr: Mechanism) -> Mechanism:
-    """An eighth joint before the last: standard DH a 0, alpha -pi/2, d 0.2 (its own turn comes first)."""
+    """Return the seven-joint LBR with an eighth joint before its last one (standard DH: a 0, alpha -pi/2, d 0.2 m)."""
     turn = Placement(
         np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.array([0.0, 0.0, 0.2])
     )

@@ -1,4 +1,4 @@
-"""Outputs of contestants compared with psdmc's Newton-Euler on arrays, before anything is timed."""
+"""Before anything is timed, compare the outputs of all libraries with psdmc's Newton-Euler recursion in NumPy."""
 
 from __future__ import annotations
 
@@ -29,13 +29,14 @@ SMALL = 1e-3
 
 
 def checked_states(outputs: int) -> int:
-    """How many states are compared where a function puts out so many numbers: a power of two, so that batches come out
-    even."""
+    """Return how many states of a function with this number of output values are compared. The number is a power of
+    two, so that the states fill whole batches."""
     return min(CHECKED, 1 << int(np.log2(max(FEWEST, CHECKED_REALS // outputs))))
 
 
 def disagreement(runner: Runner, states: States) -> float:
-    """Largest error of a contestant's outputs, relative to each output's largest value."""
+    """Return the largest error of a library's results for one function. The error of each output array is divided by
+    the largest value of this array."""
     expected = states.expected(runner.contestant.function)
     found = runner.outputs()
     if runner.contestant.convention == "MuJoCo":
@@ -50,12 +51,13 @@ def disagreement(runner: Runner, states: States) -> float:
 
 
 def relative_error(found: Array, expected: Array) -> float:
-    """Relative error; infinite where a value is not a number; absolute where all expected values are zero."""
+    """Return the largest relative error of outputs: infinite if a value is NaN, absolute if all expected values are
+    zero."""
     largest = np.max(np.abs(expected), axis=0)
     error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest) or 1.0)
     return float(np.max(error)) if np.isfinite(error).all() else float("inf")
 
 
 def tolerance(function: str) -> float:
-    """Largest relative difference of a function's outputs that counts as agreement."""
+    """Largest relative error with which the outputs of a function still count as equal to the expected ones."""
     return SOLVED if RECIPES[function].needs is Needs.POSITIVE_MASS else STRICT

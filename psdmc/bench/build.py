@@ -1,4 +1,4 @@
-"""Compile what the benchmark needs besides psdmc's own packages; results are kept by content."""
+"""Compile the libraries that psdmc is compared with in the benchmark, and keep the results in a cache."""
 
 from __future__ import annotations
 
@@ -16,25 +16,27 @@ CXX_CANDIDATES = ("c++", "g++", "clang++")
 
 
 def native_flags() -> tuple[str, ...]:
-    """psdmc's own flags on this machine, for every contestant that is compiled here."""
+    """Compiler flags that psdmc uses on this machine. The benchmark compiles all libraries with them."""
     return find_compiler().flags
 
 
 def counted_flags() -> tuple[str, ...]:
-    """psdmc's own flags for counting instructions: valgrind has no AVX-512, and every x86-64 machine counts the same."""
+    """Return the compiler flags for counting instructions. They permit AVX2 instructions but no AVX-512, which valgrind
+    does not support. So counts are equal on all machines."""
     return (*find_compiler().portable, *X86_64_V3.flags)
 
 
 def built(
     product: str, command: Sequence[str], sources: Mapping[str, str], depends: Sequence[str] = ()
 ) -> Path:
-    """Path of the file `product` that `command` makes in a folder that holds `sources`.
+    """Run a command that makes the file `product` from source files, and return the path of this file. The sources are
+    first written into a folder.
 
-    command  argument list; runs only where no earlier result came from the same content
-    sources  path inside the folder to text
+    command  argument list; it does not run if the cache has a result from equal content
+    sources  text of each file by its path in the folder
     depends  what else the result depends on, such as versions of libraries
 
-    ToolchainError where the command fails or makes no such file.
+    Raise ToolchainError if the command fails or makes no such file.
     """
 
     def build(folder: Path) -> None:
@@ -51,14 +53,16 @@ def built(
 
 
 def produced(build: Callable[[Path], None], sources: Mapping[str, str], parts: Sequence[str]) -> Path:
-    """The folder that `build` fills, from the cache or filled now; `parts` are what it depends on besides sources."""
+    """Return the folder that `build` fills with compiled files; from the cache if possible. `parts` lists what the
+    files depend on in addition to the sources, such as compiler flags."""
     compiler = find_compiler()
     target = [compiler.target] if any("native" in part for part in parts) else []
     return cached(cache_key(sources, (compiler.version, *target, *parts)), build)
 
 
 def cxx() -> str:
-    """The C++ compiler: $CXX or what the machine has; ToolchainError where there is none."""
+    """Return the command of the C++ compiler, from $CXX or found on the machine. Raise ToolchainError if there is
+    none."""
     chosen = os.environ.get("CXX")
     for name in [chosen] if chosen else CXX_CANDIDATES:
         if shutil.which(name):

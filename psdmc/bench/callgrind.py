@@ -1,4 +1,4 @@
-"""Instructions per state, counted by callgrind: the same on a busy machine as on an idle one, so that a test may
+"""Count the instructions per state with callgrind. Other work on the machine does not change the counts, so tests can
 compare them."""
 
 from __future__ import annotations
@@ -25,16 +25,17 @@ SEED = 512
 
 
 def valgrind() -> str:
-    """The command of valgrind; ToolchainError where it is not installed."""
+    """Return the command of valgrind. Raise ToolchainError if it is not installed."""
     if shutil.which("valgrind") is None:
         raise ToolchainError("valgrind was not found", "install it (Debian: apt install valgrind)")
     return "valgrind"
 
 
 def instructions(contestants: Sequence[Contestant], chain: Mechanism) -> dict[tuple[str, str], float]:
-    """Instructions per state, the loop's own few included, by (library, symbol).
+    """Count the instructions per state of each compared function, and return the counts by (library, C name). The few
+    instructions of the loop that calls the function are included.
 
-    contestants  built with counted_flags(); one run of valgrind for each of their libraries
+    contestants  the compared functions, compiled with counted_flags(); valgrind runs once for each of their libraries
     """
     states = States.random(chain, STATES, SEED)
     found: dict[tuple[str, str], float] = {}

@@ -1,4 +1,4 @@
-"""One robot of the benchmark: its chain with every number known, and its name in tables."""
+"""One robot of the benchmark: its joints and bodies with all numbers known, and its name in tables."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ FLOOR_MOUNT = (0.0, 0.0, -9.81)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A robot to measure.
+    """A robot of the benchmark.
 
-    name            in tables
-    model           with theta_b known; its chain has no unknown inertia
-    note            where its numbers come from
-    derive_seconds  how long a warm derivation took, None where the model was given
-    derive_bytes    peak memory of a process that did nothing else, None where unknown
-    named           functions to measure; empty: those that every robot's benchmark has
+    name            name in tables
+    model           its model; the base parameters and all inertias are known
+    note            where the robot's inertias come from
+    derive_seconds  time of a derivation by a process that already has its imports; None if the model was given
+    derive_bytes    peak memory of a process that only derived the model; None if unknown
+    named           functions to measure; if empty, those that are measured for every robot
     """
 
     name: str
@@ -79,17 +79,18 @@ class Case:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions that the benchmark measures on this robot."""
+        """Names of the functions that the benchmark measures for this robot."""
         return self.named or tuple(name for name in BENCHED if name not in self.costly)
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """The functions that the benchmark leaves out because they are costly."""
+        """Names of the functions that the benchmark leaves out for this robot because they take too long."""
         return () if self.named else self.costly
 
     @property
     def costly(self) -> tuple[str, ...]:
-        """Derivatives of a robot with more rates than MOST_DIFFERENTIATED."""
+        """Return the names of the derivative functions that the benchmark leaves out for this robot. They take too long
+        if the robot has more than MOST_DIFFERENTIATED degrees of freedom."""
         large = self.chain.nv > MOST_DIFFERENTIATED
         return tuple(name for name in self.named or BENCHED if large and name.endswith(DIFFERENTIATED))
 
@@ -104,9 +105,10 @@ class Case:
 
 
 def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
-    """The chain's geometry standing on the floor, with generic physical inertias and no drive inertia.
+    """Return a robot with the joints and lengths of the given robot and random, physically possible inertias. The robot
+    has no drive inertia, and gravity is along -z.
 
-    So no contestant profits from particular zeros; the same seed gives the same robot.
+    As no inertia is zero, no library profits from zeros. Equal seeds give equal robots.
     """
     rng = np.random.default_rng(seed)
     n = len(chain)
@@ -121,7 +123,8 @@ def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
 
 
 def physical_body(rng: np.random.Generator) -> Array:
-    """(10,) standard parameters of eight point masses at random places: a body that could exist, no entry zero."""
+    """Return the ten standard parameters (mass, first moments, inertia) of a random body that is physically possible.
+    The body consists of eight point masses; no parameter is zero."""
     masses = rng.uniform(0.1, 0.6, size=8)
     places = rng.normal(scale=0.08, size=(8, 3)) + rng.normal(scale=0.05, size=3)
     second = np.einsum("k,ki,kj->ij", masses, places, places)
@@ -129,7 +132,7 @@ def physical_body(rng: np.random.Generator) -> Array:
 
 
 def refuse_unlike(chain: Mechanism) -> None:
-    """InputError where a robot has joints that the rivals' models are not made for."""
+    """Raise InputError if the robot has joints that the benchmark cannot build in the other libraries."""
     for i, joint in enumerate(chain.joints):
         if joint.type.pinocchio not in JOINTS:
             raise InputError(
@@ -144,11 +147,12 @@ def refuse_unlike(chain: Mechanism) -> None:
 
 
 def robot_as_numbers(chain: Mechanism) -> str:
-    """The chain as plain text for rivals: exact placements and bodies about the joint frames, so that no parser is
-    involved. InputError as of refuse_unlike.
+    """Return the robot as plain text for the C++ programs of other libraries, so that they need no parser for robot
+    files. Raise InputError as refuse_unlike does.
 
-    n and gravity; then per joint Pinocchio's word for its type, parent (0 the base, else counted from 1), rotation (9,
-    row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
+    The text has the number n of joints, and gravity. Then follow, for each joint: Pinocchio's name of the joint type,
+    the parent (0: base, else from 1), rotation (9, row-major), translation (3), body (10 standard parameters about the
+    joint frame) and drive inertia.
     """
     refuse_unlike(chain)
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]

@@ -1,5 +1,5 @@
-"""The robots of the benchmark: published geometry, popular arms, two generic arms; quadrupeds, a humanoid, a hand, two arms
-on a torso."""
+"""The robots of the benchmark: robots of publications, common arms, two generic arms, quadrupeds, a humanoid, a hand and
+a two-armed torso."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ ARMS, TREES = ("UR5", "Panda"), ("solo12", "anymal_b", "talos", "allegro", "baxt
 
 
 def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Mechanism]]:
-    """For each standard robot's name the function that makes its chain or tree; two generic arms are among them."""
+    """Return, by name, the functions that make the standard robots of the benchmark, including two generic arms."""
     makers: dict[str, Callable[[], Mechanism]] = {}
     for name in (*BUNDLED, *ARMS):
         makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
@@ -72,9 +72,9 @@ def standard_cases(
     seed: int = SEED,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[Case]:
-    """The standard robots, each derived in a process of its own.
+    """Derive the models of the standard robots of the benchmark, each in a new process.
 
-    InputError where a robot's file is not installed or a name unknown.
+    Raise InputError if a robot's file is not installed, or if a name is unknown.
     """
     makers = standard_chains(seed)
     for name in makers if names is None else names:
@@ -91,9 +91,10 @@ def legged_cases(
     names: Sequence[str] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[Case]:
-    """Legged robots with the inertias of their files, each derived in a process of its own; all where none is named.
+    """Derive the models of legged robots with the inertias of their files, each in a new process. Without names, all
+    legged robots are derived.
 
-    InputError as for `standard_cases`.
+    Raise InputError as `standard_cases` does.
     """
     for name in names or LEGGED:
         if name not in LEGGED:
@@ -104,7 +105,8 @@ def legged_cases(
 
 
 def oblique_chain(n: int, seed: int) -> Mechanism:
-    """n revolute joints about axes that neither meet nor are parallel or perpendicular, so that nothing simplifies."""
+    """Return a robot with n revolute joints whose axes are neither parallel nor perpendicular and do not meet, so that
+    no term vanishes."""
     rng = np.random.default_rng(seed)
     joints = tuple(
         Joint(f"joint{i + 1}", f"link{i + 1}", REVOLUTE, _anywhere(rng), Placement.identity())
@@ -124,7 +126,8 @@ def oblique_chain(n: int, seed: int) -> Mechanism:
 
 
 def first_joints(chain: Mechanism, n: int) -> Mechanism:
-    """The chain cut after its first n joints, for measuring how cost grows with n."""
+    """Return the robot without the joints after joint n. The benchmark uses it to measure how times grow with the
+    number of joints."""
     rows = PARAMETERS_PER_LINK * n
     span = chain.parameter_span[:rows]
     kept = np.any(span != 0.0, axis=0)
@@ -154,7 +157,7 @@ def _known(name: str) -> Mechanism:
 
 
 def robot_data() -> Path:
-    """The folder in which the example-robot-data wheel keeps its robots."""
+    """Return the folder in which the Python package example-robot-data keeps its robot files."""
     try:
         wheel = distribution("example-robot-data")
     except PackageNotFoundError:

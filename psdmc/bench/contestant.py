@@ -1,4 +1,5 @@
-"""One contestant: one function of one library for one robot, called by the loops of rivals/loops.hpp."""
+"""One compared function of the benchmark: a library's code of one function for one robot, called by the loops of
+rivals/loops.hpp."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ TAIL_BLOCK = 64
 
 @dataclass(frozen=True, slots=True)
 class Unavailable:
-    """A rival that could not be built or run here, and the reason, which the tables show."""
+    """A library that could not be built or run on this machine, and the reason, which the tables show."""
 
     rival: str
     reason: str
@@ -45,22 +46,23 @@ class Unavailable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contestant:
-    """One function of one library.
+    """The code of one library for one function and one robot, with all data that are needed to call and time the code.
 
-    rival         who: 'psdmc factored', 'Pinocchio' ...
+    rival         name of the library in tables: 'psdmc factored', 'Pinocchio' ...
     function      name in psdmc/functions
-    library       shared library that exports `symbol`_throughput and so on
-    outputs       numbers per state that it puts out
-    variant       which of its ways, '' where there is one
-    layout        how states are passed
-    lanes         states per block where the layout is lane by lane
-    sections      reals per state of each array that a batch call fills one after the other; () where it fills one
-    convention    of a free root's states
-    robot         text for its `setup`, None where the library knows its robot
-    weights       where functions differ in what they put out (regressors): output rows times these are torques
-    operations    (multiplications, additions), None where unknown
-    instructions  per state on x86-64-v3, None where not counted
-    code_bytes    of machine code for one state, None where its library does not tell
+    library       shared library that exports the C functions `symbol`_throughput and so on
+    outputs       number of output values per state
+    variant       name of the algorithm if the library has several for the function, else ''
+    layout        how states are passed: 'state' (one per call), 'rows' (one after the other) or 'lanes' (blocks of
+                  states)
+    lanes         states per block if the layout is 'lanes'
+    sections      number of values per state of each output array of a batch call; () if there is one array
+    convention    convention for the states of a floating base: psdmc's or MuJoCo's
+    robot         text from which the library makes the robot; None if the robot is compiled in
+    weights       only for regressors: the parameters by which a row of the regressor is multiplied to get a torque
+    operations    (multiplications, additions), None if unknown
+    instructions  number per state on x86-64-v3, None if not counted
+    code_bytes    size of the machine code for one state, None if the library does not provide it
     """
 
     rival: str
@@ -103,7 +105,7 @@ class Work(ctypes.Structure):
 
 
 class Runner:
-    """A contestant's library, loaded, with its states laid out: ready to be timed again and again."""
+    """A loaded library with input states in the memory layout of the library, ready to time one function repeatedly."""
 
     def __init__(self, contestant: Contestant, states: States) -> None:
         self.contestant = contestant
@@ -119,28 +121,36 @@ class Runner:
         self.setup()
 
     def move(self) -> None:
-        """Move the output to another place in memory; see States.move."""
+        """Move the output array to another place in memory between trials. The place decides which cache lines collide,
+        and so changes the time of a call."""
         self._output = moved(self._output)
 
     def setup(self) -> None:
-        """Give the library its robot; libraries of rivals hold one at a time."""
+        """Pass the robot to the library. A library holds one robot at a time."""
         if self.contestant.robot is not None:
             self._library.setup(self.contestant.robot.encode())
 
     def throughput(self) -> Array:
-        """ns per state, block by block. The median block is not disturbed by the machine's other work."""
+        """Measure the time per state in ns if the states are independent. Returns one time for each block of states.
+        Other work on the machine hardly affects the median of these times."""
         return self._timed("throughput", self._output, self._block)
 
     def latency(self) -> Array:
-        """ns per state, block by block, where each state depends on the one before."""
+        """Measure the time per state in ns if each state depends on the result of the state before. Returns one time
+        for each block of states."""
         return self._timed("latency", self._output, self._block, self._count // LATENCY_SHARE)
 
     def tail(self) -> Array:
-        """ns per call over blocks of 64 calls, the clock's own cost subtracted."""
+        """Measure the time per call in ns, without the time of reading the clock. Returns one time for each block of 64
+        calls, from which the slowest calls are found."""
         return self._timed("throughput", self._output, TAIL_BLOCK) - self._clock_cost() / TAIL_BLOCK
 
     def cold(self, calls: int, memory: Array) -> Array:
-        """ns of each of so many single calls, after each of which all memory is read; the clock's own cost subtracted."""
+        """Measure the times of single calls with empty caches, in ns, without the time of reading the clock. The array
+        `memory`, which is larger than the caches, is read between two calls.
+
+        calls  number of calls
+        """
         seconds = np.zeros(min(calls, self._states.count))
         loop = getattr(self._library, f"{self.contestant.symbol}_cold")
         work, sizes = self._work(self._output, len(seconds)), (len(seconds), memory.size)
@@ -149,7 +159,8 @@ class Runner:
         return seconds * 1e9 - self._clock_cost()
 
     def outputs(self) -> Array:
-        """(count, outputs) what the function puts out at every state, as rows."""
+        """Compute the function at every state and return the outputs, an array (number of states, output values per
+        state)."""
         count, size = self._states.count, self.contestant.outputs
         output = np.full(count * size, np.nan)
         self._copy_matrices(True)
@@ -213,5 +224,5 @@ def _as_rows(array: Array, lanes: int, count: int) -> Array:
 
 
 def source(name: str) -> str:
-    """A C++ file that belongs to the benchmark."""
+    """Return the text of a C++ file of the benchmark."""
     return files("psdmc.bench.rivals").joinpath(name).read_text()

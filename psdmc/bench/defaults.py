@@ -1,4 +1,5 @@
-"""Defaults of a benchmark run that its command line shows, apart from what a run imports."""
+"""Default values of the benchmark's options, in a module without imports, so that the help of the command line loads
+quickly."""
 
 from __future__ import annotations
 

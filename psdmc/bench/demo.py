@@ -1,4 +1,4 @@
-"""python -m psdmc.bench.demo MODEL: one table of a model's generated functions with their operations, errors and times."""
+"""python -m psdmc.bench.demo MODEL: print the operations, errors and times of a model's generated functions."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def demo(model: DynamicsModel, progress: Progress) -> str:
 def errors_against_pinocchio(
     model: DynamicsModel, robot: CompiledRobot, functions: Sequence[str]
 ) -> dict[str, float]:
-    """Largest error of each compiled function against Pinocchio's reading of the source, relative to each output's
-    largest value over random states."""
+    """Return, for each compiled function, the largest difference from Pinocchio's results at random states. The
+    difference of each output array is divided by the largest value of the array."""
     pinocchio = reference(source_of(model))
     rng, sizes = np.random.default_rng(SEED), sizes_of(model.mechanism, model.l)
     q, qd, qdd = states_of(model.mechanism, rng, STATES)
@@ -102,7 +102,7 @@ def _ns(measured: Measurement | None) -> str:
 
 
 def main() -> int:
-    """Print the table of the model that the command line names."""
+    """Print the table of functions for the model that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.demo", description=__doc__)
     parser.add_argument("model", type=Path, help="model file made by psdmc derive (.npz)")
     options = parser.parse_args()

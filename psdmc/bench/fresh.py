@@ -1,4 +1,4 @@
-"""Derivation in a new process, so that its time and memory can be measured."""
+"""Derive a model in a new process, to measure the time and memory of the derivation."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ STATUS = Path("/proc/self/status")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivation:
-    """A MODEL and the time and memory of its derivation. peak_bytes: of the whole process, None where the system does
-    not say."""
+    """A model with the time and memory of its derivation. peak_bytes is for the whole process; None if the system does
+    not report it."""
 
     model: DynamicsModel
     seconds: float
@@ -30,12 +30,14 @@ class Derivation:
 
 
 def derive_fresh(chain: Mechanism) -> Derivation:
-    """Derive in a new process; without E and P where they do not fit into memory."""
+    """Return the model of a robot, derived in a new process, with time and memory of the derivation. The matrices E and
+    P are left out if they do not fit into memory."""
     return in_a_new_process(measured_derivation, chain)
 
 
 def measured_derivation(chain: Mechanism) -> Derivation:
-    """Time a warm derivation in this process, and read the process's peak of memory."""
+    """Derive a model twice in this process, and return it with the time of the second derivation and the peak memory of
+    the process."""
     derive_model(chain, expand=False)  # imports and first calls are not measured
     start = time.perf_counter()
     try:

@@ -1,7 +1,7 @@
-"""python -m psdmc.bench.gate compare|save: counts compared with the committed baseline.
+"""python -m psdmc.bench.gate compare|save: compare operation and instruction counts with the committed baseline.
 
-A count that grew fails until the baseline is changed in the same commit; times are only reported. Operation counts are
-compared everywhere, instruction counts only with the baseline's own compiler.
+If a count has grown, the command fails until the baseline is changed in the same commit. Times are printed, but cannot
+fail. Instruction counts are compared only if the compiler is that of the baseline.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ SLACK = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One count that differs from the baseline; None where one side lacks it."""
+    """An operation or instruction count that differs between the baseline (`before`) and the present code (`after`).
+    The value is None on the side that has no such count."""
 
     robot: str
     function: str
@@ -61,7 +62,8 @@ class Change:
 
 
 def changes(before: Baseline, after: Baseline) -> Iterator[Change]:
-    """Every difference, robots in the baseline's order; instructions only where both sides can be compared."""
+    """Return all counts that differ between the baseline `before` and the present code `after`, robot by robot.
+    Instruction counts are compared only if both were made with one compiler version."""
     comparable = before.compiler == after.compiler and after.without is None
     for robot in after.counts:
         old_robot, new_robot = before.counts.get(robot, {}), after.counts[robot]
@@ -97,7 +99,7 @@ def compare(before: Baseline, after: Baseline) -> tuple[str, bool]:
 
 
 def main() -> int:
-    """Compare with the baseline, or save it, as the command line says."""
+    """Compare the counts with the baseline, or save them as the baseline, as the command line says."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.gate", description=__doc__)
     parser.add_argument("action", choices=("compare", "save"))
     parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
@@ -149,7 +151,8 @@ Counts = dict[str, dict[str, dict[str, float]]]
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Counts, and the compiler that instruction counts are valid for; `without` is the reason where there are none."""
+    """Operation and instruction counts of all robots and functions, and the compiler with which instructions were
+    counted. `without` says why instruction counts are missing; None: they are there."""
 
     compiler: str
     counts: Counts
@@ -161,7 +164,7 @@ class Baseline:
 
     @staticmethod
     def read(path: Path) -> Baseline:
-        """InputError where the file is missing or not a baseline."""
+        """Read the baseline from its file. Raise InputError if the file is missing or not a baseline."""
         try:
             content = json.loads(read_file(path, LARGEST_BASELINE, "make it anew with: make bench-save"))
             return Baseline(content["compiler"], content["counts"])
@@ -178,9 +181,10 @@ def count(
     progress: Callable[[str], None] = lambda message: None,
     with_instructions: bool = True,
 ) -> Baseline:
-    """Operations of every function and instructions per state, for each case, factored.
+    """Count the operations and instructions per state of every function of each robot, for code that psdmc factors into
+    few operations.
 
-    Instructions are left out, with the reason, where they are not wanted or valgrind is missing.
+    Instructions are left out if they are not wanted or valgrind is not installed; the result then states the reason.
     """
     counts: Counts = {}
     without = None if with_instructions else "not asked for"
@@ -196,7 +200,8 @@ def count(
 
 
 def operations(case: Case) -> dict[str, dict[str, float]]:
-    """Multiplications and additions (with subtractions and divisions) of each function's PROGRAMs."""
+    """Return the numbers of multiplications and additions of each function (subtractions and divisions count as
+    additions)."""
     table: dict[str, dict[str, float]] = {}
     for name, kernel in psdmc_c.kernels_of(case.model, "factored", case.functions).items():
         single, batch = cost(kernel.single), cost(kernel.batch)

@@ -1,6 +1,6 @@
-"""python -m psdmc.bench.legged [NAME ...] [--rounds N] [--json FILE]: derivatives and matrices of legged robots.
+"""python -m psdmc.bench.legged [NAME ...] [--rounds N] [--json FILE]: time derivatives and matrices of legged robots.
 
-The robots have the inertias of their files. One state a call, and psdmc's batches beside it.
+The inertias are those of the robot files. The benchmark times calls for one state, and psdmc's batches.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ HEAD = ("function", "operations", "code, kB", "psdmc, ns", "Pinocchio", "CasADi"
 
 
 def main() -> int:
-    """Run the benchmark as the command line says; the exit status."""
+    """Run the benchmark with the options of the command line, and return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.legged", description=__doc__)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(LEGGED)}; all where none is named")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="trials that count (default %(default)s)")
@@ -57,7 +57,8 @@ def _measure(options: argparse.Namespace) -> int:
 
 
 def as_text(result: BenchResult, cases: Sequence[Case]) -> str:
-    """A table for each robot: psdmc's time for one state, rivals' times divided by it, and batches' times by it."""
+    """Return the results as text, with a table for each robot. A row has psdmc's time for one state. The times of other
+    libraries and of psdmc's batch calls are given as multiples of psdmc's time."""
     machine = result.machine
     lines = [f"{machine.processor}, {machine.compiler}, {machine.flags}"]
     for case, found in zip(cases, result.cases, strict=True):

@@ -1,4 +1,4 @@
-"""The machine of a measurement, and whether it was idle meanwhile."""
+"""Describe the machine on which times are measured, and test whether other programs ran during a measurement."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """This machine, as far as its system tells."""
+    """Return the properties of this machine on which a time depends, as far as the system reports them."""
     return Machine(
         processor=_cpu_line("model name") or platform.processor() or platform.machine(),
         cores=os.cpu_count() or 1,
@@ -55,9 +55,10 @@ def this_machine() -> Machine:
 
 
 def others_share() -> Callable[[], float]:
-    """Start watching; the returned function says how many cores' worth of time other processes have used since.
+    """Return a function that measures how much processor time other processes have used since the call of others_share.
+    The result is an average number of busy cores.
 
-    Zero where the system does not say (no /proc/stat).
+    The result is zero if the system does not report this time (no /proc/stat).
     """
     begin = _busy_seconds(), time.process_time(), time.monotonic()
 
@@ -108,7 +109,7 @@ PACKAGES = ("psdmc", "numpy", "pin", "casadi", "cmeel-cppadcodegen", "mujoco")
 
 
 def version_of(package: str) -> str:
-    """A package's installed version, in words where it is not installed."""
+    """Return the installed version of a package, or a text that says that it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -116,5 +117,5 @@ def version_of(package: str) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Installed version of each compared package, by its name."""
+    """Return the installed version of each compared library, by its name."""
     return {package: version_of(package) for package in PACKAGES}

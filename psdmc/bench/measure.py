@@ -1,4 +1,4 @@
-"""Interleaved trials: every contestant in turn, repeatedly, counted only while the machine is idle."""
+"""Time all compared functions in turn, round by round, and count only rounds in which the machine was otherwise idle."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ PATIENCE = 3
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """A figure over several trials: median, quartiles and the best, ns."""
+    """Median, quartiles and smallest value of the times of one function over several rounds of timing, ns.
+
+    low, high  lower and upper quartile
+    best       smallest time
+    """
 
     median: float
     low: float
@@ -37,7 +41,12 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """ns per call over blocks of 64 calls, the clock's own cost subtracted: the worst case for a control loop."""
+    """The slowest calls of one function, which limit a control loop. The values are times per call in ns, in blocks of
+    64 calls, without the time of reading the clock.
+
+    percentile_99_99  time that one block in 10,000 exceeds
+    blocks            number of blocks
+    """
 
     median: float
     percentile_99_99: float
@@ -47,9 +56,9 @@ class Tail:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """One contestant's times; latency, tail and cold calls only where it takes one state a call.
+    """Times of one compared function. The times except throughput are measured only if a call computes one state.
 
-    cold  over single calls with nothing in the caches; None where they were not measured
+    cold  time of single calls with empty caches; None if not measured
     """
 
     throughput: Spread
@@ -68,7 +77,8 @@ class _Trials:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Times in the runners' order, and whether the machine was idle while they were taken."""
+    """Times of all compared functions, in the order in which the functions were given. It also states whether the
+    machine was otherwise idle."""
 
     times: tuple[Times, ...]
     rounds: int
@@ -82,8 +92,14 @@ def measure(
     between: Callable[[], None] = lambda: None,
     cold: bool = False,
 ) -> Measured:
-    """Every runner once a round, `rounds` rounds that count; `between` runs before each of them. `cold`: single calls with
-    nothing in the caches, too."""
+    """Time every compared function once per round, until `rounds` rounds were made while no other program ran. Returns
+    the times of each function. If the machine stays busy for PATIENCE times as many rounds, the times of all rounds are
+    returned.
+
+    runners  the compared functions, with their states
+    between  function that is called before each round
+    cold     True: also time single calls with empty caches
+    """
     _round(runners)  # caches, branch predictors and the clock speed settle
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
@@ -151,8 +167,8 @@ UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 
 @cache
 def swept_memory() -> Array:
-    """Memory of twice the largest cache's size, within LEAST and MOST; every page is written, so that it is one of its
-    own."""
+    """Return an array twice as large as the largest cache of the machine, within the limits LEAST and MOST (bytes). The
+    benchmark reads this array to empty the caches."""
     largest = max(map(_bytes, CACHES.glob("index*/size")), default=0)
     return np.ones(min(max(2 * largest, LEAST), MOST) // 8)
 
@@ -169,8 +185,9 @@ CODE = frozenset("tTwW")
 
 
 def code_sizes(library: Path) -> dict[str, int]:
-    """Bytes of each function by its name. What a compiler splits off, `name.cold` and the like, counts as the function's.
-    Empty where there is no GNU or LLVM nm: the column then stays empty."""
+    """Return the size in bytes of each C function's machine code in a library, by name; empty if there is no GNU or
+    LLVM nm. A compiler may move part of a function into another symbol, such as `name.cold`; its size is added to that
+    of the function."""
     nm = shutil.which("nm")
     if nm is None:
         return {}
@@ -186,6 +203,6 @@ def code_sizes(library: Path) -> dict[str, int]:
 
 
 def code_bytes(sizes: Mapping[str, int], belongs: Callable[[str], bool]) -> int | None:
-    """Bytes of the functions that belong to one; None where none is known."""
+    """Return the size in bytes of all C functions that belong to one function; None if none is known."""
     own = [size for name, size in sizes.items() if belongs(name)]
     return sum(own) if own else None

@@ -1,4 +1,5 @@
-"""Times that the method's authors published, shown beside ours without ratios, as machines and inertias differ."""
+"""Times that the authors of the method behind psdmc published. Reports show them without ratios, because machines and
+inertias differ."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """One robot's published times, ns per call; derivation in s; None where not given."""
+    """Times that were published for one robot, in ns per call, and the time of its derivation in s. A time is None if
+    it was not published."""
 
     robot: str
     source: str
@@ -29,7 +31,7 @@ PUBLISHED = {
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """A line of Denso-2022's table 5: ns per call."""
+    """A row of table 5 of the paper Denso-2022: times in ns per call."""
 
     method: str
     inverse: float

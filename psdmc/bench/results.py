@@ -1,4 +1,5 @@
-"""The results of a benchmark run as plain values, for JSON, report and gate."""
+"""Results of a benchmark run as plain values, which are saved as JSON, shown in the report, and compared with the
+baseline."""
 
 from __future__ import annotations
 
@@ -20,13 +21,14 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One contestant on one robot.
+    """The result of one compared function for one robot.
 
-    layout        'state', 'rows' or 'lanes'
-    error         largest error of its outputs, relative to each output's largest value
-    operations    (mul, add), None where unknown
-    instructions  per state, as callgrind counts them on x86-64-v3; None where not counted
-    code_bytes    of machine code for one state; None where the library does not tell
+    layout        how states are passed: 'state' (one per call), 'rows' (one after the other) or 'lanes' (blocks of
+                  states)
+    error         largest error of the outputs, divided by the largest value of each output array
+    operations    (multiplications, additions), None if unknown
+    instructions  number per state, as callgrind counts them on x86-64-v3; None if not counted
+    code_bytes    size of the machine code for one state; None if the library does not report it
     """
 
     rival: str
@@ -50,7 +52,8 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """One robot; `rounds` trials each, `idle` where the machine was so throughout."""
+    """The results for one robot, from `rounds` timed rounds over all functions. `idle` states whether no other program
+    ran during these rounds."""
 
     name: str
     note: str
@@ -67,18 +70,22 @@ class CaseResult:
     threads: tuple[ThreadTime, ...] = ()
 
     def of(self, function: str, layout: str = "state") -> Iterator[Measurement]:
-        """Measurements of one function, in the contestants' order."""
+        """Return the measurements of one function in one memory layout of states, in the order of the libraries."""
         return (m for m in self.measurements if m.function == function and m.layout == layout)
 
     def best(self, rival: str, function: str, layout: str = "state") -> Measurement | None:
-        """A rival's better way of computing a function."""
+        """Return the measurement of a library's fastest algorithm for a function, None if there is none."""
         own = [m for m in self.of(function, layout) if m.rival == rival]
         return min(own, key=lambda m: m.ns) if own else None
 
     def ratio(
         self, function: str, layout: str = "state", *, over: str, rival: str = "psdmc factored"
     ) -> float | None:
-        """How many times faster `rival` is than the better way of `over`, for one state a call."""
+        """Return how many times faster the library `rival` is than the fastest algorithm of the library `over` for one
+        state per call. Return None if one of them was not measured.
+
+        layout  memory layout of the states of `rival`
+        """
         ours, theirs = self.best(rival, function, layout), self.best(over, function)
         return theirs.ns / ours.ns if ours and theirs else None
 
@@ -96,7 +103,7 @@ class BenchResult:
 
     @property
     def wrong(self) -> tuple[str, ...]:
-        """Contestants that gave wrong results and were therefore not timed."""
+        """Texts on the libraries' functions that gave wrong results and were therefore not timed."""
         return tuple(f"{case.name}: {w.rival}: {w.reason}" for case in self.cases for w in case.wrong)
 
     def to_json(self) -> str:
@@ -104,7 +111,7 @@ class BenchResult:
 
     @staticmethod
     def from_json(text: str) -> BenchResult:
-        """The run in a text of to_json; InputError where the text is something else."""
+        """Return the benchmark run from the text of to_json. Raise InputError if the text is something else."""
         try:
             content = json.loads(text)
             if content.pop("schema") != SCHEMA:
@@ -120,7 +127,7 @@ class BenchResult:
 
 
 def rebuilt(kind: Any, value: Any) -> Any:
-    """A value of a result's type from what JSON made of it: dataclasses from objects, tuples from arrays."""
+    """Return a value of the type `kind` from parsed JSON: dataclasses from objects, tuples from arrays."""
     arguments = get_args(kind)
     if value is None or kind is Any:
         return value

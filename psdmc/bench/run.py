@@ -1,4 +1,4 @@
-"""A benchmark run from top to bottom: build the contestants, compare their results, then time them."""
+"""A benchmark run from start to end: compile all libraries, compare their results, then time them."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ SCALED_ROUNDS = 3
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How to measure.
+    """The settings of a benchmark run.
 
-    rounds     trials of each contestant that count
-    states     fresh random states per trial
-    seed       of states
-    rivals     names of EVERYONE to run; None: all
-    functions  names to measure; None: all
-    count      whether to count instructions under callgrind
+    rounds     number of rounds of timing; each function is timed once in a round
+    states     number of random states per round
+    seed       seed of the random states
+    rivals     names of the libraries to run; None: all
+    functions  names of the functions to measure; None: all
+    count      whether to count instructions with callgrind
     threads    whether to time batch calls on one and two threads
-    cold       whether to time single calls with nothing in the caches
+    cold       whether to time single calls with empty caches
     """
 
     rounds: int = ROUNDS
@@ -62,9 +62,10 @@ def run(
     progress: Progress = silent,
     scaling: Sequence[Case] = (),
 ) -> BenchResult:
-    """Measure every case. Rivals that cannot be built are listed with the reason; wrong ones are not timed.
+    """Run the benchmark for all robots, and return its results. Libraries that cannot be built are listed with the
+    reason. Functions with wrong results are listed and not timed.
 
-    scaling  the same robot with more and more joints, for which less is measured
+    scaling  one robot with more and more joints; only some libraries and functions are measured for it
     """
     results = run_cases(cases, settings, progress)
     scaled = Settings(
@@ -75,7 +76,7 @@ def run(
 
 
 def run_cases(cases: Sequence[Case], settings: Settings, progress: Progress) -> tuple[CaseResult, ...]:
-    """Build for all cases, then measure case by case."""
+    """Compile the libraries for all robots, then measure one robot after the other."""
     if not cases:
         return ()
     everyone = assemble(cases, settings.entrants(), settings.functions, settings.count, progress)
@@ -83,7 +84,7 @@ def run_cases(cases: Sequence[Case], settings: Settings, progress: Progress) -> 
 
 
 def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> CaseResult:
-    """Measure one robot."""
+    """Check and time the libraries' functions for one robot."""
     case = assembled.case
     progress(f"{case.name}: checking")
     right, errors, wrong = checked(case, assembled.contestants, settings.seed + 1)
@@ -124,7 +125,8 @@ def _measurement(c: Contestant, error: float, times: Times) -> Measurement:
 def checked(
     case: Case, contestants: Sequence[Contestant], seed: int
 ) -> tuple[list[Contestant], list[float], tuple[Unavailable, ...]]:
-    """The contestants whose outputs are right, their errors, and the others with what is wrong."""
+    """Return three lists: the functions whose outputs agree with reference values, their relative errors, and the other
+    functions with a text on what is wrong."""
     drawn: dict[int, States] = {}
     right: list[Contestant] = []
     errors: list[float] = []
@@ -144,7 +146,7 @@ def checked(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembled:
-    """One case's contestants, and those that could not be built."""
+    """For one robot, the compiled functions of all libraries, and the libraries that could not be built."""
 
     case: Case
     contestants: tuple[Contestant, ...]
@@ -158,10 +160,11 @@ def assemble(
     count: bool,
     progress: Callable[[str], None],
 ) -> tuple[Assembled, ...]:
-    """Contestants of every case, in order.
+    """Compile the libraries for every robot, and return the compiled functions robot by robot.
 
-    functions  names to keep; None: all
-    count      whether to count instructions too, which compiles everything once more
+    entrants   the libraries
+    functions  names of the functions to keep; None: all
+    count      whether to count instructions; all libraries are then compiled a second time with other flags
     """
     assembled: list[Assembled] = []
     # What all cases share is built for the first, once, not by several processes at a time.
@@ -176,8 +179,11 @@ def assemble(
 
 
 def enter(job: tuple[Entrant, Case, bool]) -> list[Contestant | Unavailable]:
-    """One entrant's contestants for one case; with instruction counts where the job asks for them and they are
-    possible."""
+    """Return one library's compiled functions for one robot. If the job asks for it and the library permits it, the
+    functions have instruction counts.
+
+    job  the library, the robot, and whether instructions are counted
+    """
     entrant, case, count = job
     entries = list(entrant.contestants(case))
     if not count or not entrant.counted:

@@ -1,4 +1,4 @@
-"""Fresh random states in the memory layout of each contestant."""
+"""Random states for the benchmark, in the memory layout that each library reads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CACHE_LINE = 64
 
 
 def at_cache_line(size: int) -> Array:
-    """(size,) zeros that start at a cache line."""
+    """Return (size,) zeros whose memory begins at a cache line."""
     spare = CACHE_LINE // 8
     memory = np.zeros(size + spare)
     first = -memory.ctypes.data // 8 % spare
@@ -40,19 +40,20 @@ def _further(function: str) -> tuple[Quantity, ...]:
 
 
 def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
-    """What a signature's words mean for a robot with l base parameters."""
+    """Return the lengths of array axes for a robot with l base parameters. Examples are n (joints), nq (entries of q)
+    and nv (entries of qd)."""
     return Sizes(
         len(robot), robot.nq, robot.nv, l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
     )
 
 
 def output_sizes(function: str, sizes: Sizes) -> tuple[int, ...]:
-    """Reals per state of each output of a function of states."""
+    """Return the number of values per state of each output array of a function."""
     return tuple(sizes.size(output) for output in RECIPES[function].signature.outputs)
 
 
 def moved(array: Array) -> Array:
-    """A copy at another place in memory, made while the array still exists."""
+    """Return a copy of an array at another place in memory."""
     copy = at_cache_line(len(array))
     copy[:] = array
     return copy
@@ -60,7 +61,7 @@ def moved(array: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """`count` random states of a chain.
+    """`count` random states of a robot.
 
     q        (count, nq), quaternions of length one
     qd, qdd  (count, nv)
@@ -111,9 +112,11 @@ class States:
         return RobotOnArrays(self.chain, self.chain.parameters.reshape(-1), np.zeros((0, 0)))
 
     def expected(self, function: str) -> Array:
-        """(count, outputs) expected outputs of a function, by psdmc's own Newton-Euler on arrays.
+        """Return the expected outputs of a function, (number of states, output values per state), from psdmc's
+        Newton-Euler recursion in NumPy.
 
-        For regressors the torques, into which each one's parameters must turn them.
+        For a regressor, return the torques instead. The regressor of each library, times the parameters of that
+        library, must equal the torques.
         """
         if RECIPES[function].times_theta:
             return self.tau
@@ -123,8 +126,8 @@ class States:
         return np.hstack([values.reshape(self.count, -1) for values in blocks])
 
     def inputs(self, function: str, lanes: int = 1, convention: Convention = "psdmc") -> tuple[Array, ...]:
-        """q, qd, what the function reads third (qdd or tau) and further inputs, flat; with lanes > 1 in blocks
-        [variable][lane]."""
+        """Return the inputs of a function as flat arrays: q, qd, the third input (qdd or tau), then further inputs. If
+        `lanes` is more than 1, states are stored in blocks [entry of the input][state] of `lanes` states."""
         x = next((q.name for q in RECIPES[function].signature.inputs[2:]), "qdd")
         given = self.mujocos if convention == "MuJoCo" else {n: getattr(self, n) for n in ("q", "qd", x)}
         first = [self._laid_out(name, given[name], lanes, convention) for name in ("q", "qd", x)]
@@ -135,13 +138,14 @@ class States:
 
     @cached_property
     def mujocos(self) -> dict[str, Array]:
-        """q, qd and qdd in MuJoCo's convention: it is not timed converting them."""
+        """Return q, qd and qdd of all states, converted to MuJoCo's convention for a floating base. The conversion is
+        made before the timing starts."""
         states = (self.q, self.qd, self.qdd)
         converted = to_mujoco(*states) if self.has_free_root else states
         return dict(zip(("q", "qd", "qdd"), converted, strict=True))
 
     def from_mujoco(self, tau: Array) -> Array:
-        """(count, nv) efforts by psdmc's convention from MuJoCo's."""
+        """Convert (count, nv) torques from MuJoCo's convention to psdmc's."""
         return force_from_mujoco(self.mujocos["q"], tau) if self.has_free_root else tau
 
     @property
@@ -149,13 +153,13 @@ class States:
         return self.chain.has_free_root
 
     def more(self, function: str) -> int:
-        """Reals per state of the function's further input, 0 where it has none."""
+        """Return the number of values per state of the function's inputs after the third one; 0 if there are none."""
         return sum(self.sizes.size(quantity) for quantity in _further(function))
 
     def move(self) -> None:
-        """Move all inputs to another place in memory. Which physical pages an array gets decides whose lines collide in
-        the caches: up to a fifth of a batch call's time. Moved between trials, this shows in the spread instead of
-        biasing a run."""
+        """Move all input arrays to other places in memory between rounds of timing. The places decide which cache lines
+        collide, which changes the time of a batch call by up to a fifth. The spread of the times over several rounds
+        then shows this effect."""
         for key, array in self._layouts.items():
             self._layouts[key] = moved(array)
 

@@ -6,7 +6,8 @@ from psdmc.bench.results import BenchResult, CaseResult, Measurement
 
 
 def as_text(result: BenchResult) -> str:
-    """Per robot and function: operations, ns, quartiles, latency, error, and how many times slower than the fastest."""
+    """Return the results as text, per robot and function: operations, ns, quartiles, latency, error, and time divided by
+    the fastest."""
     machine = result.machine
     head = [f"{machine.processor}, {machine.cores} cores, {machine.compiler}, {machine.flags}"]
     return "\n".join(head + [line for case in result.cases for line in _case_lines(case)])

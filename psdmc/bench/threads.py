@@ -1,4 +1,4 @@
-"""Batch calls from several threads at once, for the scaling over a machine's cores."""
+"""Time batch calls on several threads at once, to show how speed grows with the number of cores."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class ThreadTime:
 
 
 def measure_threads(contestants: Sequence[Contestant], states: States) -> tuple[ThreadTime, ...]:
-    """psdmc's batch functions on one and on two threads; each has its own output, inputs are shared."""
+    """Time psdmc's batch functions on one and two threads. The threads share the inputs, but each has its own
+    outputs."""
     return tuple(
         ThreadTime(c.function, c.layout, threads, _ns_per_state(c, states, threads))
         for c in contestants

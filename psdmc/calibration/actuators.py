@@ -1,4 +1,5 @@
-"""C code for friction with a state and for motors of a calibrated robot, beside that for its rigid bodies."""
+"""Generates C code for the friction and the motors of a calibrated robot, in addition to the code for its rigid
+bodies."""
 
 from __future__ import annotations
 
@@ -18,7 +19,12 @@ from psdmc.model.calibrated import Calibrated, by_joint
 
 @dataclass(frozen=True, slots=True)
 class ActuatorView(StateLawView):
-    """The data of the templates. Every joint has friction; torque constants (N m/A) may be missing, all or none."""
+    """The data for the templates of the C code of friction and motors.
+
+    joint_names       names of the joints
+    friction          values of the LuGre friction law, one vector for each joint
+    torque_constants  N m/A, one for each joint; empty if they are unknown
+    """
 
     robot: str = "robot"
     joint_names: tuple[str, ...] = ()
@@ -43,7 +49,7 @@ class ActuatorView(StateLawView):
 
     @property
     def about(self) -> str:
-        """The law, in a sentence."""
+        """One sentence that describes the friction law."""
         return STATE_LAW.about
 
     @property
@@ -60,7 +66,8 @@ class ActuatorView(StateLawView):
 
 
 def actuator_files(view: ActuatorView) -> dict[str, str]:
-    """include/R_actuators.h and src/R_actuators.c, R the robot's identifier; C99, no dependency but libm."""
+    """Return the C files include/R_actuators.h and src/R_actuators.c by path, where R is the robot's identifier. They
+    are C99 and need only libm."""
     if len(view.friction) != view.n or (view.torque_constants and len(view.torque_constants) != view.n):
         raise ValueError(
             f"{view.n} joints, {len(view.friction)} frictions, {len(view.torque_constants)} constants"
@@ -74,7 +81,8 @@ def actuator_files(view: ActuatorView) -> dict[str, str]:
 def calibrated_actuators(
     robot: str, joint_names: Sequence[str], found: Calibrated, real: str = "double"
 ) -> ActuatorView:
-    """From what a calibration found; InputError where it has no friction with a state."""
+    """Return the data for the C code of friction and motors, from the results of a calibration. Raises InputError if a
+    joint has no LuGre friction (a friction law with bristle deflection as its state)."""
     values = by_joint(found.friction)
     missing = [joint for joint in joint_names if any((joint, name) not in values for name in PARAMETERS)]
     if missing:

@@ -1,4 +1,4 @@
-"""`psdmc.calibrate`. The rest of this stage is loaded when it is called."""
+"""The function `psdmc.calibrate`. The code of the calibration is imported when the function is called."""
 
 from __future__ import annotations
 

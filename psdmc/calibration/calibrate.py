@@ -1,4 +1,4 @@
-"""Calibration from files: a campaign's four steps, or one linear fit of plain logs."""
+"""Calibrates a model from log files: in four steps from a campaign, or by one linear fit from plain logs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign
+from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.fitted_logs import LogFit
 from psdmc.calibration.identify.essential import EssentialOptions
@@ -38,15 +38,15 @@ from psdmc.robot.derivable import require_axes
 class CalibrateOptions:
     """Options of `psdmc calibrate`.
 
-    physical     whether the result must be possible for a robot: links with a distribution of mass, drive inertias and
-                 friction not negative; False shows the unconstrained fit
-    campaign     options of the four steps
-    linear       options of the linear fit
-    consistency  options of the physical estimate
-    verdict      limits of the verdict
-    choice       of the linear fit's options, before what a log description says; for plain logs only
-    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then count as
-                 knowledge; None: none is stated. For plain logs
+    physical     True: the result must be physically possible, which means real bodies, and no negative drive inertia or
+                 friction; False: the result is the unconstrained fit
+    campaign     options of a calibration in four steps (motors, gravity, friction, inertia)
+    linear       options of the linear fit of plain logs
+    consistency  options of the search for a physically possible result
+    verdict      limits from which the verdict (usable or not) follows
+    choice       options of the linear fit that the user typed; they replace those of a log description. For plain logs
+    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then act
+                      as a prior; None: no prior. For plain logs
     essential    how parameters that the data do not need are dropped; None: all are kept. For plain logs
     """
 
@@ -73,15 +73,17 @@ def calibrate(
     load: KnownLoad | None = None,
     progress: Progress = lambda step: None,
 ) -> Calibration:
-    """Calibrate a model from a campaign (its folder or campaign.toml), a log description (log.toml) or plain logs.
+    """Calibrate a model from measured logs, and return the calibrated model with the identified values. The logs are a
+    campaign (its folder or campaign.toml), a log description (log.toml) or plain log files.
 
-    regressor         the compiled model where there is one; else Newton-Euler on arrays
-    torque_constants  N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
-    validation        plain logs that are held out as a whole
-    naming            topic and joint names of plain logs
-    loaded, load      further logs of currents, recorded with that known load: they show the torque constants
+    regressor         compiled regressor of the model, which is fast; None: psdmc computes the regressor in NumPy
+    torque_constants  N m/A by joint name, for plain logs of currents, and for joints that no load affects
+    validation        plain logs that psdmc uses only to test the fit
+    naming            topic, and joint names in plain logs
+    loaded, load      further logs of currents with a known load on the robot, and this load; they determine torque
+                      constants
 
-    Raises InputError where a file is missing or a log cannot be used.
+    Raises InputError if a file is missing or a log cannot be used.
     """
     require_axes(model.mechanism, "calibration")
     options, naming = options or CalibrateOptions(), naming or LogNaming()
@@ -97,6 +99,7 @@ def calibrate(
     campaign = campaign_of(paths)
     plain = None if campaign is None else _exciting_logs(campaign, model.joint_names)
     if plain is not None:
+        held += validation_logs(paths[0])
         paths, campaign = list(plain), None
     if campaign is not None:
         _require_plain(campaign, options, held, naming, with_load)
@@ -157,8 +160,11 @@ def calibrate_campaign(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """The result of the four steps; if physical, the physically consistent values nearest to it, in the metric of its
-    uncertainties and the prior."""
+    """Calibrate a model from the logs of a campaign, in four steps: motors, gravity, friction, inertia.
+
+    If the result must be physically possible, it is the vector of base parameters that is nearest to the result of the
+    four steps. The distance is measured in standard deviations of the fit and the prior.
+    """
     progress("checking logs")
     logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(
@@ -210,9 +216,9 @@ def calibrate_logs(
     progress: Progress,
     loaded: LoadedLogs | None = None,
 ) -> Calibration:
-    """The result of one linear fit: theta_b, friction and offsets as one vector.
+    """Calibrate a model from plain logs by one linear fit of base parameters, friction and torque offsets.
 
-    loaded  logs with a known load, from which torque constants are found before
+    loaded  further logs with a known load; torque constants are first determined from these and the other logs
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
     if loaded is None:

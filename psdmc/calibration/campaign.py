@@ -1,6 +1,5 @@
-"""A calibration campaign as a folder: `campaign.toml` lists the runs, `trajectories/` holds their motions, `logs/`
-receives what the robot (or `psdmc simulate`) measured.
-"""
+"""Reads and writes the folder of a calibration campaign. `campaign.toml` lists the runs, `trajectories/` holds their
+motions, and `logs/` holds what the robot (or `psdmc simulate`) measured."""
 
 from __future__ import annotations
 
@@ -20,7 +19,8 @@ from psdmc.calibration.campaign_plan import PlannedRun as PlannedRun
 from psdmc.calibration.campaign_plan import plan_campaign as plan_campaign
 from psdmc.calibration.logs.foreign_bytes import is_folder
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.calibration.motions.trajectory import write_trajectory
+from psdmc.calibration.motions.formats import FORMATS
+from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
 from psdmc.errors import InputError
 
 UNFINISHED = ".psdmc-unfinished"
@@ -29,7 +29,8 @@ UNFINISHED = ".psdmc-unfinished"
 
 @contextmanager
 def being_written(folder: str | Path) -> Iterator[None]:
-    """Mark a folder while a campaign is written to it: until the end, psdmc may write it again."""
+    """Mark a folder as incomplete during a `with` statement that writes a campaign to it. If the process is killed, the
+    mark remains, and psdmc may later write a new campaign to the folder."""
     root = Path(folder)
     make_folder(root)
     write_whole(root / UNFINISHED, "")
@@ -43,10 +44,10 @@ def being_written(folder: str | Path) -> Iterator[None]:
 
 
 def require_free(folder: str | Path) -> None:
-    """InputError where a folder holds a campaign, which writing another one would replace, or files of others; the
-    message lists what is there.
+    """Raise InputError if a folder holds a campaign, which another one would replace, or files that psdmc did not
+    write.
 
-    A campaign that an earlier run left unfinished, and that has no recorded logs, does not count.
+    A campaign that an earlier process left unfinished, and that has no recorded logs, is accepted.
     """
     root = Path(folder)
     if (root / UNFINISHED).is_file() and not _count(root / "logs"):
@@ -70,13 +71,20 @@ def _count(folder: Path) -> int:
 
 
 def write_campaign(
-    folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str, *, force: bool = False
+    folder: str | Path,
+    runs: Sequence[PlannedRun],
+    found: Excitation,
+    table: str,
+    formats: Sequence[str] = (),
+    *,
+    force: bool = False,
 ) -> Path:
-    """Write a campaign's folder; returns the path of its campaign.toml.
+    """Write the plan and the trajectories of a campaign to a folder. Return the path of its campaign.toml.
 
-    force   replace the plan and the trajectories of an existing campaign; logs are never touched
+    formats  names of formats of controllers; each trajectory is also written in these formats
+    force    True: replace the plan and the trajectories of an existing campaign; logs are never changed
 
-    Raises InputError where there is one and `force` is not given, or the folder cannot be written.
+    Raises InputError if a campaign exists and `force` is not given, or if the folder cannot be written.
     """
     if not force:
         require_free(folder)
@@ -91,6 +99,7 @@ def write_campaign(
         if id(run.motion) not in written:  # loaded and unloaded runs share one motion
             written[id(run.motion)] = f"trajectories/{file}.{table}"
             write_trajectory(run.motion, root / written[id(run.motion)])
+            _write_formats(run.motion, root / "trajectories" / file, formats)
         lines += ["[[run]]", f"step = {_toml_text(run.step)}", f"name = {_toml_text(run.name)}"]
         if run.joint:
             lines.append(f"joint = {_toml_text(run.joint)}")
@@ -102,6 +111,16 @@ def write_campaign(
     path = root / FILE
     write_whole(path, "\n".join(lines))
     return path
+
+
+def _write_formats(motion: Trajectory, path: Path, chosen: Sequence[str]) -> None:
+    """Write a motion in the chosen formats, beside its table. Delete files in other formats: they hold older motions."""
+    for name, form in FORMATS.items():
+        file = path.with_name(path.name + form.ending)
+        if name in chosen:
+            write_whole(file, form.text(motion))
+        else:
+            file.unlink(missing_ok=True)
 
 
 def _file_names(runs: Sequence[PlannedRun]) -> list[str]:
@@ -127,7 +146,8 @@ def _toml_text(text: str) -> str:
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
-    """The motion's parameters (22) and the condition reached, as plain values."""
+    """Return the exciting motion of a campaign as plain JSON values. They are the parameters of its Fourier series,
+    (22) in Denso-2022, and the condition number of its regressor."""
     motion = found.motion
     return {
         "duration_s": motion.duration,

@@ -1,4 +1,5 @@
-"""campaign.toml: which runs a campaign has, and its logs step by step."""
+"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs. A run is one motion of the robot
+that is recorded."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_non
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 
-Step = Literal["motor", "gravity", "friction", "inertial"]
-STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial")
+Step = Literal["motor", "gravity", "friction", "inertial", "validation"]
+STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial", "validation")
 FILE = "campaign.toml"
 WHAT = "a campaign (campaign.toml), as `psdmc excite` writes it"
 HINT = "`psdmc excite` writes campaigns; docs/calibration.md describes them"
@@ -36,7 +37,8 @@ _LOAD_KEYS = ("mass", "com")
 
 @dataclass(frozen=True, slots=True)
 class ListedRun:
-    """One [[run]] of a campaign.toml, with its paths relative to the working directory."""
+    """One entry [[run]] of a campaign.toml: a recorded motion. The paths of the trajectory and the log are relative to
+    the working directory."""
 
     step: Step
     name: str
@@ -47,19 +49,21 @@ class ListedRun:
 
 
 def is_campaign(path: Path) -> bool:
-    """Whether a path names a campaign: a .toml file, or a folder with a campaign.toml."""
+    """Return whether a path names a campaign: a .toml file, or a folder with a campaign.toml."""
     return path.suffix.lower() == ".toml" or (is_folder(path) and (path / FILE).exists())
 
 
 def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """The runs of a campaign.toml (or its folder); InputError names the run and what it lacks."""
+    """Return the runs (recorded motions) that a campaign.toml lists; the path may also name its folder. Raises
+    InputError with the run and the missing entry."""
     path = Path(path)
     path = path / FILE if is_folder(path) else path
     return runs_of(read_toml(path, WHAT), path)
 
 
 def runs_of(content: dict[str, Any], path: Path) -> tuple[ListedRun, ...]:
-    """The runs of a campaign's content; `path` is the file that it came from."""
+    """Return the runs (recordings of one motion each) that the content of a campaign.toml lists. `path` is the path of
+    this file. Raises InputError with all faults."""
     faults: list[str] = []
     tables = TomlTable(content, "campaign", ("run",), faults).items("run")
     if not tables and not faults:
@@ -93,23 +97,31 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
 
 
 def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
-    """The logs of a campaign of exciting motions alone, which one linear fit takes; None where it has other steps or loads.
+    """Return the logs of a campaign that has only exciting motions without load, for one linear fit. Return None for
+    any other campaign. Validation runs do not count.
 
-    InputError where a run names a joint that the model does not have.
+    Raises InputError if a run names a joint that the model does not have.
     """
-    runs = listed_runs(path)
+    runs = [run for run in listed_runs(path) if run.step != "validation"]
     if any(run.step != "inertial" or run.load is not None for run in runs):
         return None
     _require_joints(runs, joint_names, path)
     return tuple(run.log for run in runs)
 
 
+def validation_logs(path: str | Path) -> tuple[Path, ...]:
+    """Return the logs of a campaign's validation runs, with which no step fits a value."""
+    return tuple(run.log for run in listed_runs(path) if run.step == "validation")
+
+
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
-    """All logs of a campaign, step by step.
+    """Return all logs of a campaign except those of validation runs, by the step of the calibration that uses them:
+    motor, gravity, friction, inertial.
 
-    joint_names  of the robot that it is for
+    joint_names  joints of the robot to calibrate; None: joints are not checked
 
-    Raises InputError where a log is missing, a motor run has no partner, or a run names a joint that does not exist.
+    Raises InputError if a log is missing or a run names an unknown joint. Also raises InputError if a motor run with
+    the load has no run without the load, or the reverse.
     """
     runs = listed_runs(path)
     if joint_names is not None:

@@ -1,4 +1,5 @@
-"""The plan of a calibration campaign: its motions, checked, and what is said about them."""
+"""Plans a calibration campaign: the motions that the robot makes and records. They are checked against limits and
+collisions, and come with notes for the user."""
 
 from __future__ import annotations
 
@@ -19,6 +20,7 @@ from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_a
 from psdmc.calibration.motions.criterion import all_columns, inertial_columns
 from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
 from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.limited_sines import from_rest_to_rest
 from psdmc.calibration.motions.looked_at import allowed_of, looked_at
 from psdmc.calibration.motions.search import cpu_seconds
@@ -50,17 +52,20 @@ SINE_SHARES = ((1.0, 0.9), (0.5, 0.6), (0.25, 0.4))
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """Options of a campaign's plan.
+    """Options for the plan of a campaign.
 
-    load          kg and centre of mass (m, tip frame) of the motor step's mass; None: no motor step, for robots that log
-                  torques
-    gravity_runs  sweeps through the workspace, each there and back
+    sweep         options of slow sweeps; sines, of sine motions for friction; excite, of the exciting motion
+    load          known load with which torque constants are measured: mass (kg) and centre of mass (m, tip frame).
+                  None: for robots that log torques; no runs with a load are planned
+    gravity_runs  number of slow sweeps through the workspace, each forwards and backwards
     repeats       periods of the exciting motion
-    one_log       the exciting motion alone, for one linear fit: columns of all base parameters, friction and offsets count
-    limits        of joints, beside the file's
-    shapes        folders of the collision shapes' meshes; None: collisions are not looked at
-    floor         m, height of a floor above the base's origin; None: none
+    one_log       True: plan only the exciting motion, for one linear fit of all base parameters, friction and offsets
+    validation    True: also plan a second, different motion, on which the calibration only tests its result
+    limits        limits of joints in addition to the file's
+    shapes        folders of the collision shapes' meshes; None: collisions are not checked
+    floor         height in m of a floor above the base's origin; None: no floor
     table         format of trajectories and logs: csv, npz or parquet
+    formats       names of file formats of robots' controllers in which each trajectory is written as well
     """
 
     sweep: SweepOptions = field(default_factory=SweepOptions)
@@ -70,12 +75,17 @@ class CampaignOptions:
     gravity_runs: int = 2
     repeats: int = 6
     one_log: bool = False
+    validation: bool = False
     limits: GivenLimits = field(default_factory=GivenLimits)
     shapes: tuple[Path, ...] | None = ()
     floor: float | None = None
     table: str = "csv"
+    formats: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(f"--format is {name!r}", f"known formats: {', '.join(FORMATS)}")
         if f".{self.table}" not in WRITTEN:
             known = ", ".join(ending.removeprefix(".") for ending in WRITTEN)
             raise InputError(f"table is {self.table!r}, expected one of {known}", "choose one of these")
@@ -99,7 +109,7 @@ class CampaignOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedRun:
-    """One run of the robot: a motion, for joint `joint` where one is given, with a load or without."""
+    """One run of the robot in a campaign: a recorded motion of all joints or of one joint, with or without a load."""
 
     step: Step
     name: str
@@ -110,12 +120,14 @@ class PlannedRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """All runs, the exciting motion that was found, and what a user has to know, a sentence each.
+    """All runs of a campaign, the exciting motion, and notes for the user, one sentence each.
 
-    chain       with the limits that the motions keep
-    is_cleared  whether shapes or a floor were looked at
-    looked      what was looked at, and what was not
-    remarks     what is unlike what was asked for, or cannot be found
+    runs        motions for the robot, in their order
+    found       the exciting motion
+    chain       the robot with the limits that the motions keep
+    is_cleared  whether collisions of shapes or with a floor were checked
+    looked      sentences on the collisions that were checked, and on those that were not
+    remarks     differences from what the user asked for, and values that the campaign cannot determine
     """
 
     runs: tuple[PlannedRun, ...]
@@ -133,12 +145,14 @@ def plan_campaign(
     progress: Progress = lambda step: None,
     began: float | None = None,
 ) -> Plan:
-    """All runs of the four steps, or of one log, each checked against limits of joints, torques and clearance, and the
-    search for the exciting motion.
+    """Return the plan of a campaign: the runs for a calibration in four steps, or only the exciting motion for one log.
+    Each motion is checked against joint limits, torque limits and collisions, also during the search for the exciting
+    motion.
 
-    began  cpu_seconds() from which the search's seconds count; None: now
+    began  value of cpu_seconds() from which the time of the search counts; None: now
 
-    InputError where a joint has no limits to keep, or no motion is allowed; of motions that need no search, before it.
+    Raises InputError if a joint has no limits, or if no motion is allowed. Motions that need no search are checked
+    first.
     """
     if model.mechanism.has_followers:
         raise InputError(
@@ -147,6 +161,8 @@ def plan_campaign(
         )
     began = cpu_seconds() if began is None else began
     chain = bounded(model.mechanism, options.limits)
+    for name in options.formats:
+        FORMATS[name].require(chain.joint_names, sliding_joints(chain))
     progress("shapes")
     allowed = allowed_of(model, chain, regressor, options.excite.torque_margin, options.shapes, options.floor)
     planner = _Planner(chain, options, allowed)
@@ -166,6 +182,9 @@ def plan_campaign(
     )
     found = excite(chain, columns, options.excite, _spoken(progress), allowed, began)
     planner.exciting(found)
+    if options.validation:
+        other = replace(options.excite, seed=options.excite.seed + 1, random=FOR_VALIDATION, seconds=0.0)
+        planner.exciting(excite(chain, columns, other, allowed=allowed), "validation")
     said = (
         []
         if not found.ended_by_clock
@@ -183,6 +202,10 @@ def plan_campaign(
     )
 
 
+FOR_VALIDATION = 50
+"""Random motions, the best of which becomes the motion for validation: it need not excite much, but differ."""
+
+
 class _Planner:
     """Runs so far, and remarks on them."""
 
@@ -192,7 +215,8 @@ class _Planner:
         self.remarks: list[str] = []
 
     def motors(self) -> None:
-        """A sweep of each joint that the load acts on, without and with it."""
+        """Plan the runs that determine torque constants. Each joint on which the weight of the known load acts makes
+        two sweeps, without and with the load."""
         load = self.options.load
         if load is None:
             self.remarks.append(
@@ -227,13 +251,14 @@ class _Planner:
             series = self._first(f"sine series of joint {shown(name)}", tries)
             self.runs.append(PlannedRun("friction", f"friction_{name}", series, name))
 
-    def exciting(self, found: Excitation) -> None:
+    def exciting(self, found: Excitation, step: Step = "inertial") -> None:
         options = self.options
         motion = from_rest_to_rest(
             found.motion, self.chain, options.sweep.period, options.repeats, self.allowed.faults
         )
         motion = replace(motion, sliding=sliding_joints(self.chain))
-        self.runs.append(PlannedRun("inertial", "exciting" if options.one_log else "inertial", motion))
+        name = "exciting" if options.one_log and step == "inertial" else step
+        self.runs.append(PlannedRun(step, name, motion))
 
     def _first(self, what: str, tries: Iterator[Try], load: Load | None = None) -> Trajectory:
         """The first motion that is allowed, with the load and without; a remark where it is smaller than the first."""

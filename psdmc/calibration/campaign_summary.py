@@ -1,4 +1,4 @@
-"""What a written campaign asks of its user: runs, minutes, size, what to mount, and what was checked."""
+"""Summarises a written campaign for its user: runs, duration, size, loads to mount, and what was checked."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ MIB = 2.0**20
 
 
 def summary(plan: Plan, folder: str | Path) -> tuple[str, ...]:
-    """Lines on a campaign's folder as it was written; sizes are those of its files."""
+    """Return lines of text for the user about a campaign that was written to a folder. They give runs, minutes, loads
+    to mount, and the size of the trajectory files."""
     runs, listed = plan.runs, listed_runs(folder)
     files = sorted({run.trajectory for run in listed if run.trajectory is not None})
     size = sum(path.stat().st_size for path in files) / MIB
@@ -37,7 +38,7 @@ def _steps(plan: Plan) -> Iterator[str]:
         own = [run for run in plan.runs if run.step == step]
         if own:
             minutes = sum(run.motion.duration for run in own) / 60.0
-            yield f"  {step:<9}{len(own):>3} run{'s' if len(own) > 1 else ' '} {minutes:6.1f} min"
+            yield f"  {step:<10}{len(own):>3} run{'s' if len(own) > 1 else ' '} {minutes:6.1f} min"
 
 
 def _loads(plan: Plan) -> tuple[Load, ...]:
@@ -56,7 +57,7 @@ def _which(plan: Plan, load: Load) -> str:
 
 def _found(plan: Plan) -> str:
     found = plan.found
-    is_whole = all(run.step == "inertial" for run in plan.runs)
+    is_whole = all(run.step in ("inertial", "validation") for run in plan.runs)
     what = (
         "all columns of the fit, friction and offsets included" if is_whole else "what gravity does not show"
     )

@@ -1,4 +1,4 @@
-"""`psdmc.compare`: how two models of one robot differ, in standard deviations and in torque."""
+"""The function `psdmc.compare`: how two models of one robot differ, in standard deviations and in torque."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ SAME_PLACE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One value of both models; joint std: of b - a, infinite if it is not known."""
+    """One value, such as a base parameter, in two models a and b. `std` is the standard deviation of b - a, infinite if
+    unknown."""
 
     name: str
     equation: str
@@ -59,16 +60,19 @@ class Difference:
 
     @property
     def sigmas(self) -> float:
-        """b - a in standard deviations; NaN if these are not known."""
+        """Return the difference b - a of the value, divided by its standard deviation; NaN if that is unknown."""
         return (self.b - self.a) / self.std if 0.0 < self.std < np.inf else float("nan")
 
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """Torque of b minus that of a over the workspace, N m (N).
+    """How the torques of two models a and b differ for one joint over the workspace, N m (N).
 
-    rms, largest       of the whole torque; typical: RMS of a's torque
-    gravity, friction  RMS of these parts;  inertia  largest share by which the joint's own inertia differs
+    rms, largest  RMS and largest magnitude of the difference, torque of b minus torque of a
+    typical       RMS of the torque of a
+    gravity       RMS of the difference of gravity torques
+    friction      RMS of the difference of friction torques
+    inertia       largest relative difference of the inertia about the joint's axis
     """
 
     joint: str
@@ -95,7 +99,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Friction torque of one joint, which moves alone, against its speed."""
+    """Friction torque of two models against the speed of one joint, while the other joints rest."""
 
     joint: str
     unit: str
@@ -106,7 +110,8 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class OnLog:
-    """R^2, RMS and largest error of both models on one joint of the logs, N m (N)."""
+    """The errors of two models on the logs for one joint: R^2, RMS and largest error of the predicted torque, N m (N).
+    Each is a pair, for model a and model b."""
 
     joint: str
     unit: str
@@ -117,13 +122,18 @@ class OnLog:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How two models of one robot differ.
+    """The result of comparing two models of one robot.
 
-    a, b           names of the models
-    doubts         what a user should know first
-    parameters, friction   values of both; a's numbering and equations of base parameters
-    chi2, freedom, chance  of all base parameters together; NaN without standard deviations
-    joints, curves, on_log
+    a, b        names of the models
+    doubts      warnings that a user should read first
+    parameters  base parameters of both models, with the numbering and equations of model a
+    friction    friction values of both models
+    chi2        statistic of a chi-squared test that all base parameters are equal; NaN without standard deviations
+    freedom     degrees of freedom of this test
+    chance      probability that equal robots would give a chi2 of at least this size; NaN without standard deviations
+    joints      differences of torques for each joint
+    curves      friction torque against speed for each joint
+    on_log      errors of both models on logs for each joint
     """
 
     robot: str
@@ -141,17 +151,19 @@ class Comparison:
 
     @property
     def surely(self) -> tuple[Difference, ...]:
-        """Values that differ by more than three standard deviations, the surest first."""
+        """Return the values that differ by more than three standard deviations. The values with the largest difference,
+        in standard deviations, come first."""
         own = [row for row in (*self.parameters, *self.friction) if abs(row.sigmas) > SURE]
         return tuple(sorted(own, key=lambda row: -abs(row.sigmas)))
 
     @property
     def noticed(self) -> tuple[JointDifference, ...]:
-        """Joints at which a controller notices the difference."""
+        """Return the joints whose torques differ by more than the share NOTICEABLE, which is large enough to matter for
+        a controller."""
         return tuple(joint for joint in self.joints if joint.share > NOTICEABLE)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for a user; numbers that are not finite become null."""
+        """Return the result as plain values; numbers that are not finite become null."""
         values = asdict(self) | {"noticed": [joint.joint for joint in self.noticed]}
         for name in ("parameters", "friction"):
             for row, own in zip(values[name], getattr(self, name), strict=True):
@@ -278,7 +290,7 @@ def _doubts(*sides: _Side) -> list[Remark]:
 
 
 def require_same_robot(a: Mechanism, b: Mechanism) -> None:
-    """InputError, which says what differs, unless joints, axes, link frames and gravity are the same."""
+    """Raise InputError unless two robots have equal joints, axes, link frames and gravity. The error says what differs."""
     hint = "compare two models of one robot, derived with the same --base, --tip, --lock and --gravity"
     if a.joint_names != b.joint_names:
         pairs = (("first", a.joint_names, b.joint_names), ("second", b.joint_names, a.joint_names))
@@ -397,7 +409,8 @@ def _states(chain: Mechanism) -> tuple[Array, Array, Array]:
 
 
 def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
-    """(N, n) friction torque, steady if its law has a state, without springs."""
+    """Return the friction torque (N samples, n joints) without springs. For LuGre friction, whose state is the
+    deflection of bristles, return the torque in steady sliding."""
     names = found.model.joint_names
     if found.prediction.is_linear:
         still = np.zeros_like(q)

@@ -1,4 +1,4 @@
-"""`psdmc calibrate --describe`: from logs, and a model where one is given, to the draft of a log description."""
+"""The command `psdmc calibrate --describe`, which drafts a log description from logs and optionally a model."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ MODEL_ARRAYS = {"manifest", "B"}
 def describe_command(
     given: Sequence[str | Path], output: str | Path, topic: str = ""
 ) -> tuple[Path | None, tuple[str, ...]]:
-    """Write a description's draft; returns the model among the paths, and quantities without a column.
+    """Write the draft of a log description to `output`. Returns the model file, or None if none was given, and the
+    joint quantities for which no column was found.
 
-    given   paths of logs, the first one perhaps a model file, whose joints are then described
+    given   paths of logs; the first one may be a model file, whose joints are then described
 
-    InputError where a log cannot be read, or there is a file of the output's name.
+    Raises InputError if a log cannot be read, or if a file with the name of the output exists.
     """
     paths, output = [Path(path) for path in given], Path(output)
     model = paths.pop(0) if is_model_file(paths[0]) else None
@@ -45,7 +46,7 @@ def describe_command(
 
 
 def is_model_file(path: Path) -> bool:
-    """Whether a file is an .npz with a model's arrays."""
+    """Return whether a file is an .npz file with the arrays of a model."""
     if path.suffix.lower() != ".npz" or not path.is_file():
         return False
     try:

@@ -1,4 +1,4 @@
-"""A known load as its user gives it: four numbers, or the file of one."""
+"""Reads a known load that a user gives as four numbers or as the path of a load file."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ HINT = "write MASS,X,Y,Z: kg, and m to the centre of mass in the tip's frame; or
 
 
 def given_load(source: str | Path | Sequence[float]) -> KnownLoad:
-    """The load of 'MASS,X,Y,Z', of four numbers (kg, m in the tip's frame: a point), or of a file as `psdmc payload` writes
-    it; InputError says what is wrong with it."""
+    """Return the known load from text 'MASS,X,Y,Z', from four numbers, or from a file that `psdmc payload` wrote. The
+    numbers are the mass (kg) and the centre of mass (m, in the tip frame) of a point mass. Raises InputError if the
+    load is wrong."""
     if isinstance(source, Path) or (isinstance(source, str) and source.lower().endswith(".toml")):
         found = read_load(source)
         return KnownLoad(found.mass, found.com, found.inertia, found.frame)

@@ -1,4 +1,4 @@
-"""Torque constants of a calibration from plain logs: given, or from further logs that were recorded with a known load."""
+"""Determines torque constants for a calibration from plain logs: given ones, or those from logs with a known load."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NOTICED = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedLogs:
-    """Logs of currents that were recorded with a known load on the robot."""
+    """Logs of currents that were recorded with a known load on the robot, and that load."""
 
     logs: Sequence[AnyLog]
     load: KnownLoad
@@ -46,11 +46,12 @@ def motors_with_load(
     given: Mapping[str, float] | None,
     progress: Progress,
 ) -> tuple[Motors, MotorResult]:
-    """The motors that the logs without and with the load show; given constants where they show none.
+    """Return the motors with the torque constants from logs without and with the load. Given constants apply to joints
+    for which the logs do not determine one.
 
     given  N m/A by joint name
 
-    Raises InputError where the logs hold no currents, or a joint has neither.
+    Raises InputError if the logs hold no currents, or if a joint has neither constant.
     """
     chain = model.mechanism
     if chain.has_followers:
@@ -97,7 +98,8 @@ def _together(names: Sequence[str], found: MotorResult, given: Mapping[str, floa
 def with_loaded_logs(
     record: Calibration, loaded: LoadedLogs, found: MotorResult, options: LinearOptions
 ) -> Calibration:
-    """The record with what its model's file, read back, says of the known load's torque: table 3's motor column."""
+    """Return the record with the quality of the torque constants (column Motor of the report's accuracy table). The
+    quality is computed from the model's file after the file was written and read back."""
     load = loaded.load
     used = LoadUsed(
         float(load.mass),
@@ -124,8 +126,8 @@ def with_loaded_logs(
 
 
 def loaded_quality(model: DynamicsModel, loaded: LoadedLogs, options: LinearOptions) -> StepQuality:
-    """The known load's torque against what a calibrated model's file says that the load adds: measured torque less the
-    model's. Of joints where the load makes a noticeable part of the torque."""
+    """Return how well a calibrated model's file predicts the torque that the known load adds: the measured torque
+    minus the model's torque without load. Only joints on which the load has a noticeable effect are included."""
     model = reread(model)
     chain = model.mechanism
     full = [checked(log, chain, options.filter.cutoff, options.check) for log in loaded.logs]

@@ -1,4 +1,5 @@
-"""`psdmc.identify_payload`: the load in logs of a robot whose model without it is known."""
+"""The function `psdmc.identify_payload`, which finds a load from logs of a robot whose model without the load is
+known."""
 
 from __future__ import annotations
 

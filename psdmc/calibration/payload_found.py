@@ -1,4 +1,4 @@
-"""An identified load: its numbers with standard deviations, its verdict, and its file."""
+"""An identified load: its values with standard deviations, its verdict, and its file."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ WHAT = "a load's file (.toml), as psdmc payload writes one"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PayloadFound:
-    """A load on a frame of a robot; standard deviations are infinite where the logs do not fix a number by itself.
+    """A load on a frame of a robot. A standard deviation is infinite if the logs do not determine the number by
+    itself.
 
     mass, com, inertia   kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz)
     visible              what the logs show of each of the ten linear parameters, in words
-    notes                what was kept, moved or noticed
+    notes                notes for the user, one sentence each
     """
 
     robot: str
@@ -43,11 +44,11 @@ class PayloadFound:
     notes: tuple[str, ...]
 
     def added_to(self, model: DynamicsModel) -> DynamicsModel:
-        """The model with this load on it."""
+        """Return the model with this load attached."""
         return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
 
     def lines(self) -> list[str]:
-        """The load as lines of text: what R_add_payload takes, with standard deviations."""
+        """Return the load as lines of text: the arguments of R_add_payload with standard deviations."""
         rows = [f"mass     {_with_std(self.mass, self.mass_std)} kg"]
         rows += [
             f"com {axis}    {_with_std(value, std)} m"
@@ -59,7 +60,7 @@ class PayloadFound:
         ]
 
     def as_toml(self) -> str:
-        """The file's text. Standard deviations that do not exist are inf."""
+        """Return the text of the load file. A standard deviation that is not known is written as inf."""
         return "\n".join(
             [
                 "# A load that psdmc payload identified. Lengths in m in the frame, inertia about the centre of mass:",
@@ -80,13 +81,13 @@ class PayloadFound:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the file, whole or not at all."""
+        """Write the load file, as a whole or not at all."""
         write_whole(path, self.as_toml())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadFile:
-    """What a load's file says; fields as of PayloadFound."""
+    """The content of a load file; its fields are those of PayloadFound."""
 
     frame: str
     mass: float
@@ -94,12 +95,13 @@ class LoadFile:
     inertia: Array
 
     def added_to(self, model: DynamicsModel) -> DynamicsModel:
-        """The model with this load on it; InputError where no body has these numbers or the frame is another robot's."""
+        """Return the model with this load attached. Raises InputError if no real body has these values, or if the
+        model has no such frame."""
         return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
 
 
 def read_load(path: str | Path) -> LoadFile:
-    """A load from its file; InputError names what is wrong with it."""
+    """Return a load from its file. Raises InputError with what is wrong in the file."""
     content = read_toml(Path(path), WHAT)
     numbers = {
         name: _numbers(content.get(name), count) for name, count in (("mass", 1), ("com", 3), ("inertia", 6))
@@ -123,7 +125,8 @@ def _numbers(value: Any, count: int) -> Array | None:
 
 
 def load_numbers(load: Array) -> Array:
-    """(10,) mass, com, inertia about it, of ten linear parameters: what standard deviations are carried over to."""
+    """Return mass, centre of mass and inertia about it (10,) from ten linear parameters. It serves to convert standard
+    deviations."""
     mass, h = float(load[0]), load[1:4]
     com = h / mass
     inertia = inertia_matrix(load[4:10]) - mass * (com @ com * np.eye(3) - np.outer(com, com))

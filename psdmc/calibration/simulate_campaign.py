@@ -1,4 +1,4 @@
-"""Logs of a whole campaign from a virtual robot. Each is kept until its inputs change."""
+"""Simulates the logs of a whole campaign with a virtual robot. A log is simulated again only if its inputs change."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ LARGEST_SEED = 2**31
 
 @dataclass(frozen=True, slots=True)
 class SimulateOptions:
-    """The plant's variant, and how it is simulated.
+    """The variant of the virtual robot, and how it is simulated.
 
-    ideal_sensors  no noise, no steps, no delay
-    harness        with the file's cable harness, an effect that no model here has
-    seed           of the sensors' noise; each run adds its number
-    workers        processes
+    ideal_sensors  True: sensors without noise, quantisation and delay
+    harness        True: with the file's cable harness, an effect that no model in psdmc has
+    seed           seed of the sensors' noise; the number of a run is added to it
+    workers        number of processes
     """
 
     ideal_sensors: bool = False
@@ -59,10 +59,11 @@ def simulate_campaign(
     options: SimulateOptions,
     progress: Callable[[str], None] = lambda step: None,
 ) -> int:
-    """Write the log of every run of a campaign; returns how many had to be simulated, the others being up to date.
+    """Write the log of every run of a campaign. Return the number of logs that were simulated; the others were up to
+    date.
 
-    InputError, before anything is written, where the campaign is another robot's, a log would leave its folder, or one is
-    there that was not simulated.
+    Raises InputError before anything is written in these cases: the campaign is for another robot, the path of a log
+    is outside the campaign's folder, or a log exists that was not simulated.
     """
     plant = Path(plant)
     if not 0 <= options.seed <= LARGEST_SEED:

@@ -1,4 +1,4 @@
-"""What a calibration is made from: a campaign, a log description, or plain logs, some of them for validation."""
+"""The input of a calibration: a campaign, a log description, or plain logs, some of them for validation."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from psdmc.progress import Progress
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogSources:
-    """Logs, and what their description says of the fit.
+    """Logs, and what their log description says about the fit.
 
     linear     options of the linear fit
-    constants  N m/A by joint name, for logs that hold currents; empty: the description says nothing
+    constants  N m/A by joint name, for logs of currents; empty: the description gives none
     """
 
     logs: tuple[AnyLog, ...]
@@ -35,10 +35,10 @@ class LogSources:
 
 @dataclass(frozen=True, slots=True)
 class LogNaming:
-    """How plain logs name things.
+    """Names of topics and joints in plain logs.
 
-    topic   of a bag's joint states; empty: its only one, or /joint_states
-    joints  the model's joint by the log's, where they differ
+    topic   topic of a bag with joint states; empty: its only one, or /joint_states
+    joints  names of the model's joints by the names in the log, if they differ
     """
 
     topic: str = ""
@@ -46,16 +46,16 @@ class LogNaming:
 
     @property
     def flags(self) -> list[str]:
-        """Options of the command line that say so."""
+        """Options of the command line that correspond to these names."""
         return (["--topic"] if self.topic else []) + (["--joint-map"] if self.joints else [])
 
     def require_bag(self, paths: Sequence[Path]) -> None:
-        """InputError where a topic is named, and no log has any. A description says its topics itself."""
+        """Raise InputError if a topic is given although no log has topics. A log description states its topics itself."""
         if self.topic and not any(has_topics(path) or is_description(path) for path in paths):
             raise InputError(f"--topic {quoted(self.topic)}: none of the logs is a bag", "leave it out")
 
     def opened(self, path: Path, progress: Progress) -> AnyLog:
-        """A log with the model's joint names; InputError where it has no joint of a given name."""
+        """Open a log and give its joints the model's names. Raises InputError if it lacks a joint with a given name."""
         log = open_log(path, progress, topic=self.topic)
         unknown = [quoted(name) for name in self.joints if name not in log.joint_names]
         if unknown:
@@ -67,7 +67,7 @@ class LogNaming:
 
 
 def campaign_of(paths: Sequence[Path]) -> Path | None:
-    """The campaign among the sources; InputError where anything else is given with it."""
+    """Return the campaign among the sources, or None. Raises InputError if other sources are given with a campaign."""
     if not paths:
         raise InputError("no log to calibrate from", "give a campaign's folder, a log description, or logs")
     campaigns = [path for path in paths if is_campaign(path) and not is_description(path)]
@@ -82,7 +82,7 @@ def campaign_of(paths: Sequence[Path]) -> Path | None:
 def plain_sources(
     paths: Sequence[Path], joint_names: tuple[str, ...], linear: LinearOptions, progress: Progress
 ) -> LogSources:
-    """Opened logs of a description or of plain files, which all count alike."""
+    """Open the logs of a description or of plain files, all for the same use."""
     return log_sources(paths, (), joint_names, linear, FitChoice(), LogNaming(), progress)
 
 
@@ -95,12 +95,13 @@ def log_sources(
     naming: LogNaming,
     progress: Progress,
 ) -> LogSources:
-    """Opened logs of a description or of plain files.
+    """Open the logs of a description or of plain files for a fit.
 
-    validation  logs that are held out as a whole; the others are then fitted whole, unless `choice` has a split
-    choice      of the command line, which overrides the description's
+    validation  logs that are held out as a whole; the other logs are then used fully for the fit, unless `choice` has a
+                split
+    choice      options of the command line, which take precedence over the description's
 
-    Raises InputError where a file cannot be used, or a description is given with other logs.
+    Raises InputError if a file cannot be used, or if a description is given together with other logs.
     """
     described = [path for path in paths if is_description(path)]
     if described and len(paths) + len(validation) > 1:

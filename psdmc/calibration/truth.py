@@ -1,4 +1,4 @@
-"""A calibration compared with the truth, which only a virtual robot has."""
+"""Compares a calibration with the true parameters, which are known only for a virtual (simulated) robot."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from psdmc.model.dynamics_model import DynamicsModel
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Largest errors.
+    """The largest errors of a calibration.
 
-    torque_constant      relative, of any joint
-    gravity, inertial    of any base parameter, relative to the largest of its group
-    friction             relative, by parameter name, of any joint
-    within_three_std     share of base parameters whose truth lies within three standard deviations
+    torque_constant      relative error, largest of all joints
+    gravity, inertial    largest error of a base parameter, relative to the largest parameter of its group
+    friction             relative error by parameter name, largest of all joints
+    within_three_std     share of base parameters whose true value lies within three standard deviations
     """
 
     torque_constant: float
@@ -32,7 +32,7 @@ class Comparison:
     within_three_std: float
 
     def lines(self) -> list[str]:
-        """The comparison as lines of text."""
+        """Return the comparison as lines of text."""
         worst = ", ".join(f"{name} {error:.2%}" for name, error in self.friction.items())
         return [
             f"  largest error: K_t {self.torque_constant:.4%}, gravity {self.gravity:.4%}, inertial {self.inertial:.4%}",
@@ -51,7 +51,7 @@ class Comparison:
 
 
 def compare(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> Comparison:
-    """Errors of a campaign's record; the model of the truth has the same base parameters as the record's."""
+    """Return the errors of a campaign's result. The true model must have the same base parameters."""
     assert true_model.theta_b is not None
     truth = true_model.theta_b
     std = np.array([row.std for row in record.parameters])

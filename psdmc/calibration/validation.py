@@ -1,7 +1,8 @@
-"""`psdmc.validate`: whether a calibrated model still predicts the torques of its robot; if not, what has changed.
+"""The function `psdmc.validate`: whether a calibrated model still predicts the torques of its robot, and if not, what
+changed.
 
-The regressor and friction columns of a calibration estimate what the file's prediction leaves of the measured torque. The
-chi-square of these changes, by the covariances of the file and of the new logs, tells a change of the robot from chance.
+psdmc fits the columns of a calibration to the difference between measured and predicted torque. A chi-square test of
+these changes, with the covariances of the file and of the new logs, distinguishes a change of the robot from chance.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import stats
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign
+from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
@@ -73,7 +74,7 @@ SAID = (
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """Errors, measured minus predicted torque, of some samples: their middle speed or time, mean and RMS."""
+    """Errors (measured minus predicted torque) of a group of samples: their middle speed or time, mean and RMS."""
 
     at: float
     mean: float
@@ -82,9 +83,10 @@ class Bin:
 
 @dataclass(frozen=True, slots=True)
 class JointError:
-    """How well the file predicts one joint; N m (N), and A if a torque constant is known, else NaN.
+    """How well the model file predicts the torque of one joint; N m (N), and also A if a torque constant is known,
+    else NaN.
 
-    refitted_r2        of a fit of the same columns to these logs, on their last 30 %: what a new calibration would reach
+    refitted_r2        R^2 of a fit of the same columns to these logs, on their last 30 %: what a new calibration could reach
     forward, backward  mean error in either direction
     by_speed, by_time  errors against signed speed (rad/s, m/s), and against time since a log's start (s)
     """
@@ -105,7 +107,7 @@ class JointError:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """Whether a calibrated model is still valid, with all figures.
+    """The result of `validate`: whether a calibrated model is still valid, with all figures.
 
     reasons        why the logs are not usable; empty if they are
     doubts         what a user should know before relying on the verdict
@@ -135,20 +137,20 @@ class Validation:
 
     @property
     def exit_status(self) -> int:
-        """0, 5 if the robot has changed, 6 if the logs are not usable."""
+        """Exit status of the command: 0, 5 if the robot has changed, or 6 if the logs are not usable."""
         statuses = {"still valid": 0, "log not usable": NOT_USABLE_STATUS}
         return statuses.get(self.word, CHANGED_STATUS)
 
     @property
     def grounds(self) -> tuple[tuple[str, str], ...]:
-        """(kind, sentence), in the order in which a user should read them: doubts first."""
+        """Pairs (kind, sentence) in the order in which a user should read them, doubts first."""
         found = [("doubt", text) for text in self.doubts]
         found += [("not usable", text) for text in self.reasons]
         found += [("load", self.load.words)] if self.load is not None else []
         return (*found, *(("changed", change.words) for change in self.named))
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for a user; numbers that are not finite become null."""
+        """Return the result as plain values; numbers that are not finite become null."""
         values = asdict(replace(self, quality=None)) | {"exit_status": self.exit_status}
         del values["quality"]
         for row, change in zip(values["changes"], self.changes, strict=True):
@@ -205,12 +207,12 @@ def validate(
 def opened_logs(
     found: Delivered, given: str | Path | Sequence[str | Path], naming: LogNaming, progress: Progress
 ) -> tuple[list[AnyLog], Mapping[str, float]]:
-    """The logs, and a description's torque constants."""
+    """Return the logs, and the torque constants of their log description."""
     names = found.model.joint_names
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]
     campaign = campaign_of(paths)
     if campaign is not None:
-        plain_ones = plain_logs(campaign, names)
+        plain_ones = validation_logs(campaign) or plain_logs(campaign, names)
         if plain_ones is None:
             own = [run.log for run in read_campaign(campaign, names).inertial if run.tool is None]
             if not own:

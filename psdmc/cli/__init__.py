@@ -1,4 +1,4 @@
-"""The command line: arguments, progress, tables, the error boundary. No mathematics."""
+"""The command line of psdmc: its arguments, progress, tables and error messages. No mathematics is here."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ __all__ = ["main"]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; Ctrl-C ends it without a traceback, from here on. The option --version loads nothing."""
+    """Run the command line. From here on, Ctrl-C ends psdmc without a traceback. The option --version imports no other
+    modules."""
     discard_output_if_closed()
     if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
         sys.exit(exit_status_of(_print_version))

@@ -1,4 +1,4 @@
-"""Errors of the command line: one line, a hint and an exit status; a traceback only with --debug."""
+"""Turn errors of the command line into one line, a hint and an exit status. Only --debug shows a traceback."""
 
 from __future__ import annotations
 

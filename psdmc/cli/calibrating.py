@@ -203,7 +203,7 @@ DRAFT = Path("log.toml")
 
 
 def describe_logs(given: Sequence[Path], output: Path | None, topic: str | None) -> None:
-    """Write the draft of a description of logs, the first path being a model where it is one; never over a file."""
+    """Write a draft of a log description; the first path may be a model. Never overwrite a file."""
     from psdmc.calibration.describe import describe_command
 
     output = output or DRAFT
@@ -217,7 +217,7 @@ def describe_logs(given: Sequence[Path], output: Path | None, topic: str | None)
 
 
 def require_none(flags: Sequence[str]) -> None:
-    """InputError where options of a fit are given with --describe, which fits nothing."""
+    """Raise InputError if options of a calibration are given with --describe, which calibrates nothing."""
     if flags:
         raise InputError(
             f"--describe drafts a description, and reads no {', '.join(flags)}",
@@ -226,7 +226,7 @@ def require_none(flags: Sequence[str]) -> None:
 
 
 def fit_choice(cutoff: float | None, split: str | None, friction: Sequence[str] | None) -> FitChoice:
-    """The options of the linear fit that the command line gives; InputError where one is none."""
+    """Return the options of the linear fit that the command line gives. Raise InputError if a value is wrong."""
     from psdmc.calibration.description.table_fit import FitChoice, split_of
     from psdmc.friction.terms import EXAMPLE, options_of
 
@@ -247,7 +247,7 @@ SPLIT_HINT = "write --split 0.3 for the last 30 %, or --split 0.15,40 for 15 % i
 
 
 def parsed_joint_map(given: Sequence[str] | None) -> dict[str, str]:
-    """The model's joint by the log's, from 'LOGGED=JOINT,...'."""
+    """Return the model's joint name by the log's joint name, from 'LOGGED=JOINT,...'."""
     found: dict[str, str] = {}
     for word in assignments(given):
         logged, _, joint = (part.strip() for part in word.rpartition("="))

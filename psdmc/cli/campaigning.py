@@ -1,4 +1,5 @@
-"""psdmc excite and psdmc simulate: a calibration campaign is planned, and recorded from a virtual robot."""
+"""The commands psdmc excite, which plans a calibration campaign, and psdmc simulate, which records it on a virtual
+robot."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from psdmc.calibration.motions.excite_options import (
     ExciteOptions,
     chosen_objective,
 )
-from psdmc.cli.lists import assignments
+from psdmc.cli.lists import assignments, names
 from psdmc.cli.next_step import quoted, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
@@ -30,6 +31,9 @@ def excite(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder to write")],
     one_log: Annotated[
         bool, typer.Option("--one-log", help="plan one motion and one log instead of four steps")
+    ] = False,
+    validation: Annotated[
+        bool, typer.Option("--validation", help="also plan a second motion, to test the calibration with")
     ] = False,
     load: Annotated[
         str | None,
@@ -88,6 +92,14 @@ def excite(
     collisions: Annotated[
         bool, typer.Option("--collisions/--no-collisions", help="check self-collision, or not")
     ] = True,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="NAME,...",
+            help="also write each trajectory for a controller: ros2, urscript, rsi (KUKA), franka",
+        ),
+    ] = None,
     seconds: Annotated[
         float,
         typer.Option(min=1.0, help="most CPU time of the search, s"),
@@ -141,9 +153,11 @@ def excite(
         load=None if carried is None else Load(*carried),
         repeats=repeats,
         one_log=one_log,
+        validation=validation,
         limits=limits,
         shapes=tuple(meshes or ()) if collisions else None,
         floor=floor,
+        formats=names(formats),
     )
     with steps() as progress:
         plan = excite_command(model, output, options, progress, force)
@@ -187,13 +201,14 @@ LARGEST_ARM = 100.0
 
 
 def joint_numbers(given: Sequence[str] | None, option: str) -> dict[str, float]:
-    """JOINT=NUMBER,... by joint; InputError where a word is none, or a joint is named twice."""
+    """Return the numbers by joint of an option JOINT=NUMBER,... Raise InputError if a word has another form, or a joint
+    two numbers."""
     hint = "write JOINT=NUMBER,JOINT=NUMBER"
     return {name: _number(value, option, hint) for name, value in _named(given, option, hint).items()}
 
 
 def acceleration_limits(given: Sequence[str] | None) -> tuple[float | None, dict[str, float]]:
-    """One number for all joints that have no limit, and JOINT=NUMBER."""
+    """Return the limit for all joints without one, and the limits by joint, from NUMBER and JOINT=NUMBER."""
     words = [word for value in given or () for word in ([value] if "=" in value else value.split(","))]
     alone = [word for word in words if "=" not in word]
     if len(alone) > 1:
@@ -218,7 +233,7 @@ def joint_ranges(given: Sequence[str] | None) -> dict[str, tuple[float, float]]:
 
 
 def load_numbers(given: str | None) -> tuple[float, tuple[float, float, float]] | None:
-    """MASS,X,Y,Z as kg and m; None for the word none."""
+    """Return the load MASS,X,Y,Z in kg and m, or None for the word none."""
     if given is None or given.strip() == "none":
         return None
     hint = "write MASS,X,Y,Z: kg, and m in the tip's frame; or none, where the robot logs torques"

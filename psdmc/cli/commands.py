@@ -1,4 +1,4 @@
-"""The command line: its options before the command, and its commands in the order of its help."""
+"""The options before the command, and psdmc's commands in the order in which the help lists them."""
 
 from __future__ import annotations
 

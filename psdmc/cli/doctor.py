@@ -1,4 +1,4 @@
-"""The command `psdmc doctor`: packages, programs and folders, their purpose, and how to get missing ones."""
+"""The command `psdmc doctor`: list packages, programs and folders, what needs them, and how to install missing ones."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ PROGRAMS = (
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """One part.
+    """A package, program or folder that psdmc uses.
 
-    found    its version or place; '' where it is missing
-    needed   whether psdmc cannot do without it
-    purpose  what needs it
-    remedy   how to get it where it is missing
+    found    its version or place; '' if it is missing
+    needed   whether psdmc cannot run without it
+    purpose  which parts of psdmc need it
+    remedy   how to install it
     """
 
     part: str
@@ -79,7 +79,7 @@ class Ground:
 
 
 def findings() -> tuple[Ground, ...]:
-    """All parts, what psdmc cannot do without first."""
+    """Return all packages, programs and folders that psdmc uses, those first that it cannot run without."""
     return (
         Ground("psdmc", psdmc_version(), True, "", ""),
         Ground(
@@ -95,7 +95,7 @@ def findings() -> tuple[Ground, ...]:
 
 
 def missing(parts: Sequence[Ground]) -> tuple[Ground, ...]:
-    """The parts that psdmc cannot do without and that are not there."""
+    """Return those packages and programs that psdmc cannot run without and that are not installed."""
     return tuple(part for part in parts if part.needed and not part.found)
 
 

@@ -1,4 +1,4 @@
-"""Commands that hand a model on to other programs."""
+"""Commands that write a model in a format for other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C: exit at once while modules load, an error of one line at any other time; never a traceback."""
+"""What Ctrl-C does: psdmc exits at once while modules load, and prints an error of one line at any other time."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ IMPORT_SYSTEM = "<frozen importlib."
 
 
 class Interrupted(BaseException):
-    """Ctrl-C. Not a KeyboardInterrupt, which libraries turn into statuses and messages of their own."""
+    """The exception that Ctrl-C raises. It is no KeyboardInterrupt, because libraries catch that and continue."""
 
 
 def at_once() -> contextlib.AbstractContextManager[None]:
-    """Exit where Ctrl-C comes: no work has begun, and modules that are being loaded do not pass exceptions on."""
+    """While this context is open, Ctrl-C ends the process at once. psdmc uses it while modules load, which may swallow
+    exceptions."""
     return _handled(_leave)
 
 
 def as_error() -> contextlib.AbstractContextManager[None]:
-    """Raise Interrupted where Ctrl-C comes; exit at once where it comes while a command loads a module."""
+    """While this context is open, Ctrl-C raises Interrupted, or ends the process at once if a module is being loaded."""
     return _handled(_raise_or_leave)
 
 

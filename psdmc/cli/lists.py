@@ -1,4 +1,4 @@
-"""Options that take a list: separated by commas, by repeating the option, and numbers also as several words."""
+"""Read options that take a list: separated by commas, given several times, and for numbers also as several words."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ SEVERAL_WORDS: Mapping[str, int] = {"--gravity": 3, "--tool": 6}
 
 
 def names(given: Sequence[str] | None) -> tuple[str, ...]:
-    """The names in all values of an option, in order."""
+    """Return the names in all values of an option, in order."""
     return tuple(name for value in given or () for word in value.split(",") if (name := word.strip()))
 
 
 def numbers(given: Sequence[str] | None, option: str, hint: str) -> tuple[float, ...] | None:
-    """The numbers in all values of an option, in order; None where it is not given, InputError where one is no number."""
+    """Return the numbers in all values of an option, in order; None if the option is not given. Raise InputError if a
+    word is no number."""
     if not given:
         return None
     text = ",".join(given)
@@ -27,8 +28,8 @@ def numbers(given: Sequence[str] | None, option: str, hint: str) -> tuple[float,
 
 
 def assignments(given: Sequence[str] | None) -> tuple[str, ...]:
-    """The texts NAME=VALUE in all values of an option, in order. A comma ends one only where another one follows: names of
-    robot files may have commas."""
+    """Return the texts NAME=VALUE in all values of an option, in order. A comma separates two texts only if the next
+    word has a "=", as names in robot files may contain commas."""
     found: list[str] = []
     for value in given or ():
         pending: list[str] = []
@@ -43,7 +44,8 @@ def assignments(given: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def with_numbers_joined(words: Sequence[str]) -> list[str]:
-    """A command line whose SEVERAL_WORDS have one word each: `--gravity 0 0 -9.81` becomes `--gravity 0,0,-9.81`."""
+    """Return the command line with the numbers of some options joined: `--gravity 0 0 -9.81` becomes `--gravity
+    0,0,-9.81`."""
     joined: list[str] = []
     rest = list(words)
     while rest:
@@ -71,7 +73,7 @@ def _is_numeric(word: str) -> bool:
 
 
 def parsed_torque_constants(given: list[str] | None) -> dict[str, float] | None:
-    """'joint=36.1,...' as a dict; None where nothing is given."""
+    """Return the torque constants by joint from 'joint=36.1,...'; None if nothing is given."""
     found: dict[str, float] = {}
     for word in assignments(given):
         name, _, value = word.rpartition("=")

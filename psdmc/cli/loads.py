@@ -1,4 +1,4 @@
-"""The command that finds what a robot carries."""
+"""The command `psdmc payload`, which identifies the load that a robot carries."""
 
 from __future__ import annotations
 

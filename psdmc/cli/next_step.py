@@ -1,4 +1,4 @@
-"""The line that a command ends with: what to type next."""
+"""Print the last line of a command, which shows the next command to type."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 
 def say_next(*words: object) -> None:
-    """Print `next: psdmc WORDS`, quoted for a shell, to standard error: standard output holds results alone."""
+    """Print `next: psdmc WORDS`, quoted for a shell, to standard error, because standard output has only results."""
     say_next_line(shlex.join(["psdmc", *map(str, words)]))
 
 
@@ -18,7 +18,7 @@ def quoted(word: object) -> str:
 
 
 def say_next_line(line: str) -> None:
-    """Print `next: LINE` likewise, below the results: where they cannot be written, nothing is next."""
+    """Print `next: LINE` to standard error, after the results. Print nothing if the results cannot be written."""
     sys.stdout.flush()
     with contextlib.suppress(OSError):  # whoever closed it does not want to know
         if sys.stderr is not None:
@@ -26,5 +26,5 @@ def say_next_line(line: str) -> None:
 
 
 def one_line(text: str) -> str:
-    """Untrusted text on one line of a terminal: control characters escaped."""
+    """Return untrusted text without control characters, which are escaped, so that it fits on one line of a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -10,7 +10,7 @@ from psdmc.errors import InputError
 
 
 def check_output(output: Path | None, *inputs: Path) -> None:
-    """InputError where a file cannot be written there, or where it is one of the inputs."""
+    """Raise InputError if psdmc cannot write a file at this path, or if the path is one of the inputs."""
     if output is None:
         return
     for source in inputs:
@@ -22,7 +22,7 @@ def check_output(output: Path | None, *inputs: Path) -> None:
 
 
 def check_report(report: Path | None, *others: Path) -> None:
-    """InputError as of check_output, for a report and the JSON that is written beside it; its folder may be missing."""
+    """Raise InputError if a report or its JSON file cannot be written. The folder of the report may be missing."""
     if report is None:
         return
     numbers = report.with_suffix(".json")

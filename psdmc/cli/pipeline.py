@@ -1,4 +1,4 @@
-"""The commands of the pipeline: derive, check, emit-c, build, cache. Modules of a command are imported when it runs."""
+"""The commands derive, check, emit, emit-c, build and cache. A command imports its modules when it runs."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def derive(
 
 
 def xacro_arguments(words: list[str] | None, options: list[str] | None) -> dict[str, str]:
-    """Values by argument, of the words behind the robot's file and of --xacro-arg."""
+    """Return the xacro arguments by name, from the words after the robot's file and from --xacro-arg."""
     from psdmc.robot.xacro_file import parsed_arguments
 
     return parsed_arguments([*(words or ()), *(options or ())])
@@ -197,7 +197,7 @@ def _drive_inertia(given: list[str] | None) -> bool | tuple[float, ...]:
 
 
 def say_what_a_model_is_for(path: Path, model: DynamicsModel) -> None:
-    """The command that a model is made for: C where its parameters are known, else the campaign that finds them."""
+    """Print the next command for a model: emit-c if its parameters are known, else excite, which plans a calibration."""
     unknown = model.theta_b is None
     if unknown and all(joint.type.about_z for joint in model.mechanism.joints):
         say_next("excite", path, "-o", f"{path.stem}_campaign")

@@ -1,4 +1,5 @@
-"""The current step of a command and the time it will take: on a terminal a line that changes, elsewhere one line a stage."""
+"""Show the current step of a command and the time it will take: on a terminal as a changing line, else as one line per
+stage."""
 
 from __future__ import annotations
 
@@ -27,9 +28,10 @@ FIRST_SHARE = 0.02
 
 
 class Estimate:
-    """A stage, and when it will be done.
+    """The current stage of a command, and an estimate of the time that it still takes.
 
-    A stage begins with a step of another wording (figures do not count), and where a share is smaller than the last.
+    A new stage begins if a step's text differs in more than its numbers, or if its share of the work is smaller than
+    before.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -57,7 +59,7 @@ class Estimate:
         return self._clock() - self.begun
 
     def left(self) -> float | None:
-        """s until the stage's work is done, at the pace so far; None where that cannot be said yet."""
+        """Estimate the time in s until the end of the stage from its pace so far; None if it has only begun."""
         if self._share is None or self._first is None:
             return None
         begun, first = self._first
@@ -73,7 +75,8 @@ def in_words(seconds: float) -> str:
 
 
 class Lines:
-    """Lines for where there is no terminal: one for each stage that lasts, none before PATIENCE."""
+    """Progress without a terminal: print one line for each stage that takes long, and none in the first PATIENCE
+    seconds."""
 
     def __init__(self, say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self._say, self._clock = say, clock
@@ -86,7 +89,7 @@ class Lines:
             self._estimate.tell(step)
 
     def look(self) -> None:
-        """Say the current stage where PATIENCE has passed since the last line, and it has not been said."""
+        """Print the current stage if it has not been printed yet and the last line is PATIENCE seconds old."""
         with self._lock:
             now, at = self._clock(), self._estimate
             if now - self._last < PATIENCE or at.stage == self._told:
@@ -101,7 +104,8 @@ class Lines:
 
 @contextmanager
 def steps() -> Iterator[Progress]:
-    """Progress that is told on standard error, unless the variable PSDMC_PROGRESS is 'off'."""
+    """Return a function that shows progress on standard error; it shows nothing if the variable PSDMC_PROGRESS is
+    'off'."""
     if sys.stderr is None or os.environ.get("PSDMC_PROGRESS", "").lower() == "off":
         yield lambda step: None
     elif sys.stderr.isatty():

@@ -1,4 +1,4 @@
-"""The command sample: states within a robot's limits, and its functions' values there."""
+"""The command `psdmc sample`: compute functions of a robot at random states within its limits."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from psdmc.robot.mechanism import POINT, Mechanism
 
 
 def print_model(model: DynamicsModel) -> None:
-    """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
+    """Print a summary of a model: its robot, joints, sizes, base parameters, certificate and notes."""
     found = summary(model)
     calibrated = model.calibrated
     if calibrated is not None:
@@ -65,7 +65,8 @@ def _sizes(found: Summary) -> list[str]:
 
 
 def joint_errors(robot: Mechanism, certificate: Sequence[float]) -> list[float | None]:
-    """Each joint's largest entry of the certificate (nv,); None of a joint that has no rate of its own."""
+    """Return, for each joint, the largest error in the certificate (nv,); None for a joint that has no rate, such as a
+    mimic joint."""
     of_joint = [
         [error for k, error in zip(robot.rate_joints, certificate, strict=True) if k == i]
         for i in range(len(robot))
@@ -144,7 +145,7 @@ def position_range(lower: float, upper: float, unit: str) -> str:
 
 
 def followed(found: Mechanism, i: int) -> str:
-    """Describe a joint's q: its coordinate, that of the joint it follows, or a number."""
+    """Describe on what a joint's position depends: "its own" coordinate, another joint's, or a fixed number."""
     coordinate = found.coordinates[i]
     if coordinate.leader is None:
         return f"{coordinate.offset:g}"
@@ -173,7 +174,8 @@ COSTS = ("mul", "add", "total", "div", "sincos", "fused")
 def cost_rows(
     model: DynamicsModel, lowerings: Sequence[Lowering]
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Operations of each function per lowering, for one state and for one state per lane; and what is left out and why."""
+    """Return the operations of each function by lowering, for one state and per SIMD lane; and what is left out, with
+    the reason."""
     rows = []
     functions, notes = admitted(model)
     for lowering in lowerings:
@@ -187,7 +189,7 @@ def cost_rows(
 
 
 def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
-    """Print the operations of each function per lowering."""
+    """Print the operations of each function for each lowering."""
     rows, notes = cost_rows(model, lowerings)
     for note in notes:
         print_line(f"note: {note}")
@@ -209,8 +211,8 @@ MOST_LOGS = 8
 
 
 def print_calibration(found: Calibrated) -> None:
-    """Print verdict, logs and their dates, held-out R^2 and residual of every joint, and its friction; what an older psdmc
-    did not write is left out."""
+    """Print the verdict, the logs and their dates, and R^2 on held-out data, residual and friction of every joint. Leave
+    out what an older version of psdmc did not save."""
     for line in _verdict(found.verdict):
         print(line)
     print(f"method: {one_line(found.method)}")

@@ -1,4 +1,5 @@
-"""Output of `check` and `calibrate`: comparisons, the mass matrix, the verdict, the accuracy."""
+"""Output of the commands `check` and `calibrate`: comparisons, the test of the mass matrix, the verdict and the
+accuracy."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ def megabytes(size: int) -> str:
 
 
 def print_check(rows: Sequence[CheckRow]) -> None:
-    """Print each comparison, whether it passed, and the readers of the source."""
+    """Print the result of each comparison, and which programs read the robot file."""
     from psdmc.verification.check import readers
 
     texts = []
@@ -38,7 +39,7 @@ def print_check(rows: Sequence[CheckRow]) -> None:
 
 
 def print_mass_check(mass: MassCheck | None) -> None:
-    """Whether the mass matrix is positive definite over the joint limits, or why that was not tested."""
+    """Print whether the mass matrix is positive definite within the joint limits, or why that was not tested."""
     if mass is None:
         print("mass matrix: not tested, for the base parameters are unknown")
         return
@@ -52,7 +53,7 @@ def print_verdict(verdict: Verdict) -> None:
 
 
 def print_accuracy(record: Calibrated) -> None:
-    """R^2 on held-out data per joint and step."""
+    """Print R^2 on held-out data for each joint and step of the calibration."""
     rows = []
     for joint in record.joint_names:
         both = [step.joints.get(joint) for step in record.steps]
@@ -61,7 +62,7 @@ def print_accuracy(record: Calibrated) -> None:
 
 
 def print_torque_constants(record: Calibrated) -> None:
-    """Torque constants that were found, with standard deviations; nothing where none was."""
+    """Print the torque constants that the calibration found, with standard deviations; nothing if it found none."""
     found = [row for row in record.motors if row.seen]
     rows = [
         (row.joint, f"{row.value:.6g}", f"{row.std:.2g}", f"{row.std / abs(row.value):.2%}") for row in found

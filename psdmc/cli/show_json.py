@@ -24,13 +24,14 @@ SCHEMA = 1
 
 
 def print_json(kind: str, content: dict[str, Any]) -> None:
-    """Print one document: what it is about (`kind`), then its content; ASCII, and nothing else on standard output."""
+    """Print one JSON document to standard output, in ASCII: its `kind`, which says what it describes, and the
+    content."""
     document = {"schema": SCHEMA, "kind": kind, **content}
     print(json.dumps(document, indent=2, ensure_ascii=True, allow_nan=False))
 
 
 def model_json(model: DynamicsModel) -> dict[str, Any]:
-    """All that `psdmc show` says of a model."""
+    """Return what `psdmc show --json` prints for a model."""
     found, robot = summary(model), model.mechanism
     errors = joint_errors(robot, found.certificate)
     joints = [{**joint, "error": error} for joint, error in zip(_joints(robot), errors, strict=True)]
@@ -60,7 +61,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
 
 
 def mechanism_json(robot: Mechanism) -> dict[str, Any]:
-    """All that `psdmc show` says of a robot file."""
+    """Return what `psdmc show --json` prints for a robot file."""
     refused = why_not_derived(robot)
     joints = [
         {**joint, "mass_kg": _finite(float(row[0]))}
@@ -79,7 +80,7 @@ def mechanism_json(robot: Mechanism) -> dict[str, Any]:
 
 
 def terms_json(model: DynamicsModel) -> dict[str, Any]:
-    """The monomials y, in the order of E."""
+    """Return the monomials y of the model, in the order of the columns of E."""
     return {"terms": list(term_texts(model))}
 
 
@@ -131,7 +132,8 @@ def _plain(value: Any) -> Any:
 
 
 def print_mechanism(found: Mechanism) -> None:
-    """Print a robot file's bodies, what each hangs on and follows, and whether psdmc derives it."""
+    """Print the joints of a robot file with links and parents, which joints they follow, and whether psdmc can derive
+    the robot."""
     count, own = len(found), len(leaders(found.coordinates))
     shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
     print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")
@@ -164,7 +166,7 @@ def print_mechanism(found: Mechanism) -> None:
 
 
 def why_not_derived(found: Mechanism) -> InputError | None:
-    """The error with which a derivation of the whole robot would end, if any."""
+    """Return the error that deriving the whole robot would raise, None if there is none."""
     try:
         require_derivable(found)
     except InputError as refused:

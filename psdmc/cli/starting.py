@@ -1,4 +1,4 @@
-"""The commands for a first hour: new, doctor."""
+"""The commands for new users: new, doctor."""
 
 from __future__ import annotations
 

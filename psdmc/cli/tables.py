@@ -1,4 +1,4 @@
-"""Tables and lines that commands print: columns without boxes, names whole, as wide as a terminal at most."""
+"""Tables and lines that commands print: columns without frames, names never cut, at most as wide as the terminal."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ BOLD, PLAIN = "\033[1m", "\033[0m"
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of texts, which may be untrusted.
+    """A table of texts, which may come from untrusted files.
 
-    heads  one a column
-    keys   how many columns, from the left, say what a row is about: they are repeated where a table is printed in pieces
+    heads  head of each column
+    keys   number of columns at the left that name a row; they are repeated if a table is printed in pieces
     prose  whether the last column is text that may be wrapped
-    breaks a pattern: where it may be wrapped
+    breaks a pattern: where the last column may be wrapped
     """
 
     heads: Sequence[str]
@@ -47,8 +47,8 @@ class Table:
 
 
 def print_table(table: Table) -> None:
-    """Print a table. Where its columns do not fit side by side they follow below one another, the keys in front again; no
-    cell but prose is wrapped, and none is cut."""
+    """Print a table. If it is too wide, print it in pieces below each other, each with the key columns. Only a prose
+    column is wrapped, and no cell is cut."""
     bold = sys.stdout.isatty()
     for number, piece in enumerate(pieces(table, line_width())):
         if number:
@@ -59,12 +59,12 @@ def print_table(table: Table) -> None:
 
 
 def print_note(note: str) -> None:
-    """Print a note, or what begins with "warning: ", in one line."""
+    """Print a note on one line. A text that begins with "warning: " stays as it is; others get "note: " in front."""
     print_line(note if note.startswith(WARNING) else f"note: {note}")
 
 
 def print_line(text: str) -> None:
-    """Print untrusted text on one line, which terminals wrap and other programs search."""
+    """Print untrusted text on one line, so that other programs can search it."""
     print(one_line(text))
 
 
@@ -76,7 +76,7 @@ def line_width() -> int:
 
 
 def pieces(table: Table, width: int) -> Iterator[Table]:
-    """The table, or where it is wider than `width` several narrower ones with the same keys."""
+    """Yield the table, or several narrower tables with the same key columns if it is wider than `width`."""
     widths = _widths(table)
     if table.prose:
         widths[-1] = min(widths[-1], NARROWEST_PROSE)

@@ -1,4 +1,5 @@
-"""psdmc validate and psdmc compare: is a calibrated model still valid, and how do two models differ."""
+"""The commands psdmc validate, which tests a calibrated model on new logs, and psdmc compare, which compares two
+models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands that draw: a robot in space, and figures of a calibration."""
+"""The commands that draw: `psdmc view` a robot in space, and `psdmc figures` the results of a calibration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The certificate: the finished model compared with recursive Newton-Euler, at states that derivation did not use."""
+"""The certificate of a finished model: its torques are compared with recursive Newton-Euler, at random states that the
+derivation did not use."""
 
 from __future__ import annotations
 
@@ -51,15 +52,15 @@ PROMISED = 1e-11
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """A model's errors at fresh states, relative to each joint's largest torque, and the data to judge them by.
+    """A model's torque errors at random states, relative to each joint's largest torque, and the data to judge them.
 
-    model       whose errors
+    model       the model whose errors these are
     x           (11 n,) standard parameters that were used
     states      q, qd, qdd
     reference   (states, n) torques by Newton-Euler
-    errors      (n,) of what the model computes, from E and P where it has them
-    plain       (n,) of its base parameters alone; zero where they were not computed
-    last_digit  (n,) change by the last digit of the robot's own numbers; zero where below DOUBTFUL throughout
+    errors      (n,) of the torques that the model computes, from E and P if it has them
+    plain       (n,) of torques from its base parameters alone; zero if they were not computed
+    last_digit  (n,) change by the last digit of the robot's own numbers; zero if below DOUBTFUL for all joints
     """
 
     model: DynamicsModel
@@ -72,16 +73,17 @@ class Measured:
 
 
 def certificate(model: DynamicsModel) -> Array:
-    """(n,) largest torque error per joint relative to that joint's largest torque.
+    """Compute the certificate of a model: for each joint, the largest torque error divided by the joint's largest
+    torque, (n,).
 
-    The model's own parameters are used where they are known, else random ones from the span. Raises DerivationError or
-    InternalError as `judged` does.
+    The model's own parameters are used if they are known, else random ones from the parameter span. Raises
+    DerivationError or InternalError as `judged` does.
     """
     return judged(measured(model))
 
 
 def measured(model: DynamicsModel) -> Measured:
-    """Errors of the model's torques against Newton-Euler at SAMPLES random states."""
+    """Compare the model's torques with Newton-Euler's at SAMPLES random states, and return the errors."""
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
     chain, none = model.mechanism, np.zeros(model.nv)
@@ -100,11 +102,11 @@ def measured(model: DynamicsModel) -> Measured:
 
 
 def judged(found: Measured) -> Array:
-    """(n,) the certificate.
+    """Return the certificate (n,) if the measured errors are small enough; otherwise raise an error.
 
-    Where an error exceeds WORST_ALLOWED: DerivationError if the robot's own numbers are the cause (they overflow, or a
-    joint's torque is a small difference of large contributions), else InternalError. DerivationError where a robot that
-    is sensitive to its last digits exceeds PROMISED.
+    If an error exceeds WORST_ALLOWED, this is a DerivationError if the robot's own numbers are the cause (they
+    overflow, or a joint's torque is a small difference of large contributions), else an InternalError. Raises
+    DerivationError also if a robot that is sensitive to the last digits of its numbers exceeds PROMISED.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         worst = np.maximum(found.errors, found.plain)
@@ -185,8 +187,8 @@ def _contributions(chain: Mechanism, x: Array, states: States) -> Array:
 
 
 def relative_errors(values: Array, reference: Array) -> Array:
-    """(n,) largest difference per column relative to the column's largest magnitude; absolute where that is
-    zero."""
+    """(n,) for each column, the largest difference relative to the column's largest magnitude. The difference is
+    absolute if that magnitude is zero."""
     largest = np.abs(reference).max(axis=0)
     errors: Array = np.abs(values - reference).max(axis=0) / np.where(largest > 0, largest, 1.0)
     return errors
@@ -220,7 +222,7 @@ linear in it."""
 
 
 class Numbers(NamedTuple):
-    """A chain's numbers, all in one precision.
+    """All numbers of a robot, in one floating-point precision.
 
     places, link_frames   n rotations (3, 3) and translations (3,) each, m: joint frames in their parents', and link
                           frames in joint frames
@@ -233,8 +235,11 @@ class Numbers(NamedTuple):
 
 
 def last_digit_effect(chain: Mechanism, x: Array, states: States) -> Array:
-    """Largest change (n,) of each joint's torque if all numbers of the robot change by LAST, up or down at random. It
-    is relative to that joint's largest torque, or absolute if that is zero."""
+    """Compute how sensitive each joint's torque is to rounding of the robot's numbers, (n,).
+
+    This is the largest change of the torque if all numbers change by LAST, up or down at random. It is relative to that
+    joint's largest torque, or absolute if that is zero.
+    """
     rng = np.random.default_rng(DIGIT_SEED)
     numbers = _numbers(chain, x, _as_it_is, np.dtype(np.float64))
     torques = _torques(chain, numbers, states)
@@ -247,7 +252,8 @@ def last_digit_effect(chain: Mechanism, x: Array, states: States) -> Array:
 
 
 def extended_torques(chain: Mechanism, x: Array, states: States) -> Array:
-    """(states, n) N m or N: Newton-Euler in extended precision, rotations orthonormal to all of its digits."""
+    """Compute torques (states, n), N m or N, by Newton-Euler in extended precision. The rotations are orthonormal to
+    all digits of this precision."""
     long = np.dtype(np.longdouble)
     numbers = _numbers(chain, x, orthonormal, long)
     vectors = [[vector.astype(long) for vector in one] for one in states]

@@ -1,4 +1,4 @@
-"""Derivation of a MODEL from a robot, from top to bottom."""
+"""The derivation of a MODEL (inverse dynamics as data) from a robot: all steps in their order."""
 
 from __future__ import annotations
 
@@ -59,16 +59,17 @@ def derive_model(
     provenance: Mapping[str, Any] | None = None,
     memory: int | None = None,
 ) -> DynamicsModel:
-    """The chain's dynamics as E, P and theta_b, certified.
+    """Derive the robot's dynamics as E, P and theta_b, and certify them.
 
-    expand      False leaves E and P out: base parameters alone, for robots of any size; None: for trees, and for joints of
-                several coordinates
+    expand      False: without E and P, that is, base parameters alone, for robots of any size. None: the same for trees and
+                for joints of several coordinates
     progress    called with the name of each step as it begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
-    memory      bytes that the expansion may take; default: most of what the machine has free
-    Raises InputError where a joint has no coordinate of its own; DerivationError where the expansion would take too much
-    memory or time, the robot has more joints than LARGEST_CHAIN, its numbers are beyond double precision, or no parameter
-    has any effect.
+    memory      bytes that the expansion may take; default: most of the machine's free memory
+
+    Raises InputError if a joint has no coordinate of its own. Raises DerivationError if the expansion would take too
+    much memory or time, if the robot has more joints than LARGEST_CHAIN, if its numbers exceed double precision, or if
+    no parameter has any effect.
     """
     tell = progress or silent
     require_derivable(chain)
@@ -142,7 +143,7 @@ def _refuse_absurd(chain: Mechanism) -> None:
 
 
 def tolerances(precision: Precision, reduction: Reduction) -> dict[str, float]:
-    """The tolerances that this derivation used, by name, for the model's provenance."""
+    """Return the tolerances that this derivation used, by name, for the model's provenance."""
     return {
         "coefficient": precision.zero,
         "value_noise": precision.noise,
@@ -156,7 +157,8 @@ def _equation_noise(reduction: Reduction) -> float:
 
 
 def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
-    """B (l, 11 n) in SI: base parameters from standard parameters, which are the span's leading rows."""
+    """Return the matrix B (l, 11 n) in SI units, which computes base parameters from standard parameters. Only the
+    leading rows of the span have columns that are not zero."""
     units = parameter_units(robot.types, robot.unit)[robot.leads]
     echelon = reduction.echelon * units[reduction.pivots][:, None] / units
     B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.types)))
@@ -166,7 +168,7 @@ def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
 
 
 def base_parameters(B: Array, chain: Mechanism) -> Array | None:
-    """theta_b = B x; None where a parameter that it depends on is unknown."""
+    """Compute theta_b = B x. The result is None if theta_b depends on a parameter that is unknown."""
     x = chain.parameters.reshape(-1)
     unknown = np.isnan(x)
     if B[:, unknown].any():

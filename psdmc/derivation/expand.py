@@ -1,4 +1,4 @@
-"""E, P and the base parameters' equations of a chain, in coefficient space."""
+"""The expansion of a robot's inverse dynamics: the matrices E and P, computed from coefficients of polynomials."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ VALUE_NOISE = 1e-14
 
 
 class Precision(NamedTuple):
-    """Limits of rounding, lengths in the robot's unit.
+    """The rounding errors that the expansion assumes, with lengths in the robot's unit.
 
-    zero   what an exact zero may become
+    zero   the largest coefficient that counts as an exact zero
     noise  uncertainty of a coefficient of size one, relative for larger ones
     """
 
@@ -68,7 +68,8 @@ Some coefficients of 1e-18 that are rounding are kept: they add monomials, but c
 def expand(
     scaled: Scaled, reduction: Reduction, precision: Precision, progress: Progress, memory: int | None = None
 ) -> Expansion:
-    """E and P; DerivationError where they do not fit into `memory` bytes (default: most of the free memory)."""
+    """Compute E and P. Raises DerivationError if they do not fit into `memory` bytes (default: most of the free
+    memory)."""
     types = scaled.types
     if precision is not IN_DOUBLE:
         scaled = extended(scaled)
@@ -96,14 +97,14 @@ def expand(
 
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
-    """The precision that a chain needs: double where every coefficient is either rounding or far larger."""
+    """Return the precision that a robot needs. Double is enough if every coefficient is either rounding or far larger."""
     if is_of_many_scales(scaled) and can_be_finest():
         return FINEST
     return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
 
 
 def can_be_finest() -> bool:
-    """Whether long doubles have the digits for FINEST here."""
+    """Whether the machine's long doubles have enough digits for the precision FINEST."""
     return bool(np.finfo(np.longdouble).eps < FINEST.zero)
 
 
@@ -125,7 +126,8 @@ def assembled(
     unit: float,
     value_noise: float = VALUE_NOISE,
 ) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
-    """E and P in SI from torque terms (monomial: key, column: base parameter) in the robot's unit of length.
+    """Return E and P in SI units from torque terms (monomial: key, column: base parameter) in the robot's unit of
+    length.
 
     units        (l,) one unit of each base parameter in SI
     value_noise  uncertainty of a coefficient of size one, relative for larger ones
@@ -155,10 +157,10 @@ def gravity_terms(
     monomials: Monomials,
     tolerance: float,
 ) -> Terms:
-    """Torque terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
+    """Compute the gravity torques' terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
 
-    The potential of a unit mass at r in a link's frame is direction . r + height; both are carried outward from joint
-    to joint. The coefficient of a link's mass is the height; those of mx, my, mz are the direction.
+    The potential of a unit mass at r in a link's frame is direction . r + height. Both are computed outward from joint
+    to joint. The height is the coefficient of a link's mass, and the direction that of its first moments mx, my, mz.
     """
     parts: list[Terms] = []
     at_base: tuple[Vector, Array] = (

@@ -1,7 +1,7 @@
-"""A chain's geometry in extended precision, with rotations that are orthonormal to all its digits.
+"""A robot's geometry in extended precision, with rotations that are orthonormal to all digits of this precision.
 
-A file's rotation is orthonormal to 1e-16 only. Terms that cancel because of orthonormality would leave 1e-16 of
-themselves, which is also the size of the effect of axes that are 1e-8 rad from parallel.
+The rotations in a file are orthonormal to 1e-16 only. Terms that should cancel then leave a remainder of relative size
+1e-16. The effect of axes that are 1e-8 rad from parallel has the same size and would be hidden.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class LongPlacement(NamedTuple):
 
 
 def orthonormal(rotation: NDArray[np.float64]) -> Long:
-    """The rotation nearest to a (3, 3) one of doubles, in extended precision. Where it maps an axis to an axis, its
-    zeros stay exact."""
+    """Return the rotation nearest to a (3, 3) rotation of doubles, in extended precision. If the rotation maps a
+    coordinate axis to a coordinate axis, its zeros stay exact."""
     near = rotation.astype(np.longdouble)
     three = 3.0 * np.eye(3, dtype=np.longdouble)
     for _ in range(STEPS):
@@ -91,8 +91,12 @@ def has_small_entries(robot: Scaled) -> bool:
 
 
 def is_of_many_scales(robot: Scaled) -> bool:
-    """Check if all lengths outward of some joint are small but not all zero, or all lengths are small compared with
-    sliding joints. An example is a finger of millimetres on an arm of metres."""
+    """Whether some joint only moves lengths that are tiny compared with the robot, such as a finger of millimetres on
+    an arm of metres.
+
+    All lengths after this joint must be small, but not all zero. True also if all lengths are small compared with the
+    motion of sliding joints.
+    """
     if robot.unit < MANY_SCALES and any(joint.length_order for joint in robot.types):
         return True
     reach = [_length(place.translation) for place in robot.link_frames]

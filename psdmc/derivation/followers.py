@@ -1,10 +1,13 @@
-"""Base parameters of robots whose joints follow others: fewer than those of the same tree with every joint free.
+"""Base parameters of robots with mimic joints (followers), which have fewer of them than the same robot without
+mimicry.
 
-All torques of the free tree depend on its base parameters alone, and so do their sums onto the leaders. Which of these
-parameters the sums tell apart is found from sampled rows, one column for each: two fingers that close together show the sum
-of their masses. Rows are doubles where the robot is of one scale and no column is nearly dependent, else of extended
-precision, each coordinate's relative to its own torque, and all columns are gone through together, the largest first: what
-sampling leaves of a column is its own rounding, which is much beside an effect of 1e-14.
+All torques of the robot without mimicry depend on its base parameters alone. A mimic joint's torque is added to its
+leader's, so some of these parameters then appear only in sums: two fingers that close together show the sum of their
+masses. Which parameters stay separate is found from sampled rows of the regressor, one column per parameter.
+
+Rows are doubles if the robot is of one scale and no column is nearly dependent. Otherwise, they are in extended
+precision, each coordinate's rows relative to its own torque. All columns are then eliminated together, the largest
+first: the rest of a column after elimination is its own rounding, which can hide an effect of 1e-14.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ STATES = 32
 
 
 def reduction_for(scaled: Scaled) -> Reduction:
-    """The base parameters within the span's columns, of robots with and without followers."""
+    """Return the base parameters within the span's columns, for robots with and without mimic joints."""
     return _of_followers(scaled) if any_follows(scaled.frames) else reduction_of(scaled)
 
 
@@ -77,10 +80,12 @@ SAMPLED_JOINTS = 10
 
 
 def reduction_of(scaled: Scaled) -> Reduction:
-    """The base parameters. They are found from sampled rows of doubles where joints have one coordinate each, rows are few
-    and of one scale, angles and
-    lengths are not so small that their squares are rounding, and no column is nearly dependent; else link by link in
-    extended precision."""
+    """Return the base parameters of a robot without mimic joints.
+
+    They are found from sampled rows of doubles for short robots whose joints have one coordinate each, if the robot is
+    of one scale, the squares of its angles and lengths are larger than rounding, and no column is nearly dependent.
+    Otherwise, they are found link by link in extended precision.
+    """
     if (
         is_plain(scaled)
         and len(scaled.types) <= SAMPLED_JOINTS
@@ -93,20 +98,20 @@ def reduction_of(scaled: Scaled) -> Reduction:
 
 
 def is_plain(scaled: Scaled) -> bool:
-    """Whether the robot is of one scale and has no angle or length whose square is rounding."""
+    """Whether the robot is of one scale, and no angle or length is so small that its square is lost in rounding."""
     return not is_of_many_scales(scaled) and not has_small_entries(scaled)
 
 
 def sampled_reduction(scaled: Scaled) -> Reduction:
-    """Find the base parameters of the expanded path from samples, within the span's columns."""
+    """Return the base parameters, found from samples of the regressor in double precision, within the span's columns."""
     n = len(scaled.types)
     rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
     return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
-    """(count, nv, 11 n) regressor at random states, in the robot's unit and the precision of its vertical; gravity of
-    strength one."""
+    """(count, nv, 11 n) the regressor at random states, with gravity of strength one. Lengths are in the robot's unit,
+    and the floating-point precision is that of `scaled.up`."""
     n, nv = len(scaled.types), first_rates(scaled.frames)[-1]
     rng, real = np.random.default_rng(SEED), np.asarray(scaled.up).dtype
     drawn, qd, qdd = (

@@ -1,8 +1,8 @@
-"""E, P and B of a user's own torque function, by sampling alone: the general path of PSDM-2021.
+"""Derivation of E, P and B from a user's own torque function, by sampling alone: the general method of PSDM-2021.
 
 The function's torques must be the inverse dynamics of a serial chain, linear in its parameters: gravity of first order
 in every joint, acceleration and velocity terms of second. Each term is sampled on the tensor grid of all joints and
-interpolated axis by axis, so that the cost grows as 5^n: for a few joints.
+interpolated axis by axis. The cost grows as 5^n, so the method suits robots of a few joints.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ PROBES = 32
 class SampledModel:
     """A torque function as monomials times constants: tau[i] = y(state) @ P[i] @ B @ X.
 
-    E            (5n, p) uint8   as in DynamicsModel; monomials without rates carry gravity_scale
+    E            (5n, p) uint8   as in DynamicsModel; monomials without rates contain gravity_scale
     P            n x (p, l)      reduction matrices
     B            (l, k)          base parameters from the function's own parameters
     parameters   k               their names
-    pivots       (l,)            index of the parameter that each base parameter leads with
-    certificate  (n,)            largest error against the function at fresh states, relative to the joint's largest torque
+    pivots       (l,)            index of the first parameter of each base parameter, which has the factor one
+    certificate  (n,)            largest error against the function at random states, relative to the joint's largest torque
     """
 
     E: NDArray[np.uint8]
@@ -55,7 +55,7 @@ class SampledModel:
     certificate: Array
 
     def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float = 1.0) -> Array:
-        """tau (states, n) from (states, n) arrays and parameters (k,)."""
+        """Compute the torques (states, n) from q, qd and qdd, (states, n) each, and parameters (k,)."""
         n = len(self.P)
         rows = np.concatenate([q.T, np.sin(q).T, np.cos(q).T, qd.T, qdd.T])
         strength = np.where(self.E[RowBlocks.of(n).rates].any(axis=0), 1.0, gravity_scale)
@@ -82,8 +82,8 @@ def derive_from_callable(
     length           m, the robot's size: prismatic joints are sampled at -length, 0 and length
     memory           bytes that the grids may take; default: most of what the machine has free
 
-    Raises InputError where f returns something else or is no such function, DerivationError where the grids exceed the
-    memory.
+    Raises InputError if f returns another shape or is not the inverse dynamics of a serial chain. Raises
+    DerivationError if the grids exceed the memory.
     """
     unknown = [kind for kind in kinds if kind not in JOINT_TYPES]
     if unknown:
@@ -113,12 +113,12 @@ class _Sampler:
     length: float
 
     def grid(self) -> Array:
-        """(cells, n) tensor grid of joint positions, the first joint slowest."""
+        """(cells, n) all combinations of the joints' sampled positions; the first joint varies slowest."""
         axes = [nodes(joint) * self.length**joint.length_order for joint in self.monomials.types]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.monomials.n)
 
     def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float) -> Array:
-        """(m, n) from (m, n) states, whether or not f is vectorised."""
+        """(m, n) torques of the user's function at (m, n) states, whether or not the function is vectorised."""
         if self.vectorised:
             values = np.asarray(self.f(q, qd, qdd, X, gravity_scale), dtype=np.float64)
         else:
@@ -132,7 +132,7 @@ class _Sampler:
         return values
 
     def per_parameter(self, qd: Array, qdd: Array, gravity_scale: float) -> Array:
-        """(parameters, n, cells) torques on the grid at fixed rates, for each parameter alone."""
+        """Sample the torques on the grid at fixed rates, for each parameter alone: (parameters, n, cells)."""
         q = self.grid()
         speeds, accelerations = np.broadcast_to(qd, q.shape), np.broadcast_to(qdd, q.shape)
         return np.stack(
@@ -143,7 +143,7 @@ class _Sampler:
         )
 
     def terms(self, values: Array, rate: int) -> Terms:
-        """Torque terms from per-parameter values on the grid."""
+        """Return the torque terms that give these values on the grid, for each parameter."""
         types = self.monomials.types
         joints, sizes = range(len(types)), quadratic_sizes(types)
         batch = values.reshape(-1, values.shape[-1])

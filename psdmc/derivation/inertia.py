@@ -1,9 +1,9 @@
-"""Coefficients of the mass matrix, for each standard parameter separately.
+"""Coefficients of the mass matrix as polynomials in the joint variables, for each standard parameter separately.
 
 The part of M_ij that one parameter of link k contributes (i, then j, on the path from the base to that link) is a
 bilinear form in the twists that the two joints give to that link's frame. Joint i's twist is a polynomial of degree one
-in the q of each joint after i on the path. The product therefore has degree one in those up to j, where joint j's twist
-is constant, and degree two in those after j: only the latter need a grid.
+in the q of each joint after i on the path. The product has degree one in the q of joints up to j, because joint j's
+twist does not depend on them, and degree two in the q of joints after j. Only the latter need a grid.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FormalAngle:
-    """An angle at formal points: the algorithms of psdmc.dynamics use it as a scalar, and ask for its sine and cosine
-    only."""
+    """An angle that is given by values for its sine and cosine at several formal points. These values need not be those
+    of a real angle. The algorithms of psdmc.dynamics use it as a scalar."""
 
     sine: Array
     cosine: Array
@@ -58,21 +58,25 @@ class Moving(NamedTuple):
 
 
 def moving(frame: Frame) -> Moving:
-    """A joint at formal points of its coordinate, one for each factor of degree one."""
+    """Return a joint with its state at the formal points of its coordinate, one point for each factor of degree one."""
     q = formal_coordinate(frame.joint.basis)
     state = JointState(joint_angle(frame, q).turn(), joint_offset(frame, q))
     return Moving(frame.joint.basis, frame, state)
 
 
 def formal_coordinate(basis: Basis) -> Scalar:
-    """A coordinate at as many formal points as there are factors of degree one. At the first point all factors but the
-    constant are zero, at each other point one of them is one, so that coefficients follow by exact differences."""
+    """Return a coordinate at several formal points, one for each factor of degree one (such as 1, sin q, cos q).
+
+    At the first point all factors except the constant are zero. At each other point, exactly one of them is one.
+    Differences of values at these points are then exact coefficients.
+    """
     q, sine, cosine = np.array(basis.exponents[: basis.linear], dtype=np.float64).T
     return FormalAngle(sine, cosine) if basis.has_sincos else q
 
 
 def coefficients(at_points: Scalar, count: int, basis: Basis) -> Array:
-    """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * linear,)."""
+    """Compute coefficients of degree one from values at the formal points; the axis of the new joint is the last one.
+    Shape (count * linear,)."""
     found = np.asarray(at_points)
     values = np.broadcast_to(
         np.asarray(found, dtype=np.result_type(found, np.float64)), (count, basis.linear)
@@ -81,18 +85,18 @@ def coefficients(at_points: Scalar, count: int, basis: Basis) -> Array:
 
 
 def column(v: Vector) -> Vector:
-    """Coefficient vectors with an axis appended for the next joint."""
+    """Return coefficient vectors with a further axis for the next joint."""
     return (v[0][:, None], v[1][:, None], v[2][:, None])
 
 
 def expanded(v: Vector, count: int, basis: Basis) -> Vector:
-    """Coefficients of a vector's three entries, given at `count` formal points, in the basis."""
+    """Return the coefficients of a vector's three entries in the joint's basis, from the entries at the formal points."""
     x, y, z = (coefficients(entry, count, basis) for entry in v)
     return (x, y, z)
 
 
 def carried_twist(joint: Moving, twist: Twist) -> Twist:
-    """A twist's coefficients, carried across one more joint."""
+    """Return the coefficients of a twist in the frame of the next joint."""
     linear, angular = twist
     moved = carried(joint.frame, joint.state, (column(linear), column(angular)))
     count = len(linear[0])
@@ -106,10 +110,10 @@ def _as_arrays(v: Vector) -> Vector:
 def mass_matrix_terms(
     frames: Sequence[Frame], link_frames: Sequence[Placed], monomials: Monomials, tolerance: float
 ) -> dict[tuple[int, int], Terms]:
-    """M_ij, i on the path to j, as terms in codes and standard parameters (11 per link); `row` is the link. Other
-    entries with i < j are zero.
+    """Compute the terms of M_ij, for i on the path to j, in codes and standard parameters (11 per link); `row` is the
+    link. Other entries with i < j are zero.
 
-    Lengths in a unit near the robot's size: `tolerance` is absolute, and decides which coefficients are zero.
+    Lengths are in a unit near the robot's size. Coefficients below the absolute `tolerance` are zero.
     """
     paths = [path_to(frames, k) for k in range(len(frames))]
     pairs = sorted((i, j) for j, path in enumerate(paths) for i in path)
@@ -169,8 +173,8 @@ def _interpolated(products: Array, inner: Sequence[JointType]) -> Array:
 
 
 def mass_features(first: Array, second: Array) -> Array:
-    """(10, ...): for each standard parameter of a body, the part of the mass matrix by two twists for a parameter of
-    one.
+    """(10, ...): for each standard parameter of a body, its factor in the entry of the mass matrix that belongs to two
+    twists.
 
     first, second   (6, ...) linear velocity of the frame's origin and angular velocity; broadcast
     """

@@ -1,9 +1,9 @@
 """Products of polynomials in the joint variables: evaluated on a tensor grid, multiplied, interpolated axis by axis.
 
-A joint type's basis (robot/joints/basis.py) has the factors of which its polynomials of degree one are sums, and those
-of their products: {1, s, c} and {1, s, c, s c, c^2} (s = sin q, c = cos q), or {1, q} and {1, q, q^2}. The search space
-is the tensor product over the joints, so that what PSDM-2021 solves as one dense system is a Kronecker product: one
-small inverse along each axis.
+Each joint type has a basis (robot/joints/basis.py). It contains the factors of polynomials of degree one, such as {1,
+s, c} or {1, q}, and those of their products, such as {1, s, c, s c, c^2} or {1, q, q^2}, with s = sin q and c = cos q.
+The search space is the tensor product over the joints. PSDM-2021 solves one dense system for the coefficients. Here
+this system is a Kronecker product, so one small inverse along each axis is enough.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ LAST_DIGIT = 5e-16
 
 
 def linear_sizes(joints: Iterable[JointType]) -> list[int]:
-    """Number of factors of degree one at most, for each joint."""
+    """For each joint, the number of basis factors for polynomials of degree one."""
     return [joint.basis.linear for joint in joints]
 
 
 def quadratic_sizes(joints: Iterable[JointType]) -> list[int]:
-    """Number of factors of degree two at most, for each joint."""
+    """For each joint, the number of basis factors for polynomials of degree two."""
     return [joint.basis.size for joint in joints]
 
 
 def nodes(joint: JointType) -> Array:
-    """The values of q at which products are sampled."""
+    """The values of q at which products are sampled, for a joint with this basis."""
     return np.array(joint.basis.nodes)
 
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
-    """(len(q), size) values of the joint's factors at each q."""
+    """Evaluate the factors of degree two of a joint's basis at each q: (len(q), size)."""
     rows = (q, sine(q), cosine(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
 
@@ -57,24 +57,24 @@ def _product(powers: Sequence[int], rows: Sequence[Array]) -> Array:
 
 @cache
 def evaluation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(size, linear) matrix: coefficients of degree one to values at the nodes."""
+    """(size, linear) matrix that computes the values at the nodes from coefficients of degree one."""
     return quadratic_basis(joint, nodes(joint).astype(precision))[:, : joint.basis.linear]
 
 
 @cache
 def interpolation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(size, size) matrix: values at the nodes to coefficients of degree two."""
+    """(size, size) matrix that computes coefficients of degree two from the values at the nodes."""
     found = inverse(quadratic_basis(joint, nodes(joint).astype(np.longdouble))).astype(precision)
     return np.where(np.abs(found) < LAST_DIGIT, 0.0, found) if precision == DOUBLE else found
 
 
 def along_axes(matrices: Sequence[Array], values: Array) -> Array:
-    """Apply one matrix along each axis but the last.
+    """Multiply an array by one matrix along each of its axes except the last.
 
     values   (d_1 ... d_m, batch) as any shape with that many entries in that order
     returns  (batch, e_1 ... e_m) flattened to (batch, e_1 * ... * e_m), matrices[a] being (e_a, d_a)
 
-    Each step takes the first axis off and puts its result last. Half of the matrices' entries are zero: they add nothing.
+    Each step takes the first axis and puts its result last. Half of the matrices' entries are zero and are skipped.
     """
     for matrix in matrices:
         rows = values.reshape(matrix.shape[1], -1)

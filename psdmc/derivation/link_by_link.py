@@ -1,7 +1,7 @@
-"""Base parameters link by link, in extended precision: for long chains, and for axes that are nearly parallel.
+"""Base parameters found link by link in extended precision, for long chains and for axes that are nearly parallel.
 
-The rows that all torques depend on hold nothing but rank, joint by joint (dynamics/torque_rows.py): every decision is made
-there.
+They are found from rows that all torques are combinations of. dynamics/torque_rows.py computes these rows joint by
+joint, and decides there which effects are larger than rounding.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ column of a long chain has a length of a thousand, and its rounding grows alike.
 
 
 def reduction_link_by_link(robot: Scaled) -> Reduction:
-    """The base parameters within the span's columns, by graded passes over rows that span the row space and nothing
-    more."""
+    """Return the base parameters within the span's columns, by eliminating columns from rows that span the row space of
+    all torques."""
     long = extended(robot)
     rows = torque_rows(long.frames, long.link_frames, long.up)
     links = links_together(robot)[robot.leads // PARAMETERS_PER_LINK]
@@ -36,11 +36,11 @@ def reduction_link_by_link(robot: Scaled) -> Reduction:
 
 
 def links_together(robot: Scaled) -> NDArray[np.int64]:
-    """(n,) for each link the first of those whose columns are gone through together with its own.
+    """(n,) for each link, the first of the links whose columns are eliminated together with its own.
 
-    Whatever a link does to the joints before it, the link that carries it could do: where that one has all its parameters,
-    nothing is left for later links there, and links are gone through one by one. Links that hang on one with fewer
-    parameters are each other's equal: what little one of them has alone, another may have in full.
+    Any effect of a link on the joints before it could also come from the link that carries it. If that carrying link
+    has all its parameters, later links add nothing there, and links are eliminated one by one. Links attached to a link
+    with fewer parameters are treated alike: one of them may have in full what another has only a small part of.
     """
     parents = [frame.parent for frame in robot.frames]
     own = robot.leads[robot.leads % PARAMETERS_PER_LINK != DRIVE] // PARAMETERS_PER_LINK
@@ -53,14 +53,15 @@ def links_together(robot: Scaled) -> NDArray[np.int64]:
 
 
 def reduced_to_digits(rows: Long, links: NDArray[np.int64]) -> Reduction:
-    """The base parameters from rows, with residuals compared as they are and not relative to their columns.
+    """Return the base parameters from rows. Columns are compared by their remaining absolute size, not relative to
+    their original size.
 
-    A small column then becomes a pivot late: earlier, its torque would be a large parameter times small numbers, which
-    double precision holds with fewer digits. A link's columns come before the next link's, small or not; otherwise a
-    parameter of a heavy link could be combined into one of a light link farther out, whose torque would be a small
-    difference of large numbers.
+    A small column then becomes a pivot late. If it were a pivot earlier, its torque would be a large parameter times
+    small numbers, which loses digits. All columns of a link, small or not, come before those of the next link.
+    Otherwise, a parameter of a heavy link could be combined into one of a light link farther out, whose torque would
+    then be a small difference of large numbers.
 
-    links  (k,) which link each column belongs to
+    links  (k,) the link to which each column belongs
     """
     work = np.array(rows, order="C")
     last = EXACT * max(1.0, float(lengths(work).max(initial=0.0)))

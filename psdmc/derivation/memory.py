@@ -1,4 +1,4 @@
-"""Memory and time of an expansion, estimated before it is made, and the refusals that follow."""
+"""Estimates of an expansion's memory and time before it is made, and the errors if it would take too much."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ HEADROOM = 0.75
 
 
 def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tuple[tuple[JointType, ...], ...]:
-    """Joint types on the way from the base to each body that carries no other; of a serial chain, all of them once."""
+    """Return the joint types on the path from the base to each leaf body. A serial chain has one such path."""
     ways: list[tuple[JointType, ...]] = []
     for joint, parent in zip(types, parents, strict=True):
         ways.append((*(ways[parent] if parent != BASE else ()), joint))
@@ -48,7 +48,7 @@ def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tupl
 
 
 def refuse_uncountable(types: Sequence[JointType]) -> None:
-    """Raise DerivationError where the monomials cannot be numbered in 64 bits."""
+    """Raise DerivationError if there are too many monomials to be numbered in 64 bits."""
     monomials = Monomials(tuple(types))
     if len(monomials.rate_exponents()) * monomials.codes < 2**63:
         return
@@ -59,7 +59,8 @@ def refuse_uncountable(types: Sequence[JointType]) -> None:
 
 
 def largest_monomial_count(types: Sequence[JointType]) -> int:
-    """The p of a chain of these joints with axes in general position; no such chain has more.
+    """Return the number of monomials p of a chain of these joints with axes in general position. No other chain of
+    these joints has more.
 
     M_0j has degree one in q_1 ... q_j and two in the following joints; every rate product qd_j qd_k (k >= j) has at
     most these degrees.
@@ -77,7 +78,7 @@ def largest_monomial_count(types: Sequence[JointType]) -> int:
 
 
 def grid_bytes(types: Sequence[JointType]) -> int:
-    """Bytes of the largest grid of mass-matrix features."""
+    """Estimate the bytes of the largest grid on which the mass matrix is sampled."""
     size = 10 * 8 * _GRID_COPIES
     for points in quadratic_sizes(types[1:]):
         size *= points
@@ -87,7 +88,8 @@ def grid_bytes(types: Sequence[JointType]) -> int:
 def velocity_bytes(
     mass_matrix: Mapping[tuple[int, int], Terms], monomials: Monomials, carried: Sequence[Sequence[int]]
 ) -> tuple[int, int]:
-    """(terms, bytes) of the velocity terms before equal ones are summed; `carried` as in velocity_terms."""
+    """Count the velocity terms before equal ones are summed, and estimate their memory: (terms, bytes). `carried` is as
+    in velocity_terms."""
     count = 0
     for (a, b), terms in mass_matrix.items():
         slopes = sum(slope_count(terms, monomials, d) for d in carried[a])
@@ -96,7 +98,7 @@ def velocity_bytes(
 
 
 def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
-    """Raise DerivationError, naming p and the memory, where more is needed than there is."""
+    """Raise DerivationError if the expansion needs more memory than there is. The message names p and the memory."""
     if needed <= available:
         return
     raise DerivationError(
@@ -107,8 +109,11 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
 
 
 def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None:
-    """Raise DerivationError if an expansion of n joints would take more than about a minute. It has too many velocity
-    terms or, while their number is unknown (0), too large a grid towards one of the robot's ends."""
+    """Raise DerivationError if an expansion of n joints would take more than about a minute.
+
+    That is so if it has too many velocity terms or, while their number is unknown (0), too large a grid along one of
+    the paths from the base to the robot's ends.
+    """
     grid = max(int(np.prod(quadratic_sizes(way[1:]), dtype=float)) for way in ways)
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
         return
@@ -122,8 +127,8 @@ def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None
 
 
 def available_memory() -> int:
-    """Bytes that an expansion may plan for: most of the machine's free memory, or of what is left of its control
-    group's."""
+    """Return the bytes that an expansion may use: most of the machine's free memory. If the process has a memory limit
+    (control group), it is most of what the limit leaves, if that is less."""
     return int(HEADROOM * min(_machine_memory(), _group_memory()))
 
 

@@ -1,10 +1,12 @@
-"""The monomials y_j: how they are numbered, in which order they stand, and their exponents E.
+"""The monomials y_j: how they are numbered, their order, and their exponents, the matrix E.
 
-A monomial is a product of one factor per joint, which depends on that joint's q, and a rate factor: |g|; qdd_j;
-qd_j^2; qd_j qd_k. The joints' factors are written as a code: a number with one digit per joint, radix 5, the first
-joint's digit the highest. The basis of the joint's type says what a digit stands for: 1, s, c, s c, c^2 where it
-turns, 1, q, q^2 where it slides. A monomial's key is the rate's number times 5^n plus the code; E's columns stand in the
-order of keys: gravity, acceleration, centrifugal, Coriolis; within each by joint (pair), then by code.
+A monomial is a product of one factor per joint, which depends on that joint's q, and a rate factor: |g|; qdd_j; qd_j^2;
+qd_j qd_k. The joints' factors are written as a code, a number in radix 5 with one digit per joint, the first joint's
+digit the highest. A digit stands for a factor in the basis of the joint's type: 1, s, c, s c, c^2 for a revolute joint,
+1, q, q^2 for a prismatic one.
+
+A monomial's key is the number of the rate factor times 5^n plus the code. The columns of E are in the order of keys:
+gravity, acceleration, centrifugal, Coriolis; within each by joint (pair), then by code.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ class Monomials:
         return int(RADIX**self.n)
 
     def weight(self, joint: int) -> int:
-        """The step in the code for one step of a joint's digit."""
+        """The change of the code if a joint's digit increases by one."""
         return int(RADIX ** (self.n - 1 - joint))
 
     def digit(self, codes: Integers, joint: int) -> Integers:
@@ -48,7 +50,7 @@ class Monomials:
         return digits
 
     def tensor_codes(self, joints: Sequence[int], sizes: Sequence[int]) -> Integers:
-        """Codes of a flattened coefficient tensor: one axis per joint, with that many digits each."""
+        """Return the codes of the monomials in a flattened coefficient tensor, whose axes belong to these joints."""
         codes = np.zeros(1, dtype=np.int64)
         for joint, size in zip(joints, sizes, strict=True):
             codes = (codes[:, None] + self.weight(joint) * np.arange(size)).reshape(-1)
@@ -58,7 +60,7 @@ class Monomials:
         return 1 + j
 
     def velocity_rate(self, j: int, k: int) -> int:
-        """Number of the rate factor qd_j qd_k, in either order."""
+        """Return the number of the rate factor qd_j qd_k, in either order."""
         j, k = min(j, k), max(j, k)
         if j == k:
             return 1 + self.n + j
@@ -66,7 +68,7 @@ class Monomials:
         return 1 + 2 * self.n + before + k - j - 1
 
     def rate_exponents(self) -> NDArray[np.uint8]:
-        """(rates, 2n) exponents of qd and qdd for every rate number."""
+        """(rates, 2n) exponents of qd and qdd for every rate factor."""
         n = self.n
         table = np.zeros((1 + 2 * n + n * (n - 1) // 2, 2 * n), dtype=np.uint8)
         for j in range(n):
@@ -77,7 +79,7 @@ class Monomials:
         return table
 
     def exponents(self, keys: Integers) -> NDArray[np.uint8]:
-        """E: (5n, p) uint8 for p monomial keys; row blocks q, sin q, cos q, qd, qdd."""
+        """Return E, (5n, p) uint8, for p monomial keys; row blocks q, sin q, cos q, qd, qdd."""
         rows = RowBlocks.of(self.n)
         table = np.zeros((BLOCKS * self.n, len(keys)), dtype=np.uint8)
         position = table[rows.position].reshape(-1, self.n, len(keys))

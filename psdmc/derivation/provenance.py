@@ -1,4 +1,4 @@
-"""Where a model comes from: what is needed to read its source again."""
+"""The origin of a model: all data that psdmc needs to read the model's robot file again."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from psdmc.robot.mechanism import Mechanism
 
 
 def provenance(loaded: LoadedRobot) -> dict[str, Any]:
-    """The model's origin as plain JSON values: enough to read the source again."""
+    """Return the model's origin as plain JSON values, with which psdmc can read the robot file again."""
     effect = snap_effect(loaded.mechanism, loaded.unsnapped().chain) if loaded.snap_report else None
     return {
         "source_text": loaded.source_text,
@@ -38,7 +38,8 @@ SAMPLES = 256
 
 
 def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
-    """(nv,) largest torque change per rate over random states, N m (N); None where parameters are unknown."""
+    """(nv,) the largest torque change at random states, N m or N, that results from snapping, the replacement of
+    rounded angles by exact ones. None if parameters are unknown."""
     if np.isnan(snapped.parameters).any() or np.isnan(unsnapped.parameters).any():
         return None
     return np.asarray(np.max(np.abs(_torques(snapped) - _torques(unsnapped)), axis=1))

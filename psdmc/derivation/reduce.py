@@ -1,7 +1,8 @@
-"""Base parameters: the reduced row echelon form of the coefficients, pivots in the parameters' own order.
+"""Base parameters from the reduced row echelon form of the coefficients. Pivots are chosen in the parameters' own
+order.
 
-Velocity terms are derivatives of the mass matrix in coefficient space, so that their coefficients are combinations of
-its coefficients: mass matrix and gravity alone span the row space.
+Velocity terms are derivatives of the mass matrix. Their coefficients are combinations of the mass matrix's
+coefficients, so mass matrix and gravity alone span the row space.
 """
 
 from __future__ import annotations
@@ -42,11 +43,11 @@ _BLOCK_ROWS = 8192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduction:
-    """Columns that are base parameters, and the combinations that they represent.
+    """The columns that are base parameters, and the combinations of columns that they represent.
 
     pivots    (l,)     column indices, ascending
     echelon   (l, k)   base parameters = echelon @ columns' parameters; a unit vector at each pivot
-    is_clear           whether no column was nearly dependent, so that double precision is enough
+    is_clear           True if no column was nearly dependent, so that double precision is enough
     """
 
     pivots: NDArray[np.int64]
@@ -55,7 +56,7 @@ class Reduction:
 
 
 def row_space(blocks: Iterable[Terms], columns: int) -> Array:
-    """(k, k) triangular factor R of all rows (row, monomial) of the blocks: R^T R = A^T A, by blocked QR."""
+    """Return the (k, k) triangular factor R of all rows (row, monomial) of the blocks: R^T R = A^T A, by blocked QR."""
     factor: Array = np.zeros((0, columns))
     for block in blocks:
         for rows in _dense_rows(block, columns):
@@ -64,7 +65,7 @@ def row_space(blocks: Iterable[Terms], columns: int) -> Array:
 
 
 def triangular(rows: Array) -> Array:
-    """The factor R of rows = Q R."""
+    """Return the triangular factor R of rows = Q R."""
     factor: Array = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
     return factor
 
@@ -84,10 +85,10 @@ def _dense_rows(terms: Terms, columns: int) -> Iterable[Array]:
 
 
 def reduced(rows: Array) -> Reduction:
-    """Reduced row echelon form of rows (m, k), the next column in order being a pivot where its residual is large
-    enough.
+    """Return the reduced row echelon form of rows (m, k). The next column in order becomes a pivot if its residual is
+    large enough.
 
-    The largest residual is not taken first: between equal residuals rounding would decide.
+    The column with the largest residual is not taken first, because rounding would decide between equal residuals.
     """
     work = np.array(rows, order="C")
     norms = lengths(work)

@@ -1,7 +1,7 @@
-"""Numbers that differ by rounding alone are made one number, the simplest within rounding.
+"""Numbers that differ only by rounding are replaced by one number, the simplest one within the rounding error.
 
-The same product of link lengths enters P by many paths, with different last bits, while the expanded lowering shares
-sub-expressions only where coefficients are equal. Numbers are rounded here, before certification, and nowhere else.
+The same product of link lengths enters P in several places, with different last bits. The expanded lowering shares
+sub-expressions only if coefficients are equal. Numbers are rounded here, before certification, and nowhere else.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ the noise of larger coefficients, it would cost digits of the torque."""
 
 
 def merged(values: Array, noise: Array) -> Array:
-    """The numbers, with those that are equal up to `noise` made equal in magnitude; none changes by more than its
-    noise.
+    """Return the numbers, with those that are equal up to `noise` made equal in magnitude. No number changes by more
+    than its noise.
 
     values, noise   (count,), noise the absolute uncertainty of each value
     """

@@ -1,4 +1,4 @@
-"""Sparse lists of terms: which monomial multiplies which parameter in which joint's torque, and the factor."""
+"""Sparse lists of torque terms. A term has a monomial, a parameter, the joint whose torque it belongs to, and a factor."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Integers = NDArray[np.int64]
 
 
 class Terms(NamedTuple):
-    """value * monomial * parameter, one entry each; all four of one length.
+    """Terms value * monomial * parameter as four arrays of one length.
 
-    row       joint, or row of whatever is listed
+    row       joint, or the row of another quantity
     monomial  code or key (monomials.py)
     column    parameter
     value
@@ -42,13 +42,14 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
-    """The terms that a mask or a list of places chooses."""
+    """Return the terms that a mask or a list of indices chooses."""
     row, monomial, column, value = terms
     return Terms(row[chosen], monomial[chosen], column[chosen], value[chosen])
 
 
 def summed(terms: Terms, tolerance: float) -> Terms:
-    """The terms sorted by row, monomial and column, equal ones added; sums within the tolerance of zero are left out."""
+    """Return the terms sorted by row, monomial and column, with equal ones added. Sums within the tolerance of zero are
+    left out."""
     if not len(terms.value):
         return terms
     columns = int(terms.column.max()) + 1
@@ -65,7 +66,7 @@ def summed(terms: Terms, tolerance: float) -> Terms:
 
 
 def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
-    """The terms on other parameters: columns replaced by their combinations in `matrix` (old, new)."""
+    """Return the terms in other parameters: each column is replaced by its combination in `matrix` (old, new)."""
     right = sparse.csr_array(matrix)
     counts = np.diff(right.indptr)[terms.column]
     source = np.repeat(np.arange(len(counts)), counts)
@@ -81,7 +82,7 @@ def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
 
 
 def restricted(terms: Terms, columns: Integers) -> Terms:
-    """The terms of some columns alone, renumbered in the order given."""
+    """Return the terms of the given columns only, renumbered in the order given."""
     number = np.full(int(max(terms.column.max(initial=0), columns.max(initial=0))) + 1, -1)
     number[columns] = np.arange(len(columns))
     place = number[terms.column]

@@ -1,6 +1,6 @@
-"""A unit of length near the robot's size, so that one absolute tolerance means the same for every coefficient.
+"""A unit of length near the robot's size. One absolute tolerance then means the same for every coefficient.
 
-The unit is a power of two: converting to it and back changes no bit of any number.
+The unit is a power of two, so converting to it and back changes no bit of any number.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 
 
 def length_unit(chain: Mechanism) -> float:
-    """Metres: the power of two nearest to the longest step from joint to joint; one where all are zero."""
+    """Return the unit of length in metres: the power of two nearest to the longest step from joint to joint; one if all
+    steps are zero."""
     steps = [
         math.hypot(*joint.placement.translation)
         for joint, parent in zip(chain.joints, chain.parents, strict=True)
@@ -37,12 +38,13 @@ def length_unit(chain: Mechanism) -> float:
 
 
 def in_unit(placement: Placement, unit: float) -> Placement:
-    """A placement with its translation (m) in another unit of length (m)."""
+    """Return a placement with its translation (m) in another unit of length (m)."""
     return Placement(placement.rotation, placement.translation / unit)
 
 
 def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
-    """Frames in another unit of length: their places, and how joints that slide follow others or are followed."""
+    """Return the frames in another unit of length: their translations, and the ratios and offsets of mimic joints that
+    slide or follow a sliding joint."""
     found = []
     for frame in frames:
         x, y, z = frame.translation
@@ -56,7 +58,7 @@ def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
 
 
 def parameter_units(types: Sequence[JointType], unit: float) -> Array:
-    """(11 n,) what one unit of each standard parameter is in SI."""
+    """(11 n,) the value of one unit of each standard parameter in SI, for a unit of length in metres."""
     drive = [joint.drive_order for joint in types]
     orders = np.column_stack([np.tile(LENGTH_ORDER, (len(types), 1)), drive])
     units: Array = unit ** orders.reshape(len(types) * PARAMETERS_PER_LINK).astype(np.float64)
@@ -64,12 +66,12 @@ def parameter_units(types: Sequence[JointType], unit: float) -> Array:
 
 
 def torque_units(types: Sequence[JointType], unit: float) -> Array:
-    """(n,) one unit of torque (force for sliding joints) in SI; the units of mass and time are SI's."""
+    """(n,) the value of one unit of torque (force for sliding joints) in SI; the units of mass and time are SI's."""
     return np.array([unit**joint.effort_order for joint in types])
 
 
 def monomial_units(exponents: NDArray[np.uint8], types: Sequence[JointType], unit: float) -> Array:
-    """(p,) one unit of each monomial of E in SI; monomials without rates carry |g|."""
+    """(p,) the value of one unit of each monomial of E in SI; monomials without rates contain |g|."""
     n = len(types)
     orders = np.array([joint.length_order for joint in types])
     blocks = exponents.reshape(5, n, -1).astype(np.int64)
@@ -81,11 +83,11 @@ def monomial_units(exponents: NDArray[np.uint8], types: Sequence[JointType], uni
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scaled:
-    """A chain as derivation sees it: lengths in `unit`, parameters within their span.
+    """A robot in the form that derivation uses: lengths in `unit`, parameters within their span.
 
     span    (11 n, k)  parameters from the span's coordinates, both in the robot's unit
-    leads   (k,)       the row of each span column's leading one
-    up      unit vector against gravity in the base frame; zero where there is no gravity
+    leads   (k,)       the row of the leading one in each column of the span
+    up      unit vector against gravity in the base frame; zero if there is no gravity
     """
 
     types: tuple[JointType, ...]
@@ -98,7 +100,7 @@ class Scaled:
 
 
 def scaled(chain: Mechanism) -> Scaled:
-    """The chain in a unit of length near its size, for derivation."""
+    """Return the robot in a unit of length near its size, for derivation."""
     unit = length_unit(chain)
     units = parameter_units(chain.types, unit)
     leads = leading_rows(chain.parameter_span)

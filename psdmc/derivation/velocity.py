@@ -1,4 +1,4 @@
-"""Centrifugal and Coriolis terms from the mass matrix, in coefficient space.
+"""Centrifugal and Coriolis terms, computed from the coefficients of the mass matrix.
 
 tau_i = sum over j, k of (dM_ij/dq_k - 1/2 dM_jk/dq_i) qd_j qd_k: Christoffel's formula before it is made symmetric.
 """
@@ -14,7 +14,7 @@ from psdmc.derivation.terms import Integers, Terms, joined, selected, summed
 
 
 def derivative(terms: Terms, monomials: Monomials, joint: int) -> Terms:
-    """The terms' derivative by q of one joint; monomials are codes."""
+    """Return the derivative of the terms by q of one joint; monomials are codes."""
     digits = monomials.digit(terms.monomial, joint)
     weight = monomials.weight(joint)
     parts: list[Terms] = []
@@ -32,9 +32,9 @@ def velocity_terms(
     carried: Sequence[Sequence[int]],
     tolerance: float,
 ) -> Terms:
-    """Torque terms (row the joint, monomial the key) of all products of joint rates.
+    """Return the torque terms (row the joint, monomial the key) of all products of joint rates.
 
-    carried   the joints beyond each joint: its row of the mass matrix depends on no others
+    carried   for each joint, the joints that it carries; its row of the mass matrix depends on no others
     """
     parts: list[Terms] = []
     for (a, b), terms in mass_matrix.items():

@@ -1,11 +1,12 @@
-"""Symmetric matrices of limbs on a core, where one limb of each group stands for all of them: block elimination.
+"""Block elimination of symmetric matrices for robots with equal limbs, such as legs, on a core, such as a trunk. The
+computation is written for one limb of each group, and holds for all of them.
 
-Rows of two limbs have no common entries. With a limb's rows l, and c those of the core,
+Two different limbs have no common entries in the matrix. With the rows l of a limb and c of the core,
 
     Q = M_ll^-1        T = Q M_lc        V = (M_cc - sum over all limbs of M_cl T)^-1
 
-solve M x = y by x_c = V (y_c - sum T^T y_l) and x_l = Q y_l - T x_c. Nothing else is summed over limbs. The pivots are those
-of an elimination row by row from the last one up (solve.py).
+solve M x = y by x_c = V (y_c - sum T^T y_l) and x_l = Q y_l - T x_c. Nothing else is summed over limbs. The pivots are
+those of an elimination row by row from the last one up (solve.py).
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ Matrix = Sequence[Sequence[Scalar]]
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """A limb of a group, after its elimination.
+    """One limb of a group of equal limbs, after its rows of a symmetric matrix M were eliminated.
 
     rates     its rows
     carriers  rows of the core that have entries in common with it
-    total     the sum over the group's limbs of a scalar that each of them has
-    factors   of its block
-    shares    T: a row per rate, a column per carrier
+    total     returns the sum over the group's limbs of a scalar that each limb has
+    factors   of its diagonal block
+    shares    T = M_ll^-1 M_lc, the block's inverse times its entries with the core: a row per rate, a column per carrier
     """
 
     rates: tuple[int, ...]
@@ -39,7 +40,7 @@ class Limb:
     shares: Matrix
 
     def reduced(self, right: Sequence[Scalar]) -> list[Scalar]:
-        """y_c - T^T y_l and Q y_l, of a right side that is this limb's in all rows."""
+        """Return y_c - T^T y_l and Q y_l (see the module) for a right side y of this limb alone."""
         own, found = [right[k] for k in self.rates], list(right)
         for k, column in zip(self.carriers, zip(*self.shares, strict=True), strict=True):
             found[k] = found[k] - inner_product(column, own)
@@ -50,11 +51,11 @@ class Limb:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A matrix of limbs on a core, after elimination.
+    """A symmetric matrix M of a robot with limbs on a core (such as legs on a trunk), after elimination.
 
     core     rows of the core
     limbs    one of each group
-    factors  of the inverse of V
+    factors  of the core's block minus what elimination of the limbs subtracts from it
     pivots   of all rows
     """
 
@@ -66,7 +67,7 @@ class Arrow:
     def solved(
         self, right: Sequence[Scalar], matrix: Matrix | None = None, vector: Sequence[Scalar] = ()
     ) -> list[Scalar]:
-        """x of M x = right, or of M x = right - matrix vector, where no two limbs have common entries in the matrix."""
+        """Solve M x = right, or M x = right - matrix vector. In `matrix`, no two limbs may have common entries."""
         found = self._reduced(right) if matrix is None else self._reduced_by(right, matrix, vector)
         above = [found[k] for k in self.core]
         for k, value in zip(self.core, solve(self.factors, above), strict=True):
@@ -109,9 +110,11 @@ class Arrow:
         return found
 
     def thin(self, matrix: Matrix) -> list[list[Scalar]]:
-        """The factors of - M^-1 D, if no two limbs have common entries in D: E in the rows of the core, Y in those of limbs.
+        """Return two factors of - M^-1 D: E in the rows of the core, and Y in those of limbs. No two limbs may have
+        common entries in D.
 
-        - M^-1 D is x = - V E in the rows of the core, and Y - T x in those of a limb, Y being zero in other limbs' columns.
+        - M^-1 D is then x = - V E in the rows of the core, and Y - T x in those of a limb. Y is zero in other limbs'
+        columns.
         """
         columns = [list(column) for column in zip(*matrix, strict=True)]
         found = columns[:]
@@ -131,7 +134,8 @@ class Arrow:
 
     @property
     def thin_factors(self) -> list[list[Scalar]]:
-        """V in the rows of the core, T in those of limbs, both in the columns of the core."""
+        """Two factors of M^-1 in one matrix: V in the rows of the core, and T in those of limbs. Both are in the
+        columns of the core."""
         n = len(self.pivots)
         found: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
         for k, row in zip(self.core, inverse(self.factors), strict=True):
@@ -145,7 +149,7 @@ class Arrow:
 
 
 def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
-    """A symmetric matrix over the rates of these frames, factorized limb by limb. Raises SingularMatrix if a pivot is a
+    """Factorize a symmetric matrix over the rates of these frames, limb by limb. Raises SingularMatrix if a pivot is a
     constant not above 0."""
     core, groups = limbs_of(frames)
     rest = {(i, j): matrix[i][j] for i in core for j in core if j <= i}
@@ -199,14 +203,15 @@ def _is_zero(value: Scalar) -> bool:
 
 
 def any_limbs(frames: Sequence[Frame]) -> bool:
-    """Whether some frame stands for those of several limbs at once."""
+    """Whether some frame represents the corresponding frames of several equal limbs, such as legs."""
     return any(frame.limbs is not None for frame in frames)
 
 
 def limbs_of(
     frames: Sequence[Frame],
 ) -> tuple[tuple[int, ...], list[tuple[tuple[int, ...], Callable[[Scalar], Scalar]]]]:
-    """The rates of the core, and of one limb of each group its rates and the sum over the group's limbs."""
+    """Return the rates of the core, and for one limb of each group its rates and a function that sums over the group's
+    limbs."""
     roots: list[int] = []
     for i, frame in enumerate(frames):
         above = BASE if frame.parent == BASE else roots[frame.parent]

@@ -1,4 +1,4 @@
-"""Rigid bodies as pseudo-inertias: turned, shifted and joined."""
+"""Rigid bodies as pseudo-inertias, and operations on them: rotate, shift and join."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Body(NamedTuple):
     moment  kg m, (hx, hy, hz) = mass times centre of mass
     second  kg m^2, (xx, yy, zz, xy, xz, yz); the inertia is Ixx = yy + zz, Ixy = -xy and so on
 
-    In this form a body moved, turned or added to another costs fewest operations (Wensing, Kim, Slotine 2018 call the
-    4 x 4 matrix of all ten the pseudo-inertia).
+    In this form, rotating, shifting and adding bodies takes the fewest operations. The 4 x 4 matrix of all ten numbers
+    is called the pseudo-inertia (Wensing, Kim, Slotine 2018).
     """
 
     mass: Scalar
@@ -26,17 +26,18 @@ class Body(NamedTuple):
 
 
 def body_from_parameters(x: Sequence[Scalar]) -> Body:
-    """Ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about any frame, as a Body about it."""
+    """Return a Body from its ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about the same
+    frame."""
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = x[:10]
     half_trace = 0.5 * (ixx + iyy + izz)
     return Body(m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz))
 
 
 def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None) -> Body:
-    """A body about a frame, turned into the frame before that frame's rotation (about z, or any): R h, R S R^T.
+    """Rotate a body from a frame to the frame before that frame's rotation (about z, or any): R h, R S R^T.
 
-    The second moment xx loses s^2 (xx - yy) + 2 s c xy, and yy gains it. With `double`, half the difference of xx and
-    yy and the product xy are turned by twice the angle instead.
+    The second moment xx decreases by s^2 (xx - yy) + 2 s c xy, and yy increases by the same. With `double`, half the
+    difference of xx and yy and the product xy are rotated by twice the angle instead.
     """
     if turn is None:
         return body
@@ -57,8 +58,11 @@ def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None)
 
 
 def spun(body: Body, turn: Turn | None) -> Body:
-    """Compute `turned` with nested products: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy. Four
-    operations fewer, in a longer dependency chain."""
+    """Compute the same as `turned` with nested products, which take four operations fewer, but in a longer dependency
+    chain.
+
+    With t = s (xx - yy) + 2 c xy, xx decreases by s t, and xy becomes c t - xy.
+    """
     if turn is None:
         return body
     xx, yy, zz, xy, xz, yz = body.second
@@ -70,7 +74,7 @@ def spun(body: Body, turn: Turn | None) -> Body:
 
 
 def in_previous(frame: Frame, body: Body) -> Body:
-    """A body about a frame, before its turn, along the axes of its parent's frame; the origin stays."""
+    """Rotate a body from a frame, before the joint's rotation, to the axes of the parent's frame. The origin stays."""
     if frame.is_parallel:
         return body
     moment = to_previous(frame, body.moment)
@@ -96,8 +100,8 @@ def _rotated(body: Body, rows: Matrix) -> Body:
 
 
 def shifted(body: Body, offset: Vector) -> Body:
-    """Move the reference point of a body from `offset` to the origin. Its moments become h + m p and S + h p^T + p h^T
-    + m p p^T."""
+    """Move the reference point of a body from `offset` p to the origin. The moments become h + m p and S + h p^T + p
+    h^T + m p p^T."""
     px, py, pz = offset
     hx, hy, hz = body.moment
     xx, yy, zz, xy, xz, yz = body.second
@@ -120,7 +124,7 @@ def joined(a: Body, b: Body) -> Body:
 
 
 def handed_body(frame: Frame, body: Body) -> Body:
-    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that it
-    represents."""
+    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that the
+    frame represents."""
     (mass,), moment = handed_on(frame, [body.mass]), handed_vector(frame, body.moment)
     return Body(mass, moment, tuple(handed_on(frame, body.second)))

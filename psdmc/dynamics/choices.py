@@ -1,4 +1,4 @@
-"""How the recursions are arranged: choices that change the number of operations, but not the result."""
+"""Choices in the arrangement of the recursions. They change the number of operations, but not the result."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import Generic, TypeVar, cast
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The arrangement of a recursion; w, dw and U are those of motion.py.
+    """The arrangement of a recursion. w and dw are a body's angular velocity and its derivative; a body's point at r
+    accelerates with a + U r.
 
-    compound           consecutive parallel axes turn w and dw once, by the sum of their angles, from the frame before the
+    compound           consecutive parallel axes rotate w and dw once, by the sum of their angles, from the frame before the
                        first
-    fold               a leaf (a body that carries no other) is described in the frame before its joint's turn, where U
-                       differs from its parent's in six entries only; the body's parameters are turned instead
-    fold_double_angle  a folded body's second moments are turned by a sincos(2 q) of their own, not by products of sincos(q)
-    add_sines          a compound turn's sincos is made from those of its parts, not by a sincos of the sum
-    articulated        accelerations are found by articulated bodies, not by a factorized mass matrix
+    fold               a leaf (a body that carries no other) is described in the frame before its joint's rotation, where U
+                       differs from its parent's in six entries only; the body's parameters are rotated instead
+    fold_double_angle  a folded body's second moments are rotated with a separate sincos(2 q), not with products of sincos(q)
+    add_sines          the sine and cosine of a sum of angles are computed from those of its parts
+    articulated        accelerations are computed by articulated bodies, not by a factorized mass matrix
     """
 
     compound: bool = False
@@ -33,7 +34,7 @@ _T = TypeVar("_T")
 
 
 class _Watched:
-    """Choices that note which of them are read."""
+    """The choices, and in `read` those that a computation has read, with their values."""
 
     def __init__(self, choices: Choices) -> None:
         self.choices = choices
@@ -46,17 +47,17 @@ class _Watched:
 
 
 class ByChoices(Generic[_T]):
-    """What is made of choices and a key, made once for all choices that it does not tell apart.
+    """A cache of results that depend on a key and on choices. It notes which choices a computation reads.
 
-    What has read some of the choices is the same for all choices in which these are the same: without a fold, nothing asks
-    how a fold's angle is doubled.
+    A computation is not repeated for other choices that agree in all that it has read. An example: without a fold, no
+    computation reads how a fold's angle is doubled.
     """
 
     def __init__(self) -> None:
         self._made: dict[Hashable, list[tuple[dict[str, bool], _T]]] = {}
 
     def known(self, key: Hashable, choices: Choices) -> _T | None:
-        """What was made before; None if nothing was. The same object for all choices that are not told apart."""
+        """Return the cached result, or None. Choices that agree in all that was read get the same object."""
         return next(
             (
                 made
@@ -67,7 +68,7 @@ class ByChoices(Generic[_T]):
         )
 
     def made(self, key: Hashable, choices: Choices, make: Callable[[Choices], _T]) -> _T:
-        """What was made before, or is made now by `make`. Nothing that is None is kept."""
+        """Return the cached result. If there is none, `make` computes it from the choices; it may not be None."""
         found = self.known(key, choices)
         if found is None:
             watched = _Watched(choices)

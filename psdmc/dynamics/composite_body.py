@@ -1,5 +1,5 @@
-"""Composite rigid bodies: the mass matrix from bodies joined from tip to base (Walker and Orin 1982; Featherstone 2008,
-6.2)."""
+"""The mass matrix from composite rigid bodies, which are joined from tip to base (Walker and Orin 1982; Featherstone
+2008, 6.2)."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ def mass_matrix(
     q: Sequence[Scalar],
     choices: Choices = PLAIN,
 ) -> tuple[tuple[Scalar, ...], ...]:
-    """M(q), nv x nv and symmetric (kg m^2, kg m, kg by joint types); exact zeros where neither joint carries the other.
+    """Compute M(q), nv x nv and symmetric (kg m^2, kg m, kg by joint types). Entries of two joints are exact zeros if
+    neither joint carries the other.
 
-    drive_inertia   n, one per joint; of joints of several rates it is not looked at
+    drive_inertia   n, one per joint; not used for joints with several rates
     """
     n, first = len(frames), first_rates(frames)
     rows: list[list[Scalar]] = [[0.0] * first[-1] for _ in range(first[-1])]

@@ -1,5 +1,5 @@
-"""Contacts: named frames whose accelerations the world fixes, and the forces by which it does (Featherstone 2008, chapters 8
-and 11; Carpentier, Budhiraja and Mansard 2021)."""
+"""Contacts, that is, named frames whose accelerations the world prescribes, and the contact forces that result
+(Featherstone 2008, chapters 8 and 11; Carpentier, Budhiraja and Mansard 2021)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,11 @@ Rows = Sequence[Sequence[Scalar]]
 def contact_jacobian(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[Scalar]]:
-    """The rows of all contacts, nv each, along the base's axes: velocity of its origin, of a surface then angular."""
+    """Compute the Jacobian's rows of all contacts, nv entries each, along the base's axes.
+
+    The first three rows of a contact are the linear velocity of its origin. A surface contact has three more rows, its
+    angular velocity.
+    """
     found = zip(named, frame_jacobians(frames, named, q, root), strict=True)
     return [row for each, rows in found for row in rows[: each.rows]]
 
@@ -39,17 +43,17 @@ def contact_drift(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[Scalar]:
-    """The accelerations of all contacts at constant joint rates, row by row: dJ/dt qd."""
+    """Compute the accelerations of all contacts at constant joint rates, dJ/dt qd, row by row."""
     found = zip(named, frame_drifts(frames, named, q, qd, root), strict=True)
     return [value for each, drift in found for value in drift[: each.rows]]
 
 
 class Constrained(NamedTuple):
-    """The solution of a system with contacts.
+    """The solution of M x = load + J^T f for a robot with contacts.
 
     motion   x (nv)
-    forces   f, one per row
-    matrix   A, both triangles, and
+    forces   f, one per row of J
+    matrix   A, the matrix of the equations for f, both triangles
     factors  of A
     """
 
@@ -68,14 +72,15 @@ def constrained(
     shift: Sequence[Scalar],
     one: Sequence[Scalar],
 ) -> Constrained:
-    """x and f of M x = load + J^T f, where J x + shift f = wanted in active rows, and f = 0 in the others.
+    """Solve M x = load + J^T f for x and f, with J x + shift f = wanted in active rows, and f = 0 in the others.
 
     factors  of M
-    active   of each row, 0 or 1
-    shift    of each row, added to the diagonal where the row is active
-    one      of each row, the unit of the diagonal where it is not
+    active   for each row, 0 or 1
+    shift    for each row, added to the diagonal if the row is active
+    one      for each row, the diagonal entry in its unit if the row is not active
 
-    A is J M^-1 J^T + shift in active rows and the unit in others: each choice of rows executes the same operations.
+    The matrix A is J M^-1 J^T + shift in active rows and the unit matrix in the others. Every choice of active rows
+    executes the same operations.
     """
     halves = [half_solved(factors, row) for row in jacobian]
     free = half_solved(factors, load)

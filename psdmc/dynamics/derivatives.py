@@ -1,17 +1,18 @@
-"""Derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and M = d tau / d qdd on the way.
+"""Derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and also M = d tau / d qdd.
 
-When joint j turns by a small angle, every point of the bodies beyond it moves along t_j = z_j x r. Relative to these
-bodies, the motion of the link before the joint turns the other way. With z' = w x z and z'' = U z of that link and a the
-acceleration of the joint's origin, a joint i beyond j (or j itself) needs the additional torque
+When joint j turns by a small angle, every point of the bodies that it carries moves along t_j = z_j x r. Relative to
+these bodies, the motion of the link before the joint turns by the opposite angle. With z' = w x z and z'' = U z of that
+link and a the acceleration of the joint's origin, a joint i that j carries (or j itself) needs the additional torque
 
     d tau_i / d q_j   = A_i . z_j'' + B_i . z_j' + C_i . (a_j x z_j)
     d tau_i / d qd_j  = 2 A_i . z_j' + B_i . z_j
     M_ij              = A_i . z_j
 
-where A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm over the bodies beyond joint i, r from the
-origin of joint j as a point of the link before it. Where joint j slides, C_i takes the place of A_i, and there are no
-other terms. The torques of joints before i by the motion of joint i are the components along their axes of two wrenches,
-those that this motion requires on the bodies beyond it. Rows and wrenches are carried from each joint to the base.
+where A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm over the bodies that joint i carries, r
+from the origin of joint j as a point of the link before it. If joint j slides, C_i takes the place of A_i, and there
+are no other terms. The torques of joints before i by the motion of joint i are the components along their axes of two
+wrenches, those that this motion requires on the bodies after joint i. Rows and wrenches are carried from each joint to
+the base.
 
 Carpentier, Mansard 2018 and Singh, Russell, Wensing 2022 have the same derivatives in spatial vectors. Here they are
 written on the pseudo-inertia, and on composites that move (moving_composite.py): when a composite turns about z as a
@@ -59,9 +60,11 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of torques, n x n each, with entry [i][j] of output i by input j. They are d tau_i / d q_j, d tau_i /
-    d qd_j and d tau_i / d qdd_j = M_ij. The recursion also gives the n torques of gravity, C . (minus gravity). (minus
-    gravity), which the recursion also gives."""
+    """Derivatives of torques, n x n each; entry [i][j] is the derivative of torque i by input j.
+
+    They are d tau_i / d q_j, d tau_i / d qd_j and d tau_i / d qdd_j = M_ij. The recursion also gives the n torques of
+    gravity, C . (minus gravity).
+    """
 
     by_q: Rows
     by_qd: Rows
@@ -86,11 +89,11 @@ def inverse_dynamics_derivatives(
     base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Derivatives:
-    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`. Those by q of joints of
-    several coordinates are along the tangent: by a small motion along each of their rates, which stay what they are along
-    the moved frame's own axes.
+    """Compute the derivatives of the joint torques by q, qd and qdd. Arguments are those of `inverse_dynamics`.
 
-    Exact zeros where neither joint carries the other.
+    For joints of several coordinates, derivatives by q are along the tangent: by a small motion along each of the
+    joint's rates, while the rates stay constant along the moved frame's own axes. Entries of two joints are exact zeros
+    if neither joint carries the other.
     """
     n, first = len(frames), first_rates(frames)
     forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
@@ -215,7 +218,7 @@ def _fill_column(
 
 # Wrenches between a joint and the bodies beyond it: its own row A, B, C, and those that its motion requires.
 def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
-    """A, B and C of each of a joint's rates about its own origin."""
+    """Return A, B and C (see the module) for each of a joint's rates, about the joint's own origin."""
     if frame.joint.about_z:
         return [torque_row(frame, axis, composite)]
     found = []
@@ -227,7 +230,7 @@ def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
 
 
 def torque_row(frame: Frame, axis: Axis, composite: Composite) -> Row:
-    """A, B and C of a joint about its own origin."""
+    """Return A, B and C (see the module) of a joint with one rate, about its own origin."""
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:
@@ -263,7 +266,7 @@ def _sliding_row(axis: Axis, composite: Composite) -> Row:
 def wrenches_of_motions(
     frame: Frame, axis: Axis, composite: Composite, rates: Scalar
 ) -> list[tuple[Wrench, Wrench]]:
-    """For each of a joint's rates what `wrenches_of_motion` says of one."""
+    """For each of a joint's rates, return the wrenches that `wrenches_of_motion` returns for a single rate."""
     if frame.joint.about_z:
         return [wrenches_of_motion(frame, axis, composite)]
     found = []
@@ -278,7 +281,7 @@ def wrenches_of_motions(
 
 
 def wrenches_of_motion(frame: Frame, axis: Axis, composite: Composite) -> tuple[Wrench, Wrench]:
-    """Wrenches on the composite that a joint's motion requires, per unit of q and per unit of qd."""
+    """Return the wrenches on the composite body that a joint's motion requires, per unit of q and per unit of qd."""
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:

@@ -20,8 +20,10 @@ def kinetic_energy(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
 ) -> Scalar:
-    """Kinetic energy qd^T M(q) qd / 2 in J, with drive inertias. Bodies that have the torques of the real ones are
-    enough."""
+    """Compute the kinetic energy qd^T M(q) qd / 2 in J, with drive inertias.
+
+    The bodies need not be the real ones: any bodies with the same torques give the same energy.
+    """
     twice: Scalar = 0.0
     for twist, body in zip(twists(frames, q, qd), bodies, strict=True):
         linear, angular = momentum_of(body, twist)
@@ -36,10 +38,11 @@ def kinetic_energy(
 def potential_energy(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base_acceleration: Vector
 ) -> Scalar:
-    """Potential energy in J, zero where no joint has moved (q = 0). `base_acceleration` is minus gravity, m/s^2 in the base
-    frame.
+    """Compute the potential energy in J, which is zero at q = 0. `base_acceleration` is minus gravity, m/s^2 in the
+    base frame.
 
-    Torques do not depend on the energy there: bodies that have the torques of the real ones give the same differences.
+    Torques do not depend on the constant of this energy. Any bodies with the same torques as the real ones therefore
+    give the same result.
     """
     here = dot(base_acceleration, first_moment(frames, bodies, q))
     return here - dot(base_acceleration, first_moment(frames, bodies, neutral(frames)))
@@ -47,7 +50,8 @@ def potential_energy(
 
 @on_coordinates()
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:
-    """Total mass times its centre, kg m, along and about the frame that the first joint frame turns from."""
+    """Return the total mass times the centre of mass, kg m. The centre is given in the base frame of these joint
+    frames."""
     own = positions(frames, q)
     masses, moments = [body.mass for body in bodies], [body.moment for body in bodies]
     total = ZERO

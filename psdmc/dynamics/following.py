@@ -1,8 +1,9 @@
-"""Joints that follow others: algorithms run on every joint's own values, their callers on the robot's coordinates.
+"""Mimic joints (followers). Algorithms compute with the values of all joints; their callers see the coordinates of the
+robot, which mimic joints do not have.
 
-A follower's q is ratio q_leader + offset. The power of all torques at the joints' rates is that of the coordinates'
-torques, so torques, and whatever has an axis of them, are summed onto the leader with the same ratios; so are Jacobians'
-columns, and derivatives by q.
+A follower's q is ratio q_leader + offset. The power of all joint torques equals the power of the coordinates' torques.
+A follower's torque is therefore multiplied by its ratio and added to its leader's. The same holds for all quantities
+with an axis of torques, for columns of Jacobians, and for derivatives by q.
 """
 
 from __future__ import annotations
@@ -32,8 +33,11 @@ def any_follows(frames: Sequence[Frame]) -> bool:
 
 
 def on_coordinates(gather: Gather | None = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Makes an algorithm on joints, whose first argument are frames, one on coordinates. `gather` brings what it gives from
-    joints to coordinates; None: it has no axis of joints. Robots without followers are passed through."""
+    """Decorator that makes an algorithm on all joints an algorithm on the robot's coordinates, without mimic joints.
+
+    The first argument of the algorithm are frames. `gather` converts its result from joints to coordinates; None: the
+    result has no axis of joints. Robots without mimic joints call the algorithm directly.
+    """
 
     def wrap(algorithm: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(algorithm)
@@ -78,7 +82,8 @@ def _on_joints(frames: Sequence[Frame], values: Sequence[Scalar], are_positions:
 
 
 def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, ...]:
-    """Sum one value per joint's rate to one value per coordinate."""
+    """Sum one value per joint rate to one value per coordinate: a mimic joint's value, times its ratio, is added to its
+    leader's."""
     found: dict[int, list[Scalar]] = {}
     rest = list(values)
     followers: list[tuple[tuple[int, Scalar, Scalar], Scalar]] = []
@@ -96,7 +101,8 @@ def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, .
 def columns_summed(
     frames: Sequence[Frame], rows: Sequence[Sequence[Scalar]]
 ) -> tuple[tuple[Scalar, ...], ...]:
-    """A matrix whose columns are per rate, such as a Jacobian."""
+    """Sum the columns of mimic joints onto their leaders' columns, in a matrix with a column per rate, such as a
+    Jacobian."""
     return tuple(summed(frames, row) for row in rows)
 
 
@@ -106,7 +112,7 @@ def matrices_summed(frames: Sequence[Frame], matrices: Sequence[Any]) -> list[An
 
 
 def both_summed(frames: Sequence[Frame], rows: Sequence[Sequence[Scalar]]) -> tuple[tuple[Scalar, ...], ...]:
-    """A matrix with rows and columns per rate, such as the mass matrix."""
+    """Sum rows and columns of mimic joints onto those of their leaders, in a matrix such as the mass matrix."""
     columns = zip(*columns_summed(frames, rows), strict=True)
     return tuple(zip(*(summed(frames, column) for column in columns), strict=True))
 
@@ -114,7 +120,7 @@ def both_summed(frames: Sequence[Frame], rows: Sequence[Sequence[Scalar]]) -> tu
 def sparse_rows_summed(
     frames: Sequence[Frame], rows: Sequence[Mapping[int, Scalar]]
 ) -> tuple[dict[int, Scalar], ...]:
-    """Rows per rate whose zeros are left out, such as the regressor's."""
+    """Sum the rows of mimic joints onto those of their leaders, in a sparse matrix such as the regressor."""
     wanted = sorted({column for row in rows for column in row})
     found: tuple[dict[int, Scalar], ...] = tuple(
         {} for frame in frames if frame.follows is None for _ in range(frame.joint.nv)

@@ -1,10 +1,12 @@
-"""Joint accelerations from torques by articulated bodies (Featherstone 2008, 7.3), on the sweeps of Newton-Euler.
+"""Joint accelerations from torques by articulated bodies (Featherstone 2008, 7.3), with the sweeps of Newton-Euler.
 
-Three sweeps. Outward: each body's motion if no joint accelerated. Inward: the wrench that this motion requires and the
-articulated inertia, the wrench per acceleration of the body's frame with all bodies beyond it; each joint takes the
-component along its axis of both, and the rest goes to the parent. Outward: the joints' accelerations. The number of
-operations per joint is fixed, while that of a factorized mass matrix grows with the square of how many joints carry a
-body: fewer operations on long limbs.
+The first sweep, outward, computes each body's motion for zero joint accelerations. The second, inward, computes two
+quantities: the wrench that this motion requires, and the articulated inertia, which is the wrench per acceleration of
+the body's frame, with all bodies that it carries. Each joint takes the components along its axis; the rest goes to the
+parent. The third sweep, outward, computes the joints' accelerations.
+
+The number of operations per joint is fixed. With a factorized mass matrix, it grows with the square of the number of
+joints that carry a body. Articulated bodies take fewer operations on long limbs.
 """
 
 from __future__ import annotations
@@ -48,9 +50,11 @@ def forward_dynamics(
     choices: Choices = PLAIN,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> Accelerations:
-    """Accelerations from torques, and the mass matrix's pivots as `factorize` has them, all positive where it is positive
-    definite; arguments as those of `inverse_dynamics`, joints that follow no other.
-    Raises SingularMatrix where a pivot is a constant not above 0."""
+    """Compute joint accelerations from torques, and the mass matrix's pivots as `factorize` has them.
+
+    All pivots are positive if the mass matrix is positive definite. Arguments are those of `inverse_dynamics`; there
+    may be no mimic joints. Raises SingularMatrix if a pivot is a constant not above 0.
+    """
     if any_follows(frames):
         raise ValueError("a joint that follows another: its acceleration is not its own")
     still = [0.0] * first_rates(frames)[-1]
@@ -95,8 +99,8 @@ class _Inward:
         return [self.found[i] for i in range(len(self.frames))]
 
     def yielded(self, i: int, needed: Sequence[Scalar]) -> Wrench:
-        """Force that joint i passes on because its torques differ from `needed`, the torques that keep all rates
-        constant."""
+        """Return the wrench that joint i passes to its parent because its torques differ from `needed`, the torques
+        that keep all rates constant."""
         frame, whole = self.frames[i], rigid(self.bodies[i])
         if i in self.beyond:
             whole = both(whole, self.beyond[i])
@@ -218,7 +222,8 @@ _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Articulated(NamedTuple):
-    """Articulated inertia of a frame: force = linear a + mixed alpha, moment = mixed^T a + angular alpha.
+    """The articulated inertia of a frame. For the accelerations a and alpha of the frame, force = linear a + mixed
+    alpha, and moment = mixed^T a + angular alpha.
 
     linear   kg, symmetric
     mixed    kg m
@@ -250,8 +255,8 @@ def both(a: Articulated, b: Articulated) -> Articulated:
 
 
 def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
-    """About a point from which the present one lies at `offset` p: with G = mixed - linear [p], angular gets
-    [p] G + ([p] mixed)^T."""
+    """Return the inertia about another point; `offset` p leads from that point to the present one. With G = mixed -
+    linear [p], angular increases by [p] G + ([p] mixed)^T."""
     x, y, z = offset
     skew: Matrix = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     pushed = multiply(full(inertia.linear), skew)
@@ -267,15 +272,15 @@ def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
 
 
 def handed(frame: Frame, inertia: Articulated) -> Articulated:
-    """Return what a frame passes to its parent, about the parent's frame: the sum over all limbs that the frame
-    represents."""
+    """Return what a frame passes to its parent, about the parent's frame: the articulated inertia, summed over all
+    limbs that the frame represents."""
     rows = tuple(handed_vector(frame, row) for row in inertia.mixed)
     linear, angular = (tuple(handed_on(frame, part)) for part in (inertia.linear, inertia.angular))
     return Articulated(linear, rows, angular)  # type: ignore[arg-type]
 
 
 def along_parent(frame: Frame, inertia: Articulated) -> Articulated:
-    """Rotate from the axes before a joint's motion to the axes of the frame that carries the joint."""
+    """Rotate an inertia from the axes before a joint's motion to the axes of the frame that carries the joint."""
     return inertia if frame.is_parallel else rotated(inertia, frame.rotation)
 
 
@@ -297,7 +302,7 @@ def before_turn(inertia: Articulated, turn: Turn | Rotation | None) -> Articulat
 
 
 def rotated(inertia: Articulated, rows: Matrix) -> Articulated:
-    """Along other axes, of which the rows give the present ones."""
+    """Return the inertia along other axes; `rows` gives the present axes in the new ones."""
     back = transpose(rows)
     linear, mixed, angular = (
         multiply(multiply(rows, part), back)
@@ -320,7 +325,7 @@ def rows_of(inertia: Articulated) -> list[list[Scalar]]:
 
 
 def from_rows(rows: Sequence[Sequence[Scalar]]) -> Articulated:
-    """Build from a 6 x 6 matrix; of its symmetric blocks only the upper triangles are read."""
+    """Build an articulated inertia from a 6 x 6 matrix; of its symmetric blocks only the upper triangles are read."""
     linear = tuple(rows[i][j] for i, j in _PLACES)
     mixed = tuple((row[3], row[4], row[5]) for row in rows[:3])
     angular = tuple(rows[i + 3][j + 3] for i, j in _PLACES)

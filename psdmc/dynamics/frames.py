@@ -1,10 +1,10 @@
-"""Joint frames in a tree, and the turn that each joint makes: the input of every algorithm here.
+"""Joint frames in a tree, and the rotation of each joint: the input of every algorithm in this folder.
 
-Frame i sits in its parent's frame at   rotation @ Rz(turn + offset), translation + rotation @ z slide
-where turn and slide follow from q by its joint's type; a joint of several coordinates puts it at
-rotation @ rotation(q), translation + rotation @ way(q). It carries one rigid body, whose parameters are about frame i
-itself. Parents come before their children. Whole quarter turns of the offset are kept apart, so that they exchange sine
-and cosine exactly and cost nothing.
+The placement of frame i in its parent's frame is   rotation @ Rz(turn + offset), translation + rotation @ z slide
+Here turn and slide follow from q by the type of the joint. For a joint of several coordinates, the placement is
+rotation @ rotation(q), translation + rotation @ way(q). Each frame has one rigid body, whose parameters are about the
+frame itself. Parents come before their children. Multiples of 90 degrees in the offset are stored separately: they
+exchange sine and cosine exactly and cost nothing.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
 
-    parent       index of the frame that it sits in; BASE: the base frame
-    rotation     3 x 3, this frame's axes in the parent's, without the turn about z
+    parent       index of the parent's frame; BASE: the base frame
+    rotation     3 x 3, this frame's axes in the parent's, without the rotation about z
     translation  m, origin of this frame at q = 0 in the parent's
-    offset       rad, turn about z at q = 0, beside
-    quarters     whole quarter turns, 0 to 3
-    follows      leader, ratio and offset where its joint's q is that of another: ratio q_leader + offset (following.py)
-    limbs        of a limb's first frame that stands for those of several limbs at once: gives the sum over them of a scalar
-                 that is one for each; None: it stands for itself
+    offset       rad, rotation about z at q = 0, without the multiples of 90 degrees
+    quarters     number of 90-degree rotations in addition to the offset, 0 to 3
+    follows      for a mimic joint, leader, ratio and offset: its q is ratio q_leader + offset (following.py)
+    limbs        for the first frame of a limb that represents several equal limbs: returns the sum over them of a scalar;
+                 None: the frame represents itself only
 
-    Made of these: whether its axis has the direction of the joint's that it hangs on (`is_parallel`), and the rotation and
-    its transpose without their zeros (`inward_rows`, `outward_rows`).
+    Computed from these: whether the joint's axis is parallel to that of the parent joint (`is_parallel`), and the
+    rotation and its transpose without their zeros (`inward_rows`, `outward_rows`).
     """
 
     joint: JointType
@@ -68,7 +68,7 @@ class Frame:
 
 
 class Angle(NamedTuple):
-    """A turn about z: `value` rad and `quarters` quarter turns; a value of None is zero."""
+    """A rotation about z: `value` rad and `quarters` times 90 degrees; a value of None is zero."""
 
     value: Scalar | None
     quarters: int
@@ -81,7 +81,7 @@ class Angle(NamedTuple):
         return Angle(value, (self.quarters + other.quarters) % 4)
 
     def turn(self) -> Turn | None:
-        """Its sine and cosine; None where it is no turn at all."""
+        """Return the angle's sine and cosine as a Turn; None if the angle is zero."""
         if self.value is None and self.quarters == 0:
             return None
         s, c = (0.0, 1.0) if self.value is None else sincos(self.value)
@@ -92,29 +92,29 @@ NO_TURN = Angle(None, 0)
 
 
 class Turn(NamedTuple):
-    """A rotation about z by its sine and cosine; None stands for no rotation at all."""
+    """A rotation about z by its sine and cosine; None stands for no rotation."""
 
     sine: Scalar
     cosine: Scalar
 
     def then(self, other: Turn) -> Turn:
-        """Both turns as one, by the addition theorems."""
+        """Return this rotation followed by another one as a single rotation, by the addition theorems."""
         s, c = self.sine, self.cosine
         return Turn(s * other.cosine + c * other.sine, c * other.cosine - s * other.sine)
 
     def outward(self, v: Vector) -> Vector:
-        """Rz^T v: from the frame before the turn into the frame after it."""
+        """Compute Rz^T v: a vector, rotated from the frame before this rotation to the frame after it."""
         s, c = self.sine, self.cosine
         return (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
 
     def inward(self, v: Vector) -> Vector:
-        """Rz v: from the frame after the turn into the frame before it."""
+        """Compute Rz v: a vector, rotated from the frame after this rotation to the frame before it."""
         s, c = self.sine, self.cosine
         return (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
 
 
 class Rotation(NamedTuple):
-    """A rotation about any axis; its columns are the turned axes."""
+    """A rotation about any axis; its columns are the rotated axes."""
 
     rows: Matrix
 
@@ -128,13 +128,13 @@ class Rotation(NamedTuple):
 
 
 def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
-    """Plain-float copy of a 3 x 3 array."""
+    """Return a copy of a 3 x 3 array with Python floats."""
     rows = tuple(tuple(float(x) for x in row) for row in values)
     return rows  # type: ignore[return-value]
 
 
 def as_vector(values: Sequence[Scalar]) -> Vector:
-    """Three Python floats, which symbols take as constants, or symbols as a vector."""
+    """Return three numbers as a vector. The numbers are Python floats, which symbols take as constants, or symbols."""
     x, y, z = values
     return (x, y, z)
 
@@ -148,7 +148,7 @@ def frames_of(chain: Mechanism) -> tuple[Frame, ...]:
 
 
 def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
-    """These joints, those that they follow, and all that carry them, ascending."""
+    """Return these joints, the joints that they follow, and all joints that carry them, in ascending order."""
     kept: set[int] = set()
     left = list(joints)
     while left:
@@ -161,7 +161,8 @@ def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, 
 
 
 def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
-    """The frames of some joints, with which all that carry them and that they follow are kept, numbered anew."""
+    """Return the frames of the joints in `kept`, renumbered. `kept` must include all joints that carry or lead one of
+    them."""
     number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
     own = (frames[joint] for joint in kept)
     return tuple(
@@ -171,7 +172,7 @@ def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
 
 
 def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
-    """A frame's `follows`; None where joint i has a coordinate of its own."""
+    """Return leader, ratio and offset of joint i, if it is a mimic joint. None if it has its own coordinate."""
     coordinate = chain.coordinates[i]
     if coordinate.leader is None or coordinate.leader == i:
         return None
@@ -179,30 +180,30 @@ def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
 
 
 def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:
-    """A joint frame that is placed so in its parent's."""
+    """Return the frame of a joint with this placement in its parent's frame."""
     rotation = as_matrix(placement.rotation.tolist())
     return Frame(joint, parent, rotation, as_vector(placement.translation.tolist()))
 
 
 def leaves(frames: Sequence[Frame]) -> tuple[bool, ...]:
-    """For each frame, whether no other frame sits in it."""
+    """For each frame, whether no other frame has it as its parent."""
     parents = {frame.parent for frame in frames}
     return tuple(i not in parents for i in range(len(frames)))
 
 
 def base_acceleration(chain: Mechanism) -> Vector:
-    """Gravity as an upward acceleration of the base, m/s^2 in the base frame."""
+    """Return gravity as an upward acceleration of the base, m/s^2 in the base frame."""
     gx, gy, gz = chain.gravity.tolist()
     return (-gx, -gy, -gz)
 
 
 def outward(turn: Turn | Rotation | None, v: Vector) -> Vector:
-    """A vector along the axes before the turn, along those after it; None: no turn."""
+    """Rotate a vector from the axes before a joint's rotation to the axes after it; None: no rotation."""
     return v if turn is None else turn.outward(v)
 
 
 def inward(turn: Turn | Rotation | None, v: Vector) -> Vector:
-    """A vector along the axes after the turn, along those before it; None: no turn."""
+    """Rotate a vector from the axes after a joint's rotation to the axes before it; None: no rotation."""
     return v if turn is None else turn.inward(v)
 
 
@@ -212,7 +213,8 @@ def joined(first: Turn | None, second: Turn | None) -> Turn | None:
 
 
 def joint_turn(frame: Frame, q: Scalar) -> Turn | Rotation | None:
-    """How the frame is turned at q: one value, or the tuple of the joint's."""
+    """Return the joint's rotation at q; q is one value, or a tuple for a joint of several coordinates. None: no
+    rotation."""
     if frame.joint.about_z:
         return joint_angle(frame, q).turn()
     rows = frame.joint.rotation(q)
@@ -220,14 +222,14 @@ def joint_turn(frame: Frame, q: Scalar) -> Turn | Rotation | None:
 
 
 def about_z(turn: Turn | Rotation | None) -> Turn | None:
-    """Return the same rotation about z; ValueError if it is about another axis."""
+    """Return the same rotation as a rotation about z. Raises ValueError if it is about another axis."""
     if isinstance(turn, Rotation):
         raise ValueError("a joint of several coordinates, where one that turns about z was expected")
     return turn
 
 
 def joint_angle(frame: Frame, q: Scalar) -> Angle:
-    """The turn about z at q of a frame whose joint moves about it."""
+    """Return the angle at q by which the joint's frame is rotated about z."""
     value = frame.offset if frame.offset else None
     turned = frame.joint.turn(q)
     if turned is not None:
@@ -236,7 +238,7 @@ def joint_angle(frame: Frame, q: Scalar) -> Angle:
 
 
 def joint_offset(frame: Frame, q: Scalar) -> Vector:
-    """Origin of the frame in its parent's, m."""
+    """Return the origin (m) of the frame in its parent's frame, at joint position q."""
     if not frame.joint.about_z:
         moved = frame.joint.way(q)
         return frame.translation if moved is None else add(frame.translation, to_previous(frame, moved))
@@ -249,7 +251,8 @@ def joint_offset(frame: Frame, q: Scalar) -> Vector:
 
 
 def handed_on(frame: Frame, values: Iterable[Scalar]) -> Iterator[Scalar]:
-    """Return what a frame passes to its parent: the value itself, or the sums over all limbs that it represents."""
+    """Return what a frame passes to its parent: the values themselves, or their sums over all limbs that the frame
+    represents."""
     return iter(values) if frame.limbs is None else map(frame.limbs, values)
 
 
@@ -260,10 +263,10 @@ def handed_vector(frame: Frame, v: Vector) -> Vector:
 
 
 def to_previous(frame: Frame, v: Vector) -> Vector:
-    """Constant part of the rotation, from a frame (before its turn) into its parent's."""
+    """Rotate a vector from a frame, before its joint's rotation, to its parent's axes. This rotation is constant."""
     return v if frame.is_parallel else rotated(frame.inward_rows, v)
 
 
 def from_previous(frame: Frame, v: Vector) -> Vector:
-    """A vector along the parent's axes, along this frame's before its joint's turn."""
+    """Rotate a vector from the parent's axes to this frame's axes before its joint's rotation."""
     return v if frame.is_parallel else rotated(frame.outward_rows, v)

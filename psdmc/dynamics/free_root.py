@@ -1,8 +1,9 @@
-"""Derivatives of forward dynamics that need no dynamics: those by the motion of a free joint that carries the whole robot.
+"""Derivatives of forward dynamics by the motion of a floating base, which are known without computing any dynamics.
 
-Its place, its orientation and its linear rate v enter the equations of motion through one vector alone, along its own axes:
-a = dv/dt + w x v + R^T up, with up = minus gravity. At equal torques, a and all other accelerations stay what they are if
-these change. Then dv/dt changes by minus the rest.
+The position, the orientation and the linear rate v of a floating base enter the equations of motion through one vector
+only, along the base's own axes: a = dv/dt + w x v + R^T up, with up = minus gravity. If these quantities change and the
+torques do not, then a and all other accelerations stay the same. dv/dt therefore changes by minus the change of w x v +
+R^T up.
 """
 
 from __future__ import annotations
@@ -19,15 +20,16 @@ KNOWN_BY_Q, KNOWN_BY_QD = 6, 3
 
 
 def has_free_root(frames: Sequence[Frame]) -> bool:
-    """Whether a joint that leaves every motion, with rates along its own axes, carries the whole robot."""
+    """Whether a floating joint, with rates along its own axes, carries the whole robot."""
     return frames[0].joint.twists == (*SLIDES, *TURNS) and all(frame.parent != BASE for frame in frames[1:])
 
 
 def known_derivatives(
     frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], up: Vector
 ) -> tuple[Matrix, Matrix]:
-    """The derivatives of the root's linear accelerations by its orientation and by its linear rates, 3 x 3 each. Those by
-    its position, and all derivatives of other accelerations by these three, are zero."""
+    """Return the derivatives of the floating base's linear accelerations by its orientation and by its linear rates, 3
+    x 3 each. Their derivatives by its position are zero, and so are all derivatives of other accelerations by its
+    position, orientation and linear rates."""
     root = frames[0]
     turned = outward(joint_turn(root, positions(frames, q)[0]), from_previous(root, up))
     own = rates(frames, qd)[0]

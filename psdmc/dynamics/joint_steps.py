@@ -1,5 +1,5 @@
-"""The motion of the link before each joint, and the step from each joint to its parent, for the recursion of
-derivatives."""
+"""For each joint, the motion of the link before it, and the step from the joint to its parent. The recursion of
+derivatives (derivatives.py) needs both."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ Wrench = tuple[Vector, Vector]
 
 
 class Axis(NamedTuple):
-    """The motion of the link before a joint, in the joint's orientation: before its turn, or after it where it is of several
-    coordinates.
+    """The motion of the link before a joint, along the axes before the joint's rotation. For a joint of several
+    coordinates, the axes are those after the rotation.
 
-    w, dw         rad/s, its angular velocity; rad/s^2, the derivative
-    spin          its U, so that its points at r accelerate with acceleration + U r
-    acceleration  m/s^2, of the joint's origin as one of its points
+    w, dw         rad/s, the link's angular velocity; rad/s^2, its derivative
+    spin          the matrix U of the link, so that its points at r accelerate with acceleration + U r
+    acceleration  m/s^2, of the joint's origin as a point of the link
     rate, twice   z' = w x z and 2 z'
     up            m/s^2, the base's acceleration, minus gravity
     """
@@ -58,7 +58,8 @@ class Axis(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A, B and C of a joint, about the origin that they have been carried to."""
+    """The vectors A, B and C that give the derivatives of a joint's torque (derivatives.py), about the current origin
+    of the recursion."""
 
     a: Vector
     b: Vector
@@ -70,14 +71,14 @@ class Step:
     """The step from a joint's orientation and origin to those of its parent.
 
     joins     whether both share an orientation, as parallel neighbours may
-    offset    m, this origin from the parent's, and
+    offset    m, this origin from the parent's
     velocity  m/s, twice the velocity of that point of the parent's link about the parent's origin; both are in the shared
               orientation, or else along the axes of the parent's link
-    turn      the turn of the parent, or of its group of parallel axes up to it; None where it is of several coordinates:
-              its orientation is after its turn
-    slide     m/s, twice the rate at which the parent slides; None where it does not
-    own       this joint's turn where it is of several coordinates, and
-    drift     m/s, twice the linear rates of the parent where that is
+    turn      the rotation of the parent, or of its group of parallel axes up to it; None if the parent has several
+              coordinates: its orientation is after its rotation
+    slide     m/s, twice the rate at which the parent slides; None if it does not slide
+    own       this joint's rotation, if the joint has several coordinates
+    drift     m/s, twice the linear rates of the parent, if the parent has several coordinates
     """
 
     frame: Frame
@@ -90,11 +91,11 @@ class Step:
     drift: Vector | None = None
 
     def to_link(self, v: Vector) -> Vector:
-        """A vector along the axes in which `offset` is written."""
+        """Rotate a vector from the joint's orientation to the axes in which `offset` is given."""
         return v if self.joins else to_previous(self.frame, inward(self.own, v))
 
     def to_orientation(self, v: Vector) -> Vector:
-        """A vector along those axes, in the parent's orientation."""
+        """Rotate a vector from the axes in which `offset` is given to the parent's orientation."""
         return v if self.joins else inward(self.turn, v)
 
     def carried(self, wrench: Wrench) -> Wrench:
@@ -123,7 +124,8 @@ def axis_and_step(
     forward: Forward,
     axes: Sequence[Axis],
 ) -> tuple[Axis, Step]:
-    """A joint's axis, and its step to its parent; qd and qdd joint by joint."""
+    """Return the motion before joint i, and the step from joint i to its parent. qd and qdd have one value or tuple per
+    joint."""
     frame, offset, parent = frames[i], forward.states[i].offset, frames[i].parent
     own = None if frame.joint.about_z else forward.states[i].turn
     if parent == BASE:
@@ -164,7 +166,7 @@ def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tupl
 
 
 def axis_of(w: Vector, dw: Vector, acceleration: Vector, up: Vector) -> Axis:
-    """The axis whose link before it moves so, in the joint's orientation."""
+    """Return an Axis from the motion of the link before the joint, given along the joint's axes."""
     wx, wy, _ = w
     twice = (wy + wy, -(wx + wx), 0.0)
     return Axis(w, dw, spin_of(Rates(w, dw)), acceleration, (wy, -wx, 0.0), twice, up)

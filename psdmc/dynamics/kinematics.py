@@ -28,7 +28,7 @@ AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
 
 @on_coordinates()
 def forward_kinematics(frames: Sequence[Frame], q: Sequence[Scalar]) -> tuple[tuple[Matrix, Vector], ...]:
-    """Rotation and origin (m) of every joint frame in the base frame."""
+    """Compute the rotation and the origin (m) of every joint frame in the base frame."""
     placed: list[tuple[Matrix, Vector]] = []
     for frame, value in zip(frames, positions(frames, q), strict=True):
         rotation, origin = AT_BASE if frame.parent == BASE else placed[frame.parent]
@@ -53,9 +53,11 @@ def _turned(rotation: Matrix, turn: Turn | Rotation | None) -> Matrix:
 def jacobian(
     frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
 ) -> tuple[tuple[Scalar, ...], ...]:
-    """6 x nv: velocity (linear, then angular) of a frame's origin per unit joint rate, in the base frame.
+    """Compute the geometric Jacobian, 6 x nv, of a frame: velocity of its origin (linear, then angular) per unit joint
+    rate, in the base frame.
 
-    body, place   the frame: the body that it is fixed to, and where it sits in that body's joint frame
+    body, place   the frame: the body to which it is fixed, and its placement in that body's joint frame
+
     Columns of joints that do not carry the body are zero.
     """
     placed = forward_kinematics(frames, q)
@@ -68,8 +70,8 @@ def jacobian(
 def columns_at(
     frames: Sequence[Frame], body: int, placed: Sequence[tuple[Matrix, Vector]], point: Vector
 ) -> list[tuple[Scalar, ...]]:
-    """nv velocities of a body's point and angular velocities of the body, per unit joint rate; zero of rates that do not
-    carry it."""
+    """Return, for each of the nv unit joint rates, the velocity of a point of a body and the body's angular velocity.
+    They are zero for rates that do not carry the body."""
     first = first_rates(frames)
     columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
     for i in path_to(frames, body):
@@ -79,7 +81,7 @@ def columns_at(
 
 
 def column(twist: Twist, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
-    """Velocity of a point and angular velocity that a constant twist of a frame gives what moves with it."""
+    """Return the velocity of a point, and the angular velocity, of a body that moves with a constant twist of a frame."""
     rotation, origin = placed
     along, about = twist
     linear, angular = turned(rotation, along), turned(rotation, about)
@@ -90,7 +92,7 @@ def column(twist: Twist, placed: tuple[Matrix, Vector], point: Vector) -> tuple[
 
 
 def path_to(frames: Sequence[Frame], body: int) -> tuple[int, ...]:
-    """The joints that carry a body, from the base outward, its own last."""
+    """Return the joints that carry a body, from the base outward; the body's own joint is the last."""
     path: list[int] = []
     while body != BASE:
         path.append(body)
@@ -99,7 +101,7 @@ def path_to(frames: Sequence[Frame], body: int) -> tuple[int, ...]:
 
 
 def carried_by(frames: Sequence[Frame]) -> tuple[tuple[int, ...], ...]:
-    """For each joint the joints beyond it, ascending: those that its motion carries along."""
+    """For each joint, the joints that its motion carries along, in ascending order."""
     beyond: list[list[int]] = [[] for _ in frames]
     for k in range(len(frames)):
         for i in path_to(frames, k)[:-1]:
@@ -111,7 +113,8 @@ def carried_by(frames: Sequence[Frame]) -> tuple[tuple[int, ...], ...]:
 def frame_placement(
     frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
 ) -> tuple[Matrix, Vector]:
-    """Rotation and origin (m) in the base frame of a frame that is fixed at `place` in a body's joint frame."""
+    """Return the rotation and the origin (m), in the base frame, of a frame with placement `place` in a body's joint
+    frame."""
     rotation, origin = forward_kinematics(frames, q)[body]
     point = add(origin, transform(rotation, as_vector(place.translation.tolist())))
     return multiply(rotation, as_matrix(place.rotation.tolist())), point

@@ -1,7 +1,8 @@
-"""Position after constant rates for a time, and the rates between two positions: joint by joint, over abstract scalars.
+"""The position after motion at constant rates, and the rates that lead from one position to another, joint by joint.
+The values can be numbers or symbols.
 
-q ranges over a manifold where joints have several coordinates: a quaternion stays on its sphere. Tangents are rates, nv
-of them, along each moved frame's own axes.
+If a joint has several coordinates, its q is a point on a manifold: a quaternion has length one. Its tangents are the
+rates, nv in total, along the axes of the moved frame.
 """
 
 from __future__ import annotations
@@ -16,40 +17,42 @@ from psdmc.robot.joints import JointType
 
 
 def integrated(frames: Sequence[Frame], q: Sequence[Scalar], step: Sequence[Scalar]) -> list[Scalar]:
-    """nq coordinates where constant rates lead from q in a second; `step` are nv of them."""
+    """Return the nq coordinates after one second of motion from q at constant rates `step`, nv of them."""
     return [x for joint, here, way in _joints(frames, q, step) for x in joint.integrated(here, way)]
 
 
 def difference(frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Scalar]) -> list[Scalar]:
-    """nv constant rates that lead from q to `other` in a second, the short way round."""
+    """Return the nv constant rates that lead from q to `other` in one second, along the shortest rotation."""
     return [x for joint, here, there in _coordinates(frames, q, other) for x in joint.difference(here, there)]
 
 
 def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
-    """How the nq coordinates change per second at these nv rates."""
+    """Return the changes per second of the nq coordinates at these nv rates."""
     return [x for joint, here, own in _joints(frames, q, rates) for x in joint.coordinate_rates(here, own)]
 
 
 def rates_bent(
     frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
 ) -> list[Scalar]:
-    """How `coordinate_rates` change per second while q moves at nv rates of `way`."""
+    """Return the changes per second of `coordinate_rates`, for constant joint rates `rates`, while q moves at the joint
+    rates `way`."""
     both = zip(_joints(frames, q, rates), _joints(frames, q, way), strict=True)
     return [x for (joint, here, own), (_, _, moved) in both for x in joint.rates_bent(here, own, moved)]
 
 
 def tangent(frames: Sequence[Frame], q: Sequence[Scalar], moved: Sequence[Scalar]) -> list[Scalar]:
-    """nv rates at which `restored(q)` moves while coordinates q, of any length, move by nq of `moved` per second."""
+    """Return the nv rates of `restored(q)` while the coordinates q change by the nq values `moved` per second.
+    Quaternions in q may have any length."""
     return [x for joint, here, own in _coordinates(frames, q, moved) for x in joint.tangent(here, own)]
 
 
 def restored(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
-    """The nearest positions that the joints can have: quaternions of length one and so on."""
+    """Return the nearest positions that the joints can have; for example, quaternions get length one."""
     return [x for joint, here, _ in _joints(frames, q, ()) for x in joint.restored(here)]
 
 
 def pulled_back(frames: Sequence[Frame], q: Sequence[Scalar], gradient: Sequence[Scalar]) -> list[Scalar]:
-    """nv derivatives by the tangent at q of what has these nq derivatives by the coordinates."""
+    """Convert nq derivatives of a quantity by the coordinates to its nv derivatives along the tangent at q."""
     found: list[Scalar] = []
     for joint, here, own in _coordinates(frames, q, gradient):
         for k in range(joint.nv):

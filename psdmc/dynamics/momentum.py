@@ -1,4 +1,4 @@
-"""Momentum of single bodies and of all together."""
+"""Linear and angular momentum of single bodies and of the whole robot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from psdmc.dynamics.twist import momentum as unit_momentum
 
 
 def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Twist]:
-    """For every joint frame, velocity of its origin and angular velocity, along its axes."""
+    """Return, for every joint frame, the velocity of its origin and its angular velocity, along the frame's axes."""
     found: list[Twist] = []
     for frame, state, rate in zip(frames, _states(frames, q), rates(frames, qd), strict=True):
         before = (ZERO, ZERO) if frame.parent == BASE else found[frame.parent]
@@ -28,7 +28,7 @@ def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -
 
 
 def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Momentum m v + w x h and angular momentum h x v + I w about the frame's origin."""
+    """Compute a body's momentum m v + w x h, and its angular momentum h x v + I w about the frame's origin."""
     linear, (wx, wy, wz) = twist
     xx, yy, zz, xy, xz, yz = body.second
     own = (
@@ -44,8 +44,8 @@ def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
 def total_momentum(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], qd: Sequence[Scalar]
 ) -> tuple[Vector, Vector]:
-    """Momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, along and about the frame that the first joint
-    frame turns from. Needs the real bodies: others with the same torques have another momentum."""
+    """Compute the momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, in the base frame of the joint
+    frames. The bodies must be the real ones: others with the same torques have another momentum."""
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
     states, total = _states(frames, q), (ZERO, ZERO)
     for i in reversed(range(len(frames))):
@@ -64,8 +64,8 @@ def total_momentum(
 def momentum_matrix(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]
 ) -> list[list[Scalar]]:
-    """6 x nv: column by column what `total_momentum` is at unit rate of each, by composite bodies. The bodies must be
-    the real ones."""
+    """Compute the 6 x nv matrix whose columns are `total_momentum` at unit rate of each joint, by composite bodies. The
+    bodies must be the real ones."""
     found: list[list[tuple[Vector, Vector]]] = [[] for _ in frames]
     placed, states, composites = forward_kinematics(frames, q), _states(frames, q), list(bodies)
     for i in reversed(range(len(frames))):

@@ -1,14 +1,17 @@
-"""Motions of bodies: the outward sweep of Newton-Euler, written once for all its uses.
+"""Motions of bodies: the outward sweep (from base to tip) of the Newton-Euler algorithm, written once for all its uses.
 
-Each frame gets the matrix U = [w][w_r] + [dw_r] and the acceleration a of its origin, so that the body's point at r
-accelerates with a + U r. newton_euler.py carries the wrenches that this requires inward, to the axes.
+For each joint frame, the sweep computes the acceleration a of the origin and a 3 x 3 matrix U. A point of the body at r
+then accelerates with a + U r. U is [w][w_r] + [dw_r], with the matrix [w] of the cross product with w. The file
+newton_euler.py computes the forces and moments that these motions require.
 
-w_r is a second ("reference") angular velocity, linear in qd_r. Without qd_r there is one velocity: w_r is w and is not
-computed, and the result is ordinary inverse dynamics. With qd_r the result is M qdd_r + C(q, qd) qd_r + g, where C is
-the matrix of C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T) over the links' pseudo-inertias S_k, for which dM/dt - 2
-C is skew-symmetric: the Slotine-Li form.
+w is the angular velocity. w_r is a second ("reference") angular velocity, linear in the reference joint rates qd_r.
+Without qd_r, w_r is w and is not computed; the result is ordinary inverse dynamics. With qd_r, the torques are M qdd_r
++ C(q, qd) qd_r + g.
 
-How the sweep is arranged (choices.py) changes the number of operations, but not the result.
+C is the matrix C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T). T_k is the 4 x 4 placement of link k, and S_k is the
+link's pseudo-inertia (4 x 4 mass matrix). With this C, dM/dt - 2 C is skew-symmetric: the Slotine-Li form.
+
+The options of the sweep (choices.py) change the number of operations, but not the result.
 """
 
 from __future__ import annotations
@@ -40,23 +43,29 @@ from psdmc.dynamics.twist import combined
 
 
 class LinkMotion(NamedTuple):
-    """How one body moves, in the frame its parameters are about."""
+    """The motion of one body: the acceleration of the frame's origin, and the matrix U of the angular rates. A point at
+    r accelerates with a + U r, along the frame's axes."""
 
     acceleration: Vector
     spin: Spin
 
 
 class JointState(NamedTuple):
-    """A joint's position: its turn relative to its parent's frame, and the offset of its origin there."""
+    """A joint's position: the rotation relative to the parent's frame, and the origin of the joint's frame in the
+    parent's frame."""
 
     turn: Turn | Rotation | None
     offset: Vector
 
 
 class Forward(NamedTuple):
-    """Result of the outward sweep, body by body. Bodies are in the frames of `motions` and `rates`: after the joint's
-    turn; for folded ones, motions are before it and rates are their parent's. `joins`: the body turns as one with its
-    parent (compound turns)."""
+    """Result of the outward sweep, with one entry per body in each tuple.
+
+    `motions` and `rates` are along the axes of the body's frame, after the joint's rotation. For folded bodies (an
+    option in choices.py), `motions` are along the axes before the rotation, and `rates` are those of the parent.
+    `joins` is true if the body's joint is parallel to the parent's joint, and both rotations are computed as one, by
+    the sum of the angles.
+    """
 
     states: tuple[JointState, ...]
     compound_turns: tuple[Turn | Rotation | None, ...]
@@ -90,7 +99,7 @@ class _Moved(NamedTuple):
 
     @property
     def compound_turn(self) -> Turn | Rotation | None:
-        """The turn of its group up to it."""
+        """Return the rotation by this joint and by the preceding joints of the group with parallel axes."""
         return self.state.turn if self.group is None else self.group.turn
 
 
@@ -103,9 +112,10 @@ def sweep_outward(
     base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Forward:
-    """Motions of all bodies. `base_acceleration` is the base's acceleration minus gravity (m/s^2, base frame).
+    """Compute the motions of all bodies from the joint positions, rates and accelerations, from base to tip.
 
-    qd_r   reference rates; None: there is one velocity, qd
+    base_acceleration  the base's acceleration minus gravity, m/s^2, along the base's axes
+    qd_r               reference joint rates of the Slotine-Li form; None: qd takes their place
     """
     at_base = _resting(base_acceleration, qd_r is not None)
     folded = tuple(

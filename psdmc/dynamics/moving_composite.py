@@ -1,8 +1,12 @@
-"""Moving composites: all bodies from a joint on, and their motion relative to the link before it.
+"""Moving composites: all bodies that a joint carries as one body, and their motion relative to the link before the
+joint.
 
-Relative to that link, points at r have the velocity r' and the acceleration r'', which depend on the joints from this
-one on alone. Only moments of them over the whole composite are needed: 2 int r r'^T, 2 int r', int r'', int r x r''.
-Composites are built from tip to base like bodies: turned, shifted, joined, and given the motion of one joint more.
+Relative to that link, a mass point at r has the velocity r' and the acceleration r''. Both depend only on this joint
+and on the joints further out. Only integrals over the mass of the composite are needed: 2 int r r'^T, 2 int r', int r''
+and int r x r''.
+
+Composites are built from tip to base. The composite of a joint's children is rotated and shifted to the joint's frame,
+and added to the joint's body. Then the motion by the joint itself is added.
 """
 
 from __future__ import annotations
@@ -32,16 +36,22 @@ from psdmc.robot.joints import JointType
 
 
 class Momenta(NamedTuple):
-    """2 int r r'^T dm (row: component of r) and 2 int r' dm."""
+    """Two integrals over the mass of a composite (several bodies as one): 2 int r r'^T dm and 2 int r' dm. The points
+    at r have the velocities r'.
+
+    `second` is the first integral, a 3 x 3 matrix whose rows belong to the components of r.
+    """
 
     second: Matrix
     first: Vector
 
 
 class Composite(NamedTuple):
-    """Bodies about a point, their motion relative to a link.
+    """A composite (several bodies as one): mass moments about a point, and integrals of the motion relative to a link.
 
-    wrench   (int r'' dm, int r x r'' dm)
+    body     mass, first moment and second moments of all bodies together
+    momenta  integrals of the velocities relative to the link
+    wrench   the force int r'' dm and the moment int r x r'' dm, with the accelerations r'' relative to the link
     """
 
     body: Body
@@ -50,12 +60,13 @@ class Composite(NamedTuple):
 
 
 def at_rest(body: Body) -> Composite:
-    """The composite of a body that does not move relative to the link."""
+    """Return the composite (several bodies as one) that consists of one body, which does not move relative to the
+    link."""
     return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
 
 
 def both(a: Composite, b: Composite) -> Composite:
-    """Two composites about one point and relative to one link as one."""
+    """Add two composites (several bodies as one), both about one point and relative to one link."""
     second = tuple(add(x, y) for x, y in zip(a.momenta.second, b.momenta.second, strict=True))
     return Composite(
         joined(a.body, b.body),
@@ -65,7 +76,8 @@ def both(a: Composite, b: Composite) -> Composite:
 
 
 def moved_to(composite: Composite, offset: Vector) -> Composite:
-    """The composite about the point of the link from which its present origin lies at `offset`."""
+    """Return a composite (several bodies as one) with its moments about another point of the link. `offset` leads from
+    the new point to the old one."""
     (second, first), (force, moment) = composite.momenta, composite.wrench
     rows = tuple(add(row, scale(first, length)) for row, length in zip(second, offset, strict=True))
     return Composite(
@@ -76,7 +88,8 @@ def moved_to(composite: Composite, offset: Vector) -> Composite:
 
 
 def along_parent(frame: Frame, composite: Composite) -> Composite:
-    """Rotate from the axes before a joint's motion to the axes of the link before it."""
+    """Rotate a composite (several bodies as one) from a joint's axes, before the joint's motion, to the axes of the
+    link before the joint."""
     if frame.is_parallel:
         return composite
     second, first = composite.momenta
@@ -87,8 +100,9 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
 
 
 def handed_composite(frame: Frame, composite: Composite) -> Composite:
-    """Return the composite that a frame passes to its parent, about the parent's frame: the sum over all limbs that it
-    represents."""
+    """Return the composite (several bodies as one) that a joint's frame adds to its parent; the given composite is
+    about the parent's frame. If the frame represents several equal limbs (such as legs), the result is the sum over all
+    limbs."""
     (x, y, z), first = composite.momenta
     second = (handed_vector(frame, x), handed_vector(frame, y), handed_vector(frame, z))
     force, moment = (handed_vector(frame, v) for v in composite.wrench)
@@ -97,7 +111,8 @@ def handed_composite(frame: Frame, composite: Composite) -> Composite:
 
 
 def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite:
-    """The composite in the orientation before a turn."""
+    """Rotate a composite (several bodies as one) from the axes after a joint's rotation to the axes before the
+    rotation."""
     if turn is None:
         return composite
     if isinstance(turn, Rotation):
@@ -121,15 +136,21 @@ def _rotated(composite: Composite, turn: Rotation) -> Composite:
 
 
 def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
-    """The composite relative to the link before the joint, from its motion relative to the link beyond the joint."""
+    """Add a joint's motion to a composite. The given composite moves relative to the link after the joint, the returned
+    one relative to the link before the joint."""
     rate, way = joint.turn(qd), joint.slide(qd)
     found = composite if rate is None else _spinning(composite, rate, joint.turn(qdd))
     return found if way is None else _sliding(found, way, joint.slide(qdd))
 
 
 def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
-    """Drive a joint of several coordinates, whose rates u and s are along the moved axes. r' gets s x r + u, and r''
-    gets du/dt + s x u + U r + 2 s x r', with U of s and ds/dt."""
+    """Add the motion of a joint with several coordinates to a composite. The given composite moves relative to the link
+    after the joint, the returned one relative to the link before the joint.
+
+    The joint's linear velocity u and angular velocity s are along the axes after the motion. The velocity r' of a point
+    at r increases by s x r + u. The acceleration r'' increases by du/dt + s x u + U r + 2 s x r', with the matrix U of
+    s and ds/dt.
+    """
     (u, s), (u_change, s_change) = (
         combined(joint, own_rates(joint, qd)),
         combined(joint, own_rates(joint, qdd)),
@@ -146,7 +167,11 @@ def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scala
 
 
 def swept(second: Matrix, s: Vector) -> Vector:
-    """int r x (2 s x r') dm = (tr P - P^T) s"""
+    """Compute the moment of the Coriolis accelerations of a composite (several bodies as one). The moment is int r x (2
+    s x r') dm = (tr P - P^T) s.
+
+    s is the angular velocity of the axes, r' are the velocities of the points r, and P is the integral 2 int r r'^T dm.
+    """
     trace = second[0][0] + second[1][1] + second[2][2]
     return add(scale(s, trace), scale(transform(transpose(second), s), -1.0))
 

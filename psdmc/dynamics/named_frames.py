@@ -1,4 +1,5 @@
-"""Named frames: placements, Jacobians, drifts, and derivatives of velocities."""
+"""Named frames of a robot: placements, Jacobians, drifts (accelerations at constant joint rates), and derivatives of
+the velocities."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ Root = tuple[Matrix, Vector]
 def placed_frames(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[tuple[Vector, Matrix]]:
-    """Origin (m) and rotation of each named frame in the base frame."""
+    """Compute the origin (m) and the rotation matrix of each named frame, relative to the base frame."""
     joints = _in_base(frames, q, root)
     return [
         (_point(joints[each.joint], each), multiply(joints[each.joint][0], _rotation(each))) for each in named
@@ -31,7 +32,8 @@ def placed_frames(
 def frame_jacobians(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: linear velocity of its origin, then angular, per unit joint rate, along the base's axes."""
+    """Compute the Jacobian, 6 x nv, of each named frame: linear velocity of its origin, then angular velocity, per unit
+    joint rate, along the base's axes."""
     joints = _in_base(frames, q, root)
     found = []
     for each in named:
@@ -49,7 +51,8 @@ def frame_drifts(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Six per named frame: acceleration of its origin, then angular, at constant joint rates, along the base's axes."""
+    """Compute the drift of each named frame, that is, the accelerations of the frame at constant joint rates. Each
+    drift has six values along the base's axes: acceleration of the origin, then angular acceleration."""
     joints = _in_base(frames, q, root)
     forward = sweep_outward(frames, q, qd, None, [0.0] * first_rates(frames)[-1], ZERO)
     found = []
@@ -70,13 +73,15 @@ def frame_velocity_slopes(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[list[list[Scalar]]]:
-    """6 x nv per named frame: derivatives of its velocity J qd (linear, then angular) by q, along its tangent, and along the
-    base's axes.
+    """Compute the derivatives of each named frame's velocity J qd by the joint positions: 6 x nv per frame.
 
-    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. With w the angular
-    velocity of the link before it, and (u, s) the part of the frame's velocity that joints from j on contribute, the
-    frame's velocity changes by (w x v + z x u, z x s): that part, j's own rates in it, is turned, and the frame's origin
-    moves in the velocity field of the link before.
+    The velocity is linear, then angular, along the base's axes. A derivative by a joint's position is along the
+    tangent: the position moves at a unit rate of the joint.
+
+    The joint j moves the outer bodies along the twists (v, z), one twist for each rate. Let w be the angular velocity
+    of the link before joint j. Let (u, s) be the part of the frame's velocity that comes from joint j and the joints
+    after it. The frame's velocity then changes by (w x v + z x u, z x s). First, this part of the velocity is rotated.
+    Second, the frame's origin moves within the velocity field of the link before the joint.
     """
     first, found = first_rates(frames), []
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
@@ -121,8 +126,11 @@ def _running(parts: Sequence[Vector]) -> list[Vector]:
 def link_wrenches(
     named: Sequence[NamedFrame], wrenches: Sequence[Sequence[Scalar]]
 ) -> dict[int, tuple[Vector, Vector]]:
-    """Move wrenches from named frames to joint frames: force and moment about each joint frame's origin, along its
-    axes. The given force and moment of a named frame are along that frame's axes, about its origin."""
+    """Return the external force and moment on each link, from the given wrenches on named frames.
+
+    A given wrench is along the axes of the named frame, about this frame's origin. The result is along the axes of the
+    joint frame that carries the named frame, about the joint frame's origin. Several wrenches on one link are added.
+    """
     found: dict[int, tuple[Vector, Vector]] = {}
     for each, (fx, fy, fz, mx, my, mz) in zip(named, wrenches, strict=True):
         force = transform(_rotation(each), (fx, fy, fz))

@@ -1,4 +1,5 @@
-"""Recursive Newton-Euler: outward for motions (motion.py), inward for wrenches; each axis takes its component."""
+"""The recursive Newton-Euler algorithm: motions of bodies from base to tip (motion.py), then forces and moments from
+tip to base. Each joint's torque is the component of force and moment along the joint's axis."""
 
 from __future__ import annotations
 
@@ -21,9 +22,12 @@ NO_WRENCHES: Mapping[int, Wrench] = MappingProxyType({})
 
 
 def wrench(motion: LinkMotion, body: Body) -> Wrench:
-    """Force (N) and moment about the frame's origin (N m) that give a body the field a + U r.
+    """Compute the force (N) and the moment (N m) that a body needs for its motion, about the origin of the body's
+    frame.
 
-    force = m a + U h,  moment = h x a + integral of r x (U r), the latter linear in the second moments.
+    Points of the body at r accelerate with a + U r, with the matrix U of the angular rates. The force is m a + U h,
+    with the mass m and the first moment h. The moment is h x a + integral of r x (U r), whose second part is linear in
+    the second moments.
     """
     a, (u, d) = motion
     force = add(transform(u, body.moment), (body.mass * a[0], body.mass * a[1], body.mass * a[2]))
@@ -49,11 +53,13 @@ def inverse_dynamics(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """Joint torques (N m; N for sliding joints), one per rate: M(q) qdd + C(q, qd) qd_r + g(q), qd_r = qd if not given.
+    """Compute joint torques (N m; N for sliding joints), one per joint rate: M(q) qdd + C(q, qd) qd_r + g(q).
 
-    external   force and moment that the world exerts on link i, about its joint frame's origin along that frame's axes
+    qd_r      reference joint rates; None: qd, which gives ordinary inverse dynamics
+    external  force and moment that the world exerts on link i, about the origin of joint frame i, along that frame's
+              axes
 
-    Luh, Walker, Paul 1980, with the body's wrench written on its pseudo-inertia.
+    Source: Luh, Walker, Paul 1980. The body's wrench is computed from its pseudo-inertia.
     """
     forward = sweep_outward(frames, q, qd, qd_r, qdd, base_acceleration, choices)
     seen = seen_bodies(frames, bodies, q, forward, choices)
@@ -63,7 +69,10 @@ def inverse_dynamics(
 def seen_bodies(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], forward: Forward, choices: Choices
 ) -> list[Body]:
-    """Bodies in the frames that their motions are in."""
+    """Return each body's mass parameters about the frame in which the sweep gives the body's motion.
+
+    For a folded body, that is the frame before the joint's rotation. For all other bodies, it is the joint frame.
+    """
     return [
         _folded_body(frame, body, value, state.turn, choices) if is_folded else body
         for frame, body, value, state, is_folded in zip(
@@ -96,12 +105,15 @@ def sweep_inward(
     external: Mapping[int, Wrench] = NO_WRENCHES,
     yielded: Callable[[int, Sequence[Scalar]], Wrench] | None = None,
 ) -> tuple[Scalar, ...]:
-    """Joint torques: wrenches summed inward to the base, children before parents; each axis takes its component. With
-    compound turns, the x and y moments of a group of parallel axes are summed in the frame before its first turn,
-    their z and the forces joint by joint.
+    """Compute the joint torques from the motions of the bodies, from tip to base.
 
-    yielded   gives a further wrench that joint i passes on, from its number and the torques that it takes; about its
-              body's frame, along its axes
+    The force and moment of each body, and those of the bodies further out, are added and passed to the parent. The
+    component along a joint's axis is the joint's torque. If the angles of parallel joints are summed (an option in
+    choices.py), their x and y moments are summed before the first rotation. Their z moments and forces are summed joint
+    by joint.
+
+    yielded  function of a joint's number i and torques; returns a further force and moment that joint i passes to its
+             parent, about the origin of body i's frame, along the frame's axes
     """
     n = len(frames)
     torques: list[tuple[Scalar, ...]] = [()] * n

@@ -1,8 +1,9 @@
-"""Rows and wrenches of joints with several coordinates, in the recursion of derivatives. Each of their rates is along
-or about one of the moved frame's axes, which takes the place of z.
+"""Formulas for joints with several coordinates, such as spherical joints, in the recursion of torque derivatives
+(derivatives.py).
 
-All is in the orientation after the joint's turn. One term is added to those of a single axis: a rate of the joint turns
-the directions of its other rates, V x E with the joint's own twist V.
+Each rate of such a joint is along or about one axis of the frame that the joint moves. The formulas for a joint about z
+apply, with this axis in place of z. All vectors are along the axes after the joint's rotation. One term is added, V x
+E: the joint's twist V rotates the unit twist E of each rate.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ Vectors = tuple[Vector, Vector]
 
 
 def unit_twists(joint: JointType) -> list[tuple[int, bool]]:
-    """For each rate the number of its axis (0, 1, 2: x, y, z), and whether it turns about it."""
+    """Return one pair per joint rate: the number of the axis (0, 1, 2 for x, y, z), and whether the rate is a rotation
+    about this axis."""
     places = [(*linear, *angular).index(1.0) for linear, angular in joint.twists]
     return [(place % 3, place >= 3) for place in places]
 
 
 def to_z(v: Vector, axis: int) -> Vector:
-    """Permute x, y, z cyclically so that the axis becomes z."""
+    """Permute the entries x, y, z of a vector cyclically so that the given axis becomes z."""
     return (v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis])
 
 
@@ -35,13 +37,15 @@ def from_z(v: Vector, axis: int) -> Vector:
 
 
 def axis_along(axis: Axis, number: int) -> Axis:
-    """The motion of the link before, in the axes in which this one is z."""
+    """Return the motion of the link before a joint, with the entries of all vectors permuted so that the axis `number`
+    becomes z."""
     vectors = (to_z(v, number) for v in (axis.w, axis.dw, axis.acceleration, axis.up))
     return axis_of(*vectors)
 
 
 def composite_along(composite: Composite, number: int) -> Composite:
-    """The composite in the axes in which this one is z."""
+    """Return a composite (several bodies as one) with the entries of all vectors permuted so that the axis `number`
+    becomes z."""
     body, (second, first), (force, moment) = composite
     xx, yy, zz, xy, xz, yz = body.second
     squares, products = to_z((xx, yy, zz), number), to_z((yz, xz, xy), number)
@@ -54,13 +58,18 @@ def composite_along(composite: Composite, number: int) -> Composite:
 
 
 def bending(own: Vectors, number: int, turns: bool) -> Vectors:
-    """V x E, linear and angular: how the joint's own motion V bends the unit twist E."""
+    """Compute V x E, linear and angular: the change of a rate's unit twist E by the joint's motion V.
+
+    own     V, the joint's linear and angular velocity
+    number  axis of E: 0, 1, 2 for x, y, z
+    turns   whether E is a rotation about the axis; otherwise E is a motion along the axis
+    """
     (u, s), e = own, (float(number == 0), float(number == 1), float(number == 2))
     return (cross(u, e), cross(s, e)) if turns else (cross(s, e), ZERO)
 
 
 def accelerating(body: Body, linear: Vector, angular: Vector) -> Wrench:
-    """Force and moment that accelerate a body at rest so."""
+    """Return the force and moment that give a body at rest the given linear and angular accelerations."""
     xx, yy, zz, xy, xz, yz = body.second
     ax, ay, az = angular
     spun = (
@@ -75,7 +84,11 @@ def accelerating(body: Body, linear: Vector, angular: Vector) -> Wrench:
 def by_own_axes(
     joint: JointType, axis: Axis, row: Row, rates: Scalar
 ) -> tuple[tuple[Scalar, ...], tuple[Scalar, ...], tuple[Scalar, ...]]:
-    """Derivatives of a torque with this row by each of the joint's positions, rates and accelerations."""
+    """Compute the derivatives of one torque by the positions, the rates and the accelerations of one joint with several
+    coordinates.
+
+    row  the vectors (A, B, C) of the torque; the module docstring of derivatives.py defines them
+    """
     (a, b, c), (u, s) = row, combined(joint, rates)
     field = transpose(axis.spin.field)
     turning = add(transform(field, a), add(cross(b, axis.w), cross(c, axis.acceleration)))

@@ -1,4 +1,5 @@
-"""Standard parameters about the file's link frames, moved to the joint frames that the algorithms work in."""
+"""Conversion of standard parameters (mass, first moment and inertia of links) from the link frames of the robot file to
+the joint frames. The algorithms use joint frames."""
 
 from __future__ import annotations
 
@@ -19,13 +20,14 @@ _INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 def second_moments(inertia: Array) -> Array:
-    """The integral of r r^T over the mass, from the inertia matrix about the same point: tr(I) / 2 - I. (3, 3, ...)"""
+    """Compute the integral of r r^T over the mass of a body, (3, 3, ...), from the inertia matrix I about the same
+    origin: tr(I) / 2 - I."""
     moments: Array = _on_diagonal(0.5 * np.trace(inertia)) - inertia
     return moments
 
 
 def inertia_of(second: Array) -> Array:
-    """The inertia matrix from the integral of r r^T over the mass: tr(S) - S. (3, 3, ...)"""
+    """Compute the inertia matrix, (3, 3, ...), from the integral S of r r^T over the mass of a body: tr(S) - S."""
     matrix: Array = _on_diagonal(np.trace(second)) - second
     return matrix
 
@@ -36,7 +38,7 @@ def _on_diagonal(value: Array) -> Array:
 
 
 def inertia_matrix(x: Array) -> Array:
-    """(3, 3, ...) inertia matrix, kg m^2, from standard parameters of one link (10 or 11, ...)."""
+    """Return the inertia matrix, (3, 3, ...), kg m^2, from the standard parameters of one link, (10 or 11, ...)."""
     matrix = np.zeros((3, 3, *np.shape(x)[1:]), np.asarray(x).dtype)
     for (row, column), value in zip(_INERTIA_ENTRIES, x[4:BODY_PARAMETERS], strict=True):
         matrix[row, column] = matrix[column, row] = value
@@ -44,12 +46,16 @@ def inertia_matrix(x: Array) -> Array:
 
 
 def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
-    """(10, ...) standard parameters of a body; moment and inertia about the same frame."""
+    """Return the (10,) standard parameters of a body: mass, first moment, and inertia matrix as six numbers.
+
+    moment, inertia  about the origin of one frame, along the frame's axes
+    """
     return np.array([mass, *moment, *(inertia[entry] for entry in _INERTIA_ENTRIES)])
 
 
 def moved(x: Array, frame: Placement) -> Array:
-    """Ten standard parameters about a frame, moved to the frame that it is placed in."""
+    """Convert ten standard parameters of a body from one frame to another. `frame` is the placement of the old frame in
+    the new one."""
     return _moved(x, frame.rotation, frame.translation)
 
 
@@ -74,26 +80,34 @@ def _turned(r: Array, matrix: Array) -> Array:
 
 
 def joint_frame_map(link_frame: Placement) -> Array:
-    """(10, 10) map of ten standard parameters about a link frame to those about the joint frame it is placed in."""
+    """Return the (10, 10) matrix that converts a link's ten standard parameters from the link frame to the joint
+    frame."""
     return moving_map(link_frame.rotation, link_frame.translation)
 
 
 def moving_map(rotation: NDArray[Any], translation: NDArray[Any]) -> NDArray[Any]:
-    """(10, 10) map of ten standard parameters about a frame to those about the frame it is placed in, in the arrays'
-    precision."""
+    """Return the (10, 10) matrix that converts ten standard parameters from one frame to another.
+
+    rotation, translation  placement of the old frame in the new one; the matrix has the floating-point precision of
+                           these arrays
+    """
     return _moved(np.eye(BODY_PARAMETERS, dtype=rotation.dtype), rotation, translation)
 
 
 def bodies_of(chain: Mechanism, x: Array) -> tuple[Body, ...]:
-    """Bodies about the joint frames from standard parameters about the link frames.
+    """Return the mass parameters of all n links about the joint frames, from standard parameters about the link frames.
 
-    x   (n, 11) or (11 n,)   SI, none NaN
+    x  (n, 11) or (11 n,)  standard parameters in SI units, none of them NaN
     """
     return bodies_about([joint.link_frame for joint in chain.joints], x)
 
 
 def bodies_about(link_frames: Sequence[Placement], x: Array) -> tuple[Body, ...]:
-    """Bodies as of `bodies_of`, for link frames placed in any joint frames."""
+    """Return the mass parameters of all n links about other frames, from standard parameters about the link frames.
+
+    link_frames  n placements of the link frames in these other frames
+    x            (n, 11) or (11 n,)  standard parameters, SI units
+    """
     rows = np.asarray(x, dtype=np.float64).reshape(len(link_frames), PARAMETERS_PER_LINK)
     return tuple(
         body_from_parameters(times(joint_frame_map(place), row[:BODY_PARAMETERS]).tolist())
@@ -102,6 +116,6 @@ def bodies_about(link_frames: Sequence[Placement], x: Array) -> tuple[Body, ...]
 
 
 def drive_inertia_of(x: Array) -> list[float]:
-    """n drive inertias (kg m^2; kg for sliding joints) from standard parameters, (n, 11) or (11 n,)."""
+    """Return the n drive inertias (kg m^2; kg for sliding joints) from standard parameters, (n, 11) or (11 n,)."""
     drives: list[float] = np.asarray(x).reshape(-1, PARAMETERS_PER_LINK)[:, BODY_PARAMETERS].tolist()
     return drives

@@ -1,7 +1,8 @@
-"""The joint-torque regressor: torques as a matrix times the standard parameters.
+"""The joint-torque regressor: the matrix that gives the joint torques when it is multiplied by the standard parameters.
 
-Each body's wrench is linear in its parameters. A column of the regressor is the wrench for one parameter alone, dotted
-with the twist of each joint that carries the body, moved into the body's frame.
+The force and moment that a body needs are linear in the body's standard parameters. An entry of the regressor belongs
+to one joint rate and one parameter. The entry is the torque for a robot in which this parameter is one and all other
+parameters are zero.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ Twist = tuple[Vector, Vector]
 
 
 class Placed(Protocol):
-    """The placement of one frame in another: a Placement, or one in another precision."""
+    """The placement of one frame in another: a Placement, or an object with a rotation and a translation in another
+    floating-point precision."""
 
     @property
     def rotation(self) -> NDArray[Any]: ...
@@ -45,11 +47,14 @@ def regressor(
     base_acceleration: Vector,
     qd_r: Sequence[Scalar] | None = None,
 ) -> tuple[dict[int, Scalar], ...]:
-    """Y with torque[i] = sum over parameters p of Y[i][p] x[p]; entries that are zero for every state are left out.
+    """Compute the entries Y[i][p] of the regressor: torque[i] = sum over parameters p of Y[i][p] x[p].
 
-    link_frames  n, the frame that each link's parameters are about, in its joint frame
-    wanted       indices into x (11 per link, link by link) whose columns are computed
-    qd_r         reference rates, for the Slotine-Li regressor of M qdd_r + C qd_r + g; left out: qd
+    Returns one mapping per joint rate i, from the index p to the entry. Entries that are zero at every state are left
+    out.
+
+    link_frames  n placements of the link frames, about which the parameters are given, in the joint frames
+    wanted       indices p of the columns that are computed; x has 11 parameters per link, link by link
+    qd_r         reference rates, for the Slotine-Li regressor of M qdd_r + C qd_r + g; None: qd
     """
     first, changes = first_rates(frames), rates(frames, qdd_r)
     forward = sweep_outward(frames, q, qd, qd_r, qdd_r, base_acceleration, PLAIN)
@@ -74,7 +79,8 @@ def regressor(
 
 
 def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
-    """A twist of the parent's frame, at the origin and along the axes of this frame."""
+    """Convert a twist (linear and angular velocity) from the parent's frame to this joint's frame: the twist of the new
+    origin, along the new axes."""
     linear, angular = twist
     moved = add(linear, cross(angular, state.offset))
     return (
@@ -84,7 +90,8 @@ def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
 
 
 def twist_in(place: Placed, twist: Twist) -> Twist:
-    """A joint frame's twist, at the origin and along the axes of a frame placed in it."""
+    """Convert a twist (linear and angular velocity) from a joint frame to a frame that is fixed to the joint frame.
+    `place` is the placement of the new frame in the joint frame."""
     rotation, translation = _plain(place)
     linear, angular = twist
     moved = add(linear, cross(angular, translation))
@@ -93,7 +100,7 @@ def twist_in(place: Placed, twist: Twist) -> Twist:
 
 
 def seen_from(place: Placed, motion: LinkMotion, rates: Rates) -> LinkMotion:
-    """A joint frame's motion, as the motion of a frame placed in it."""
+    """Return the motion of a frame that is fixed to a joint frame, from the motion of the joint frame."""
     rotation, translation = _plain(place)
     rows = transpose(rotation)
     acceleration = add(motion.acceleration, transform(motion.spin.field, translation))
@@ -109,7 +116,10 @@ def _plain(place: Placed) -> tuple[Matrix, Vector]:
 
 
 def unit_wrench(name: int, motion: LinkMotion) -> tuple[Vector, Vector]:
-    """Force and moment for one standard parameter of value one (index into PARAMETER_NAMES), others zero."""
+    """Return the force and moment that move a body of which one standard parameter is one and all others are zero.
+
+    name  number of this parameter, 0 to 9, in the order of PARAMETER_NAMES
+    """
     (ax, ay, az), (u, d) = motion
     if name == 0:
         return (ax, ay, az), ZERO

@@ -1,8 +1,8 @@
-"""The scalars that the algorithms run on, and three-vectors of them.
+"""The scalars that the algorithms compute with, and three-vectors of scalars.
 
-A scalar is anything with + - * / and unary minus that mixes with floats: a float, a NumPy array of states, or a symbol
-that records what is done to it. Exact zeros and ones of the robot stay Python floats, so that a recording scalar can
-drop them; on arrays they cost a little and change nothing.
+A scalar is anything with + - * / and unary minus that mixes with floats. Examples are a float, a NumPy array with one
+value per state, and a symbol that records each operation. Zeros and ones of the robot's geometry stay Python floats.
+Symbols leave out additions of zero and multiplications by zero or one.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def fixed(rows: Matrix) -> Fixed:
-    """A matrix of plain floats without its zeros."""
+    """Return the entries of a 3 x 3 matrix of floats that are not zero: one tuple of (column, value) pairs per row."""
     first, second, third = (tuple((k, x) for k, x in enumerate(row) if x != 0.0) for row in rows)
     return first, second, third
 

@@ -1,4 +1,4 @@
-"""Slices of q, and of the rates, that belong to each joint."""
+"""Division of the vectors q and qd into the values of each joint."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from psdmc.dynamics.scalar import Scalar
 
 
 def positions(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
-    """Joint by joint its coordinate, or the tuple of them where there are several."""
+    """Return one entry per joint: its coordinate, or a tuple if the joint has several coordinates."""
     return _dealt([frame.joint.nq for frame in leading(frames)], q)
 
 
 def rates(frames: Sequence[Frame], qd: Sequence[Scalar]) -> list[Scalar]:
-    """Joint by joint its rate, or the tuple of them where it has several."""
+    """Return one entry per joint: the joint's rate, or the tuple of rates if the joint has several."""
     return _dealt([frame.joint.nv for frame in leading(frames)], qd)
 
 
 def first_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
-    """Where each joint's rates start, and behind the last their number."""
+    """Return, for each joint, the index of its first rate in qd; after the last joint, the number of all rates."""
     found = [0]
     for frame in leading(frames):
         found.append(found[-1] + frame.joint.nv)
@@ -36,7 +36,7 @@ def neutral(frames: Sequence[Frame]) -> list[Scalar]:
 
 
 def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
-    """(nq, ...) the nearest coordinates that the joints can have: quaternions of length one and so on."""
+    """Return the nearest positions that the joints can have, (nq, ...); for example, quaternions get length one."""
     own = leading(frames)
     ends = np.cumsum([frame.joint.nq for frame in own])[:-1]
     return np.concatenate([f.joint.normalized(part) for f, part in zip(own, np.split(q, ends), strict=True)])
@@ -53,7 +53,7 @@ def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
 
 
 def leading(frames: Sequence[Frame]) -> list[Frame]:
-    """Return the joints that have coordinates; algorithms see no others (following.py)."""
+    """Return the joints that have their own coordinates, that is, all joints except mimic joints (following.py)."""
     return [frame for frame in frames if frame.follows is None]
 
 

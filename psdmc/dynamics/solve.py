@@ -1,9 +1,10 @@
-"""Factors of a symmetric positive definite matrix, and what follows from them, written out entry by entry, from the last row
-up.
+"""Factorization of a symmetric positive definite matrix, and solutions from the factors. Loops run entry by entry,
+because the entries can be symbols that record operations.
 
-Entries that are the number zero, those of joints on different branches, are left out. Where parents come before their
-children, elimination from the last row up changes entries of two joints only where both carry the one that is eliminated, so
-that no zero is lost (Featherstone 2008, section 6.5: branch-induced sparsity).
+In a mass matrix, an entry of two joints on different branches is zero at every state and is left out. Parents come
+before children, and elimination goes from the last row up. Elimination of a joint's row changes an entry of two joints
+only if both carry the eliminated joint. Zeros therefore stay zero (Featherstone 2008, section 6.5: branch-induced
+sparsity).
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class SingularMatrix(Exception):
-    """A pivot is not positive at any state; `row` is its row of the matrix: of the mass matrix, the number of a rate."""
+    """This error says that a pivot of the factorization is not positive at any state.
+
+    `row` is the pivot's row in the matrix. In a mass matrix, the row is the number of a joint rate.
+    """
 
     def __init__(self, row: int) -> None:
         super().__init__(f"pivot {row} is not positive at any state")
@@ -26,12 +30,12 @@ class SingularMatrix(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """M = L^T D L with L unit lower triangular and D diagonal.
+    """The factors of a symmetric matrix M = L^T D L: L is lower triangular with ones on the diagonal, D is diagonal.
 
-    pivots    (n)  D, all positive where M is positive definite
+    pivots    (n)  D, all positive if M is positive definite
     inverses  (n)  1 / D
-    lower     row k: L's k entries left of the diagonal
-    scaled    row k: those times D's
+    lower     row k: the k entries of L left of the diagonal
+    scaled    row k: the k entries of D L left of the diagonal
     """
 
     pivots: tuple[Scalar, ...]
@@ -41,8 +45,8 @@ class Factors:
 
 
 def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
-    """The factors of M by elimination from the tip, whose entries the composite-rigid-body sweep finishes first. Raises
-    SingularMatrix where a pivot is a constant not above 0."""
+    """Return the factors of M by elimination from the last row up. The composite-rigid-body algorithm computes the rows
+    in this order. Raises SingularMatrix if a pivot is a constant, zero or negative."""
     n = len(matrix)
     rows = [list(row) for row in matrix]
     inverses: list[Scalar] = [0.0] * n
@@ -78,7 +82,7 @@ def _is_zero(entry: Scalar) -> bool:
 
 
 def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """x of L^T D L x = right."""
+    """Solve L^T D L x = right for x, with the factors L and D of a symmetric matrix M = L^T D L."""
     load = list(right)
     solution = list(right)
     for k in reversed(range(len(load))):
@@ -92,12 +96,14 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 
 def projected(factors: Factors, rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    """J M^-1 J^T, both triangles, from the rows of J: with Y = J L^-1, it is Y D^-1 Y^T."""
+    """Compute the symmetric matrix J M^-1 J^T from the factors of M and the rows of J. With Y = J L^-1, the result is Y
+    D^-1 Y^T. Both triangles are returned."""
     return half_products(factors, [half_solved(factors, row) for row in rows])
 
 
 def half_products(factors: Factors, halves: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    """Y D^-1 Y^T, both triangles, from the rows of Y."""
+    """Compute the symmetric matrix Y D^-1 Y^T from the rows of Y (`halves`) and the factor D of a matrix L^T D L. Both
+    triangles are returned."""
     found: list[list[Scalar]] = [[0.0] * len(halves) for _ in halves]
     for i, half in enumerate(halves):
         own = _nonzero(half)
@@ -108,7 +114,8 @@ def half_products(factors: Factors, halves: Sequence[Sequence[Scalar]]) -> list[
 
 
 def half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """y of L^T y = right; zero where no joint beyond is in `right`."""
+    """Solve L^T y = right for y, with the factors L^T D L of a matrix. An entry of y is zero if `right` is zero for the
+    entry's joint and for all joints that this joint carries."""
     found = list(right)
     for k in reversed(range(len(found))):
         if not _is_zero(found[k]):
@@ -118,7 +125,8 @@ def half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 
 def rest_solved(factors: Factors, half: Sequence[Scalar]) -> list[Scalar]:
-    """x of D L x = half, which solves M x = right if L^T half = right."""
+    """Solve D L x = half for x, with the factors M = L^T D L. If `half` is the result of `half_solved` for a vector
+    `right`, then x solves M x = right."""
     solution = [value * inverse for value, inverse in zip(half, factors.inverses, strict=True)]
     for k, row in enumerate(factors.lower):
         for i in _nonzero(row):
@@ -127,7 +135,7 @@ def rest_solved(factors: Factors, half: Sequence[Scalar]) -> list[Scalar]:
 
 
 def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    """a . b, of vectors of equal length."""
+    """Return the inner product a . b of vectors of equal length."""
     total: Scalar = 0.0
     for x, y in zip(a, b, strict=True):
         total = total + x * y
@@ -135,7 +143,8 @@ def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
 
 
 def inverse(factors: Factors) -> list[list[Scalar]]:
-    """M^-1 from M = L^T D L, both triangles: L^-1 D^-1 L^-T, of which one triangle is computed."""
+    """Compute M^-1 = L^-1 D^-1 L^-T from the factors of M = L^T D L. The lower triangle is computed, and both triangles
+    are returned."""
     n = len(factors.pivots)
     columns = _inverse_of_lower(factors.lower)
     scaled = [[entry * factors.inverses[k] for k, entry in enumerate(row)] for row in columns]

@@ -1,4 +1,5 @@
-"""Rates of a frame, and the part of its acceleration field that they make: from the rates, or from the parent's field."""
+"""The matrix U of a frame: the part of the acceleration of the frame's points that angular rates cause. U is computed
+from the angular rates, or from the matrix U of the parent frame."""
 
 from __future__ import annotations
 
@@ -9,10 +10,11 @@ from psdmc.dynamics.scalar import Matrix, Scalar, Vector, rotated_tensor, transp
 
 
 class Spin(NamedTuple):
-    """The velocity-dependent part of a frame's acceleration field.
+    """The matrix U of a frame, which depends on the angular rates only. A point at r accelerates with a + U r, with the
+    acceleration a of the frame's origin.
 
-    field        U, so that a point at r accelerates with a + U r
-    differences  (Uzz - Uyy, Uxx - Uzz, Uyy - Uxx), formed from squares where that is cheaper
+    field        the 3 x 3 matrix U
+    differences  (Uzz - Uyy, Uxx - Uzz, Uyy - Uxx), computed from squares of rates if that takes fewer operations
     """
 
     field: Matrix
@@ -20,10 +22,11 @@ class Spin(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Rates of one frame along its axes: angular velocity, derivative of the reference angular velocity, and that
-    velocity.
+    """Angular rates of one frame, along the frame's axes.
 
-    w_r   None: there is one velocity, w
+    w     angular velocity
+    dw_r  derivative of the reference angular velocity
+    w_r   reference angular velocity (of the Slotine-Li form); None: w takes the place of w_r
     """
 
     w: Vector
@@ -37,7 +40,8 @@ class Rates(NamedTuple):
 
 
 class JointRates(NamedTuple):
-    """Rate, reference acceleration and reference rate of a turn about z or a slide along it; qd_r None: it is qd."""
+    """Rate, reference acceleration and reference rate of a joint that rotates about z or slides along z. If qd_r is
+    None, qd takes the place of qd_r."""
 
     qd: Scalar
     qdd_r: Scalar
@@ -49,7 +53,8 @@ class JointRates(NamedTuple):
 
 
 def spin_of(rates: Rates) -> Spin:
-    """U = [w][w_r] + [dw_r] = w_r w^T - (w . w_r) 1 + [dw_r]."""
+    """Compute the matrix U = [w][w_r] + [dw_r] = w_r w^T - (w . w_r) 1 + [dw_r] from a frame's angular rates. [w] is
+    the matrix of the cross product with w."""
     (wx, wy, wz), (rx, ry, rz), (ax, ay, az) = rates.w, rates.reference, rates.dw_r
     xx, yy, zz = wx * rx, wy * ry, wz * rz
     field = (
@@ -61,8 +66,11 @@ def spin_of(rates: Rates) -> Spin:
 
 
 def spin_before_turn(frame: Frame, previous: Spin, before: Rates, turning: JointRates | None) -> Spin:
-    """Compute the spin of a leaf in the frame before its rotation. It is the parent's plus ([qd w_r + qd_r w + qd qd_r
-    z] + qdd_r)[z]."""
+    """Compute the matrix U of a body without children, along the axes before the body's rotation.
+
+    The result is the parent's matrix U plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]. [z] is the matrix of the cross
+    product with the joint's axis z.
+    """
     (u, d) = _turned_field(frame, previous)
     if turning is None:
         return Spin(u, d)

@@ -1,7 +1,7 @@
-"""Places of matrix entries that can differ from zero, found from the robot's tree and axes without any state.
+"""The entries of matrices that can differ from zero, found from the robot's tree and joint axes alone.
 
-The algorithms run on scalars of which nothing is known but that they may be other than zero. An entry that comes out as
-the number zero is zero at every state, whatever the inertias.
+The algorithms run on scalars that hold no number, but only whether a value can differ from zero. An entry whose result
+is the number zero is zero at every state, for all masses and inertias.
 """
 
 from __future__ import annotations
@@ -60,9 +60,10 @@ SOMETHING = Something()
 
 
 def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
-    """Return the places in the mass matrix's lower triangle, diagonal included.
+    """Return the places (row, column) in the mass matrix's lower triangle, with diagonal, whose entries can differ from
+    zero.
 
-    lift  (11 n, l) base parameters to standard parameters about the link frames
+    lift  (11 n, l)  matrix from base parameters to standard parameters about the link frames
     """
     needed = lift.any(axis=1).reshape(-1, PARAMETERS_PER_LINK)
     bodies = tuple(_body(chain, i, row[:BODY_PARAMETERS]) for i, row in enumerate(needed))
@@ -72,7 +73,11 @@ def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
 
 
 def regressor_places(chain: Mechanism, lift: Array) -> Places:
-    """Return the places in the torques' regressor in base parameters, (nv, l); `lift` as in `mass_matrix_places`."""
+    """Return the places (row, column) in the regressor of the base parameters, (nv, l), whose entries can differ from
+    zero.
+
+    lift  (11 n, l)  matrix from base parameters to standard parameters about the link frames
+    """
     needed = frozenset(np.flatnonzero(lift.any(axis=1)).tolist())
     placed = [joint.link_frame for joint in chain.joints]
     q, rates = [SOMETHING] * chain.nq, [SOMETHING] * chain.nv

@@ -1,13 +1,16 @@
-"""How the end of a step depends on its start and on its way: derivatives of `integrate` along tangents.
+"""Derivatives of the function `integrate` along tangents. They say how the end of a step at constant rates depends on
+the start and on the rates.
 
-A joint goes from T to T exp(x), x its constant rates times seconds. Moved by a small e along its own axes at the start,
-or on the way, it ends moved by
+A joint moves from the placement T to T exp(x). The twist x is the joint's constant rates times the duration. A small
+displacement e along the joint's axes displaces the end, along the axes at the end, by
 
-    Ad(exp(-x)) e = (1 - ad(x) J) e   or   J e,   J = 1 - ad(x) / 2! + ad(x)^2 / 3! - ...,
+    Ad(exp(-x)) e = (1 - ad(x) J) e   if the start is displaced by e,
+    J e                               if x is changed by e,   J = 1 - ad(x) / 2! + ad(x)^2 / 3! - ...
 
-along the axes that it ends with. Every joint type's motions are a group among those of a free body: one formula is for
-all of them, written for a linear part v and an angular part w of x.
-Source: Barfoot, State Estimation for Robotics, 2nd edition, section 8.1 (left Jacobian; here the right one, of -x).
+Ad(T) is the 6 x 6 matrix that transforms twists by a placement T, and ad(x) y is the Lie bracket of two twists. One
+formula serves all joint types, because the motions of each joint type are a subgroup of the motions of a free body. It
+is written for a linear part v and an angular part w of x. Source: Barfoot, State Estimation for Robotics, 2nd edition,
+section 8.1 (left Jacobian; here the right one, of -x).
 """
 
 from __future__ import annotations
@@ -32,7 +35,12 @@ TERMS = 12
 
 
 class StepSlopes(NamedTuple):
-    """nv x nv: derivatives of where a joint ends, along its tangent there, by its start and by its way."""
+    """Derivatives of a joint's position at the end of a step, as two nv x nv matrices. Rows and columns belong to small
+    displacements along the joint's nv rates.
+
+    by_start  by the position at the start of the step
+    by_way    by the joint's rates times the duration of the step
+    """
 
     by_start: Rows
     by_way: Rows
@@ -41,7 +49,11 @@ class StepSlopes(NamedTuple):
 def step_slopes(
     frames: Sequence[Frame], rates: Sequence[Scalar], seconds: Scalar = 1.0
 ) -> list[StepSlopes | None]:
-    """Joint by joint, of nv rates for so long. None where both are one, of joints of one rate."""
+    """Return, for each joint, the derivatives of the position after a step at the given nv constant rates for
+    `seconds`.
+
+    The entry is None for a joint of one rate, whose derivatives are both one.
+    """
     found: list[StepSlopes | None] = []
     used = 0
     for frame in leading(frames):

@@ -1,14 +1,17 @@
-"""Rows over the links' parameters, joint by joint, that all joint torques are combinations of; in extended precision.
+"""Combinations of the links' standard parameters on which the joint torques depend: matrix rows that span the torques
+at all states. They are computed joint by joint in extended precision.
 
-Link k's parameters leave the torque of joint k at zero in every motion exactly where its Lagrangian depends on neither
-q_k nor its rate. Then the torques are those of a robot whose link k is fixed to its parent, with its parameters moved there.
-So with C_k the rows that joint k's torque has in the parameters of its own link, and T_c those of a link c moved to its
-parent where joint c has not moved, the torques of all joints depend on the parameters through
+Consider a combination of link k's parameters whose Lagrangian does not depend on q_k and on its rate. It has no effect
+on joint k's torque. If these parameters are moved to the parent link, as if link k were fixed to the parent, no torque
+changes.
 
-    C_k z_k,    z_k = x_k + sum of T_c z_c over the links c that hang on k
+Let C_k be the rows that joint k's torque has in the parameters of link k. Let T_c move the parameters of a link c to
+the parent link, at the position where joint c has not moved. All torques depend on the parameters only through
 
-and on nothing else: each C_k is 11 columns of a few samples, whatever the size of the robot, and every decision about
-rank is made there, joint by joint, against that joint's own torque.
+    C_k z_k,    z_k = x_k + sum of T_c z_c over the child links c of link k
+
+Each C_k has 11 columns and few samples, for robots of any size. Every decision about rank is made on these rows, joint
+by joint, relative to that joint's own torque.
 """
 
 from __future__ import annotations
@@ -45,11 +48,13 @@ evaluating the torque in double leaves as much as this."""
 
 
 def torque_rows(frames: Sequence[Frame], link_frames: Sequence[Placed], up: Vector) -> Long:
-    """(r, 11 n) rows that span what any torque depends on, joint by joint, each joint's of length one at most.
+    """Return the (r, 11 n) rows in the standard parameters that span all joint torques, joint by joint. Each joint's
+    rows have length one at most.
 
-    r is the number of base parameters of a robot whose parameters are all free.
+    r is the number of base parameters of a robot whose standard parameters are not restricted by assumptions.
 
-    link_frames  the frames that the parameters are about, in the joint frames; `up`: the base's acceleration
+    link_frames  placements of the link frames, about which the parameters are given, in the joint frames
+    up           the base's acceleration against gravity
     """
     n = len(frames)
     own = [echelon_rows(samples) for samples in _own_torques(frames, up)]
@@ -105,8 +110,8 @@ def _own_torque(frame: Frame, motion: LinkMotion, acceleration: Scalar) -> Long:
 
 
 def echelon_rows(samples: Long) -> Long:
-    """(rank, k) rows with the row space of (m, k) samples, but for directions below EFFECT; the longest column of length
-    one."""
+    """Return (rank, k) rows that span the same space as the sampled rows (m, k). They are scaled so that the longest
+    column has length one. Directions shorter than EFFECT are left out."""
     longest = lengths(samples).max(initial=0.0)
     if not longest:
         return samples[:0]

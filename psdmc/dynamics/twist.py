@@ -1,4 +1,5 @@
-"""Constant twists, such as a joint's motion subspace, applied to vectors; zeros and ones cost nothing."""
+"""Multiplication of constant twists, such as a joint's motion per unit rate, with forces, rates and bodies. Zeros and
+ones of the twist cost no operation."""
 
 from __future__ import annotations
 
@@ -21,19 +22,22 @@ def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
 
 
 def axis_twist(joint: JointType) -> Twist:
-    """The twist per unit rate of a joint of one rate; ValueError where it has more."""
+    """Return the joint's linear and angular velocity per unit rate, for a joint with one rate. Raises ValueError if the
+    joint has more rates."""
     (twist,) = joint.twists
     return twist
 
 
 def efforts(joint: JointType, force: Vector, moment: Vector) -> tuple[Scalar, ...]:
-    """Project a force and a moment about the joint frame's origin onto each of the joint's rates."""
+    """Return, for each of the joint's rates, the component of a force and a moment along the rate's twist. The moment
+    is about the joint frame's origin."""
     values = (*force, *moment)
     return tuple(weighted((*linear, *angular), values) for linear, angular in joint.twists)
 
 
 def combined(joint: JointType, rates: Sequence[Scalar]) -> tuple[Vector, Vector]:
-    """Linear and angular part of the sum of the joint's twists times its rates."""
+    """Return the joint's linear and angular velocity: the sum of the joint's twists per unit rate times the given
+    rates."""
     parts = [
         weighted([(*linear, *angular)[part] for linear, angular in joint.twists], rates) for part in range(6)
     ]
@@ -41,12 +45,13 @@ def combined(joint: JointType, rates: Sequence[Scalar]) -> tuple[Vector, Vector]
 
 
 def own_rates(joint: JointType, rates: Scalar) -> tuple[Scalar, ...]:
-    """A joint's rates as a tuple, of one rate too."""
+    """Return the rates of one joint as a tuple; a single rate becomes a tuple with one entry."""
     return rates if isinstance(rates, tuple) else (rates,)
 
 
 def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
-    """The component of a force and a moment about the joint frame's origin along the joint: N m, or N where it slides."""
+    """Return the component of a force and a moment along the joint's axis: N m, or N for a sliding joint. The moment is
+    about the joint frame's origin."""
     linear, angular = axis_twist(joint)
     return weighted((*linear, *angular), (*force, *moment))
 
@@ -57,7 +62,8 @@ def turned(rotation: Matrix, v: tuple[float, float, float]) -> Vector:
 
 
 def momentum(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Momentum and angular momentum about the frame's origin of a body that moves with a constant twist."""
+    """Return the linear momentum of a body that moves with a constant twist, and the angular momentum about the frame's
+    origin."""
     found: tuple[Vector, Vector] | None = None
     for weight, part in zip((*twist[0], *twist[1]), range(6), strict=True):
         if weight == 0.0:

@@ -1,4 +1,5 @@
-"""What both files are written from: links on joints, each with its frame, its body and its joint's friction."""
+"""The robot in the form from which URDF and MJCF files are written: links and joints, with frames, inertias and
+friction."""
 
 from __future__ import annotations
 
@@ -27,16 +28,17 @@ ALONG = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """One moving link. Its frame lies on its joint's axis, as URDF has it.
+    """One moving link as it is written to a URDF or MJCF file. The origin of the link's frame lies on the joint's axis,
+    as URDF requires.
 
-    name      of the link that has the mass
-    parent    number of the body that its joint hangs on, or BASE
-    place     the link's frame in its joint frame
-    origin    the link's frame in its parent's (the base's) at q = 0
-    axis      (3,) of the joint, along the link's own axes
+    name      name of the link
+    parent    index of the body to which the joint is attached, or BASE
+    place     placement of the link's frame in the joint frame
+    origin    placement of the link's frame in the parent link's frame (or the base frame) at q = 0
+    axis      (3,) direction of the joint's axis, along the axes of the link's frame
     inertial  mass (kg), centre of mass (3,) and inertia about it (6,) (kg m^2, INERTIA_NAMES); None: no mass
-    drive     drive inertia, kg m^2 (kg)
-    follows   the coordinate of a joint that follows another
+    drive     drive inertia, kg m^2; kg for a sliding joint
+    follows   if the joint is a mimic joint, the coordinate that it follows
     """
 
     joint: Joint
@@ -53,11 +55,12 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """A robot as it is written.
+    """A robot in the form in which it is written to a file.
 
-    world    placement of the base in a link WORLD whose z points against gravity; None: the base's does, or the robot floats
-    gravity  (3,) m/s^2 along the axes of the outermost link
-    frames  named frames fixed to a body: its number, and the place in the body's link
+    world    placement of the base in a link WORLD whose z axis points against gravity; None if the z axis of the base
+             already does, or if the base floats
+    gravity  (3,) m/s^2, along the axes of WORLD or, without WORLD, of the base
+    frames   named frames that are fixed to a body: the index of the body, and the frame's placement in the body's link
     """
 
     name: str
@@ -69,10 +72,12 @@ class Written:
 
 
 def written(model: DynamicsModel, links: PhysicalLinks, keep_frames: bool) -> Written:
-    """The robot with these links. InputError where a name cannot be written.
+    """Return the robot in the form in which it is written, with the given masses and inertias. Raises InputError if a
+    name cannot be written.
 
-    keep_frames  links keep their frames, which are on their axes (a URDF's); else links off their axes are named anew,
-                 and their frames written beside them
+    keep_frames  True: links keep their frames, which lie on the joint axes (for models from a URDF). False: a link
+                 whose frame is off its axis gets a new frame on the axis, and its old frame is written as a separate
+                 link
     """
     chain = model.mechanism
     found = joint_friction(model)

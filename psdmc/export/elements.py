@@ -1,4 +1,4 @@
-"""Parts of a URDF that both ways of writing one share."""
+"""Functions that make the XML elements of a URDF file, such as <inertial> and <limit>."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ over it."""
 
 
 def inertial_element(body: Body) -> Element | None:
-    """<inertial> about the centre of mass along the link's axes; None where the link has no mass."""
+    """Return the element <inertial> of a link, with the inertia about the centre of mass, along the link's axes. Return
+    None if the link has no mass."""
     if body.inertial is None:
         return None
     mass, com, six = body.inertial
@@ -37,18 +38,21 @@ def inertial_element(body: Body) -> Element | None:
 
 
 def origin_element(place: Placement) -> Element:
-    """<origin> of a placement."""
+    """Return the element <origin> of a placement."""
     return Element("origin", xyz=exact(place.translation), rpy=exact(roll_pitch_yaw_of(place.rotation)))
 
 
 def dynamics_element(friction: JointFriction) -> Element:
-    """<dynamics> of a joint's friction."""
+    """Return the element <dynamics> with the given damping and constant friction of a joint."""
     return Element("dynamics", damping=exact([friction.damping]), friction=exact([friction.constant]))
 
 
 def limit_element(limits: Limits) -> Element:
-    """<limit>; effort and velocity, which URDF requires, are zero where there are none: psdmc and Pinocchio take zero as
-    written, so the largest float stands for none."""
+    """Return the element <limit> with the given limits of a joint.
+
+    URDF requires effort and velocity. If the robot has no limit of effort or velocity, 1e30 is written: psdmc and
+    Pinocchio would read a zero as a limit of zero.
+    """
     given = {"effort": limits.effort, "velocity": limits.speed, "acceleration": limits.acceleration}
     given |= {"lower": limits.lower, "upper": limits.upper}
     required = {"effort", "velocity"}
@@ -65,20 +69,21 @@ LARGEST = 1e30
 
 
 def joint_word(body: Body) -> str:
-    """URDF's type; of two words the last is for a joint without position limits."""
+    """Return the type of a joint in URDF, such as 'revolute', or 'continuous' for a joint without position limits."""
     limits = body.joint.limits
     endless = math.isinf(limits.lower) and math.isinf(limits.upper)
     return body.joint.type.urdf_words[-1 if endless else 0]
 
 
 def fixed_link(robot: Element, frame: NamedFrame, parent: str) -> None:
-    """A link without mass, fixed to another."""
+    """Add a massless link to the robot, fixed to the link `parent` at the placement of a frame."""
     SubElement(robot, "link", name=frame.name)
     fixed_joint(robot, frame.name, parent, frame.placement)
 
 
 def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> None:
-    """Add a fixed joint to the robot; its name is the child's, unless another joint has that."""
+    """Add a fixed joint to the robot. The joint's name is the child link's name with `_fixed` appended. Underscores are
+    added if another joint has this name."""
     joint = SubElement(robot, "joint", name=free_joint_name(robot, f"{child}_fixed"), type="fixed")
     joint.append(origin_element(place))
     SubElement(joint, "parent", link=parent)
@@ -86,7 +91,7 @@ def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> No
 
 
 def free_joint_name(robot: Element, name: str) -> str:
-    """The name, with underscores behind it while another joint has it."""
+    """Return the name, with underscores appended until no other joint of the robot has it."""
     used = {joint.get("name") for joint in robot.findall("joint")}
     while name in used:
         name += "_"
@@ -94,7 +99,8 @@ def free_joint_name(robot: Element, name: str) -> str:
 
 
 def put_on_world(robot: Element, what: Written) -> None:
-    """Hang the base on a link whose z points against gravity, where the base's own does not."""
+    """Attach the base to a new link whose z axis points against gravity. Add no link if the z axis of the base already
+    points against gravity."""
     if what.world is None:
         return
     name, used = WORLD, {link.get("name") for link in robot.findall("link")}
@@ -105,6 +111,6 @@ def put_on_world(robot: Element, what: Written) -> None:
 
 
 def as_text(robot: Element) -> str:
-    """The file's text, its names escaped."""
+    """Return the text of the URDF file, with all names escaped."""
     indent(robot)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + tostring(robot, encoding="unicode") + "\n"

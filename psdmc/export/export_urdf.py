@@ -1,4 +1,5 @@
-"""`psdmc.export_urdf`: a model back as a URDF that has its theta_b, and an MJCF where a URDF cannot hold all of it."""
+"""`psdmc.export_urdf` writes a model as a URDF with the model's theta_b, and as an MJCF if a URDF cannot hold
+everything."""
 
 from __future__ import annotations
 
@@ -33,13 +34,13 @@ GRAVITY_ROUNDING = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exported:
-    """What was written, and how well other readers' torques agree with theta_b.
+    """The result of `export_urdf`: the files, and how well the torques of other programs agree with theta_b.
 
-    urdf, mjcf     the files; mjcf None where none was written
-    links          the links' standard parameters and their divergence from the file's
-    readings       of the URDF, by Pinocchio and MuJoCo
-    mjcf_reading   of the MJCF, by MuJoCo
-    notes          what the files do not hold, and what was changed, one sentence each
+    urdf, mjcf    the files; mjcf is None if no MJCF was written
+    links         standard parameters of the written links, and their distance from those of the robot file
+    readings      comparison of the torques of Pinocchio and MuJoCo for the URDF with those of the model
+    mjcf_reading  comparison of the torques of MuJoCo for the MJCF with those of the model
+    notes         what the files do not contain, and what was changed, one sentence each
     """
 
     urdf: Path

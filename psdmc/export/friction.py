@@ -1,4 +1,5 @@
-"""Friction of a calibrated model as robot files hold it: a constant against the motion, and damping."""
+"""Friction of a calibrated model in the form that robot files can hold: a constant torque against the motion, and
+viscous damping."""
 
 from __future__ import annotations
 
@@ -19,9 +20,10 @@ ORDINARY_SPEED = 1.0
 
 @dataclass(frozen=True, slots=True)
 class JointFriction:
-    """One joint's friction: `constant` N m (N) against the motion, `damping` N m s/rad (N s/m); neither negative.
+    """Friction of one joint as two numbers, neither negative. `constant` is a torque against the motion, N m (N for a
+    sliding joint), and `damping` is N m s/rad (N s/m for a sliding joint).
 
-    lost  what such a pair cannot say of the calibrated friction, in words
+    lost  in words, which parts of the calibrated friction the two numbers cannot express
     """
 
     constant: float
@@ -30,9 +32,9 @@ class JointFriction:
 
 
 def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
-    """Friction by joint name, of joints for which the model was calibrated; empty where it was not.
+    """Return the friction of each calibrated joint, by joint name; empty if the model is not calibrated.
 
-    Each law says which constant and which line are nearest to it, if any.
+    Each friction law gives the constant torque and the damping that are nearest to it, if it has any.
     """
     calibrated = model.calibrated
     if calibrated is None:
@@ -84,7 +86,8 @@ def _of(rows: Sequence[Row], joint: Joint) -> JointFriction:
 
 
 def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """One sentence for each kind of friction that the files do not hold, with the joints."""
+    """Return one sentence for each kind of friction that URDF and MJCF files cannot hold, with the names of the
+    joints."""
     by_kind: dict[str, list[str]] = {}
     for name, friction in found.items():
         for what in friction.lost:
@@ -93,7 +96,8 @@ def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def calibrated_friction_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """What of the calibration is in the files."""
+    """Return sentences that say which part of the calibrated friction is in the written files, and which part is
+    not."""
     if not found:
         return ()
     return (

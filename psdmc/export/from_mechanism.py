@@ -1,4 +1,5 @@
-"""A URDF of a robot whose source is none, such as a DH table: links, joints, bodies, limits; no shapes."""
+"""Writes a URDF for a robot that does not come from a URDF, such as a DH table: links, joints, inertias and limits.
+The result has no shapes."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from psdmc.robot.mechanism import BASE
 
 
 def urdf_of(what: Written) -> Element:
-    """The <robot>."""
+    """Return the element <robot> of a URDF, which contains all links, joints and named frames of the robot."""
     robot = Element("robot", name=what.name, version="1.0")
     SubElement(SubElement(robot, "mujoco"), "compiler", MUJOCO)
     SubElement(robot, "link", name=what.base)
@@ -37,7 +38,7 @@ def urdf_of(what: Written) -> Element:
 
 
 def joint_element(body: Body, what: Written) -> Element:
-    """The <joint> that carries a body."""
+    """Return the element <joint> of the joint that moves a body."""
     joint = Element("joint", name=body.joint.name, type=joint_word(body))
     joint.append(origin_element(body.origin))
     SubElement(joint, "parent", link=what.base if body.parent == BASE else what.bodies[body.parent].name)

@@ -1,4 +1,5 @@
-"""A model's own URDF with other bodies: names, limits, shapes and whatever else it holds stay as they are."""
+"""Writes a URDF from the URDF of which the model was derived, with new inertias. Names, limits, shapes and all other
+content stay unchanged."""
 
 from __future__ import annotations
 
@@ -32,10 +33,11 @@ STILL = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller
 
 
 def urdf_with(what: Written, provenance: Mapping[str, Any]) -> tuple[Element, tuple[str, ...]]:
-    """The <robot> of the model's source below the model's base, with these bodies; and notes on what was changed in it.
+    """Return the element <robot> of the URDF of which the model was derived, with the new inertias, and sentences about
+    the changes. Links above the model's base are left out.
 
-    Joints that the model does not move are fixed where it holds them. The mass of all links that move together is on the
-    one that the joint carries.
+    Joints that the model locks become fixed at their locked positions. If several links move together, the link that
+    the joint moves gets their whole mass.
     """
     text, source = provenance["source_text"], str(provenance.get("source_name", "robot"))
     options = provenance["options"]

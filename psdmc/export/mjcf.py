@@ -1,4 +1,5 @@
-"""An MJCF of the same robot: what a URDF cannot carry, drive inertia as `armature` and gravity, is in it; shapes are not."""
+"""Writes an MJCF of the robot. It contains what a URDF cannot hold: drive inertia, as `armature`, and gravity. It has
+no shapes."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ FULL = (0, 2, 5, 1, 3, 4)
 
 
 def mjcf_of(what: Written) -> Element:
-    """The <mujoco> model. A follower's equation is an equality constraint, which MuJoCo keeps softly."""
+    """Return the element <mujoco>. A mimic joint becomes an equality constraint, which MuJoCo fulfils only
+    approximately."""
     root = Element("mujoco", model=what.name)
     SubElement(root, "compiler", COMPILER)
     SubElement(root, "option", gravity=exact(what.gravity))

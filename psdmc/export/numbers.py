@@ -1,4 +1,4 @@
-"""Placements and numbers as texts that read back to the last digit."""
+"""Writes placements and numbers as text. A program that reads the text gets exactly equal floats."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from psdmc.robot.placement import Array
 
 
 def exact(values: Iterable[float]) -> str:
-    """Numbers with the digits that tell them from any other; minus zero as zero."""
+    """Return numbers as text with as many digits as are needed to read equal floats. Minus zero is written as zero."""
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
 def roll_pitch_yaw_of(rotation: Array) -> tuple[float, float, float]:
-    """rad, R = Rz(yaw) Ry(pitch) Rx(roll); where the pitch is a quarter turn, of the possible ones that with roll 0."""
+    """Return roll, pitch, yaw (rad) of a rotation Rz(yaw) Ry(pitch) Rx(roll). If the pitch is a right angle, roll is
+    0."""
     across = math.hypot(rotation[0, 0], rotation[1, 0])
     pitch = math.atan2(-rotation[2, 0], across)
     if across < QUARTER:
@@ -30,7 +31,10 @@ QUARTER = 1e-9
 
 
 def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
-    """Unit quaternion w x y z of a rotation, w not negative; from its largest component, so that no digits are lost."""
+    """Return the unit quaternion (w, x, y, z) of a rotation, with w not negative.
+
+    The largest component is computed first, so that no digits are lost.
+    """
     r = rotation
     trace = float(np.trace(r))
     diagonal = [trace, float(r[0, 0]), float(r[1, 1]), float(r[2, 2])]

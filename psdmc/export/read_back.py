@@ -1,4 +1,5 @@
-"""Written robots read back by Pinocchio and MuJoCo: the largest difference of their torques from theta_b's."""
+"""Compares the torques that Pinocchio and MuJoCo compute from a written URDF or MJCF file with those of the model. The
+result is the largest difference."""
 
 from __future__ import annotations
 
@@ -25,11 +26,11 @@ LIMIT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One reader's torques beside theta_b's over random states.
+    """The comparison of the torques that another program computes with the model's torques, at random states.
 
-    reader   its name
-    error    largest difference, as a share of the joint's largest torque; NaN where it was not compared
-    reason   why not, in words
+    reader  name of the program, such as Pinocchio
+    error   largest torque difference, divided by the joint's largest torque; NaN if torques were not compared
+    reason  why torques were not compared, in words
     """
 
     reader: str
@@ -38,10 +39,11 @@ class Reading:
 
 
 def read_urdf_back(model: DynamicsModel, text: str, drives: Array, gravity: Array) -> tuple[Reading, ...]:
-    """The URDF read by Pinocchio and by MuJoCo, against the model's theta_b without its drive inertias.
+    """Compare the torques that Pinocchio and MuJoCo compute from a URDF with those of the model without its drive
+    inertias.
 
-    drives   (n,) drive inertias of the links that were written: a URDF has none
-    gravity  (3,) m/s^2 in the file's root
+    drives   (n,) drive inertias of the links that were written, which a URDF cannot hold
+    gravity  (3,) m/s^2 along the axes of the file's root link
     """
     floating = not model.mechanism.types[0].about_z
     loaded = load_robot_text(
@@ -71,7 +73,8 @@ def _mujoco(loaded: LoadedRobot, states: tuple[Array, Array, Array]) -> Array:
 
 
 def read_mjcf_back(model: DynamicsModel, text: str) -> Reading:
-    """The MJCF read by MuJoCo, with armature and gravity but without friction, against all of the model's theta_b."""
+    """Compare the torques that MuJoCo computes from an MJCF, without friction, with those of the model with its drive
+    inertias."""
     try:
         import mujoco
     except ImportError:

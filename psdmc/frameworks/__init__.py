@@ -1,1 +1,1 @@
-"""Compiled robots inside array frameworks that differentiate: JAX and PyTorch."""
+"""The functions of compiled robots for JAX and PyTorch, which can differentiate these functions."""

@@ -1,4 +1,5 @@
-"""The functions that make robots for array frameworks. The frameworks are optional, and imported when they are asked for."""
+"""The functions `psdmc.jax` and `psdmc.torch`. JAX and PyTorch are optional; `psdmc.jax` imports JAX when it is called,
+and `psdmc.torch` imports PyTorch."""
 
 from __future__ import annotations
 

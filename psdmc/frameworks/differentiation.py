@@ -1,7 +1,8 @@
-"""How array frameworks differentiate generated functions: by which other generated functions, over any array library.
+"""Rules by which JAX and PyTorch differentiate a generated function: each rule calls other generated functions.
 
-A derivative by q is along the tangent at q here, with nv entries. `Coordinates` leads from there to derivatives by the nq
-entries of q: a framework evaluates f(q with its quaternions normalised), and differentiates that.
+In this module, a derivative by q has one entry for each of the nv joint rates. It is the derivative as q moves at that
+rate ("along the tangent"). `Coordinates` converts it to the derivative by the nq entries of q. If q contains
+quaternions, the derivative is that of f(q with normalized quaternions).
 """
 
 from __future__ import annotations
@@ -24,31 +25,35 @@ Arrays = tuple[Array, ...]
 
 
 class ArgumentError(InputError, ValueError):
-    """A framework's function was called with a wrong argument, or differentiated by an input that has no derivative."""
+    """A JAX or PyTorch function of a robot has a wrong argument, or its derivative by this argument does not exist."""
 
 
 class Framework(Protocol):
-    """What a rule runs on."""
+    """The array library of JAX or PyTorch, and a method that calls generated functions. Differentiation rules use
+    both."""
 
     @property
     def arrays(self) -> Any:
-        """The library: jax.numpy, torch or numpy."""
+        """The array library: jax.numpy, torch or numpy."""
 
     def call(self, function: str, *inputs: Array) -> Arrays:
-        """The outputs of a generated function, with theta_b where the caller gave it and the function takes it. Leading axes
-        broadcast, those of theta_b too."""
+        """Return the outputs of a generated function. If the user gave a theta_b and the function depends on theta_b,
+        the user's values are used. Leading axes broadcast, those of theta_b too."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """How one generated function is differentiated.
+    """How JAX and PyTorch differentiate one generated function.
 
-    along       (framework, inputs, tangents, dtheta) to the tangents of all outputs; a tangent of an input or output along
-                nq has nv entries. dtheta: (..., l), or None where theta_b does not change
-    back        (framework, inputs, cotangents, by_theta) to the gradients of the weighted outputs by each input, and by
-                theta_b (..., l) if `by_theta`, else None. Gradients have the leading axes of the states
+    along       forward mode: function of (framework, inputs, tangents, dtheta) that returns the derivatives of all
+                outputs along the tangents. `tangents` are directions in which the inputs change; that of a
+                configuration q has nv entries. dtheta: (..., l), direction of theta_b, or None if theta_b does not
+                change
+    back        reverse mode: function of (framework, inputs, cotangents, by_theta) that returns the gradients of
+                sum(cotangents * outputs) by each input. If `by_theta`, it also returns the gradient by theta_b (...,
+                l), else None. Gradients have the leading axes of the states
     parameters  whether there are derivatives by theta_b
-    constant    names of inputs by which there are none: their tangents are not read, their gradients are None
+    constant    names of the inputs without derivatives: their tangents are ignored, and their gradients are None
     """
 
     along: Callable[[Framework, Arrays, Arrays, Array | None], Arrays]
@@ -58,7 +63,8 @@ class Rule:
 
 
 def rule_of(function: str) -> Rule | None:
-    """How a generated function is differentiated; None if there is no way."""
+    """Return the rule by which JAX and PyTorch differentiate a generated function; None if psdmc has no rule for this
+    function."""
     if f"{function}_vjp" in SIGNATURES and f"{function}_jvp" in SIGNATURES:
         return _gradient(function)
     if "A" in (output.name for output in _outputs(f"{function}_derivatives")):
@@ -67,7 +73,8 @@ def rule_of(function: str) -> Rule | None:
 
 
 def require_rule(function: str) -> Rule:
-    """How a generated function is differentiated; ArgumentError, which names it, if there is no way."""
+    """Return the rule by which JAX and PyTorch differentiate a generated function. Raises ArgumentError if psdmc has no
+    rule for this function."""
     rule = rule_of(function)
     if rule is None:
         known = ", ".join(name for name in SIGNATURES if rule_of(name))
@@ -80,7 +87,7 @@ def require_rule(function: str) -> Rule:
 
 
 def refuse_constant(function: str, given: str) -> ArgumentError:
-    """The error of a derivative by an input, or by theta_b, that a function's rule does not have."""
+    """Return the error that says: `function` has no derivative by the input named `given`, or by theta_b."""
     if given == "theta_b":
         known = ", ".join(name for name in SIGNATURES if (rule := rule_of(name)) and rule.parameters)
         return ArgumentError(f"{function} has no derivative by theta_b", f"these functions have one: {known}")
@@ -280,12 +287,13 @@ _OTHERS = {
 
 @dataclass(frozen=True, slots=True)
 class Coordinates:
-    """The maps between the nq entries of q and the nv entries of tangents, for the joints of one robot in a row.
+    """Conversions between derivatives by the nq entries of q and derivatives along the nv joint rates (the tangent),
+    for one robot.
 
-    Arrays of one call are (..., nq) or (..., nv), with the same leading axes.
+    The arrays of a call have the shapes (..., nq) or (..., nv), with equal leading axes.
 
     arrays  the library: jax.numpy, torch or numpy
-    joints  types of the joints that have coordinates
+    joints  types of the joints, without mimic joints
     """
 
     arrays: Any
@@ -302,24 +310,29 @@ class Coordinates:
 
     @classmethod
     def of(cls, mechanism: Mechanism, arrays: Any) -> Coordinates:
-        """Those of a robot's own joints."""
+        """Return the Coordinates of a robot (conversions between q's entries and joint rates), for the joints without
+        mimic joints."""
         return cls(arrays, tuple(mechanism.joints[i].type for i in mechanism.own_joints))
 
     @property
     def are_plain(self) -> bool:
-        """Whether every joint has one coordinate: then q is its own tangent, and all maps are the identity."""
+        """Whether every joint has one coordinate, so that the nq entries of q are the nv joint coordinates and no
+        conversion is needed."""
         return all(joint.about_z for joint in self.joints)
 
     def normalized(self, q: Array) -> Array:
-        """q with its quaternions, or cosines and sines, of length one; NaN where such a length is zero."""
+        """Return q with normalized quaternions, and with normalized pairs of cosine and sine. The result is NaN if a
+        quaternion or pair is zero."""
         return self._made([joint.restored(here) for joint, here in self._parts(q)], q)
 
     def tangent(self, q: Array, moved: Array) -> Array:
-        """(..., nv) the tangent along which q moves while its entries move by `moved`, (..., nq)."""
+        """Return the joint displacements (..., nv), one per joint rate, for a small change `moved` (..., nq) of the
+        entries of q."""
         return self._made([joint.tangent(here, own) for joint, here, own in self._pairs(q, moved)], q)
 
     def gradient(self, q: Array, by_tangent: Array) -> Array:
-        """(..., nq) the derivatives by the entries of q of what has the derivatives (..., nv) along the tangent."""
+        """Return the gradient (..., nq) by the entries of q, from the gradient `by_tangent` (..., nv) by joint
+        displacements, one per joint rate."""
         found = []
         for joint, here, own in self._pairs(q, by_tangent, rates=True):
             for k in range(joint.nq):
@@ -328,13 +341,15 @@ class Coordinates:
         return self._made(found, q)
 
     def rates(self, q: Array, v: Array) -> Array:
-        """(..., nq) how the entries of q, of length one, move along the tangent v, (..., nv)."""
+        """Return the rates of change (..., nq) of the entries of q at the joint rates v (..., nv). Quaternions in q
+        must have length one."""
         return self._made(
             [j.coordinate_rates(here, own) for j, here, own in self._pairs(q, v, rates=True)], q
         )
 
     def pulled_back(self, q: Array, gradient: Array) -> Array:
-        """(..., nv) the derivatives along the tangent of what has these derivatives (..., nq) by the entries of q."""
+        """Return the gradient (..., nv) by joint displacements, one per joint rate, from the gradient (..., nq) by the
+        entries of q."""
         found = []
         for joint, here, own in self._pairs(q, gradient):
             for k in range(joint.nv):
@@ -343,11 +358,11 @@ class Coordinates:
         return self._made(found, q)
 
     def integrated(self, q: Array, v: Array) -> Array:
-        """q after constant rates v for one second, as the generated function `integrate`."""
+        """Return q after one second at the constant rates v, like the generated function `integrate`."""
         return self._made([j.integrated(here, own) for j, here, own in self._pairs(q, v, rates=True)], q)
 
     def difference(self, q0: Array, q1: Array) -> Array:
-        """The constant rates that lead from q0 to q1 in one second, as the generated function `difference`."""
+        """Return the constant rates that lead from q0 to q1 in one second, like the generated function `difference`."""
         return self._made([joint.difference(here, there) for joint, here, there in self._pairs(q0, q1)], q0)
 
     def _parts(self, values: Array, rates: bool = False) -> Iterator[tuple[JointType, list[_Entry]]]:

@@ -1,8 +1,9 @@
-"""The functions of a compiled robot as functions of JAX, which it compiles, batches and differentiates.
+"""The functions of a compiled robot as functions of JAX, which can compile, batch and differentiate them.
 
-Two primitives do it for all functions. One calls a generated function; its derivative is the other, which is linear in the
-tangents, computes them by the function's rule (differentiation.py), and has the rule's reverse mode as its transpose. Both
-take any leading axes, so that `vmap` adds one.
+psdmc registers two JAX primitives (basic operations) for all functions. The first calls a generated function. The
+second computes its derivative along tangents, by the rules of differentiation.py. For reverse mode, JAX transposes the
+second primitive, and psdmc then applies the rule's reverse mode. Both primitives accept any leading axes, so `vmap`
+adds one.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
+from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.call_arguments import bound_arguments
@@ -54,7 +56,7 @@ def jax_robot(
     trig: Trig | None,
     target: str | Target,
 ) -> JaxRobot:
-    """The robot of `psdmc.jax`; the same object for equal requests."""
+    """Return the robot of a model for JAX. Equal arguments give the same object; `psdmc.jax` explains them."""
     found = model_of(model)
     compiled = compile(found, lowering, real=real, trig=trig, target=target)
     if compiled.dtype == np.float64 and not jax.config.jax_enable_x64:
@@ -73,12 +75,13 @@ def jax_robot(
 class JaxRobot:
     """A robot whose methods, one for each generated function, are functions of JAX. `psdmc.jax` makes such robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy. If
-    the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several results
-    returns a named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. Leading axes broadcast as in NumPy.
+    If the mass matrix of a state is not positive definite, the results of this state are NaN. A method with several
+    results returns a named tuple.
 
-    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
-    its nq entries, and zero along the quaternion.
+    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
+    derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
+    zero.
     """
 
     def __init__(
@@ -98,7 +101,8 @@ class JaxRobot:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"
 
     def call(self, function: Signature, inputs: Sequence[Any], theta_b: Any = None) -> Any:
-        """Call a generated function by its entry in `psdmc.functions.SIGNATURES`, and return the result."""
+        """Call a generated function of the robot, and return the result. `function` is an entry of
+        `psdmc.functions.SIGNATURES`."""
         if not function.inputs:
             return jnp.asarray(getattr(self.compiled, function.name)())
         pairs = zip(function.inputs, inputs, strict=True)
@@ -167,18 +171,22 @@ for _function in SIGNATURES.values():
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """A generated function of one robot, with theta_b as its last argument or not: a parameter of JAX's primitives."""
+    """The generated function that JAX's primitives call.
+
+    theta  whether theta_b is the last argument
+    """
 
     robot: JaxRobot
     function: Signature
     theta: bool
 
     def with_tail(self, lead: tuple[int, ...], quantity: Quantity) -> tuple[int, ...]:
-        """The shape of an input or output for leading axes."""
+        """Return the shape of an input or output: the leading axes `lead`, then the axes of one state."""
         return lead + self._sizes.shape(quantity.axes)
 
     def given(self, inputs: Sequence[Array], theta_b: Array | None) -> list[Array]:
-        """All arguments of the call, with common leading axes. One theta_b for all states stays alone."""
+        """Return all arguments of one call of the function, broadcast to common leading axes. A theta_b of shape (l,)
+        is not broadcast."""
         named = [*zip(self.function.inputs, inputs, strict=True)]
         named += [] if theta_b is None else [(THETA, theta_b)]
         leads = [x.shape[: x.ndim - len(quantity.axes)] for quantity, x in named]
@@ -195,7 +203,7 @@ class Kernel:
         ]
 
     def lead(self, first: Any) -> tuple[int, ...]:
-        """The leading axes, from the first argument."""
+        """Return the leading axes of the states, from the shape of the function's first argument."""
         return tuple(first.shape[: first.ndim - len(self.function.inputs[0].axes)])
 
     @cached_property
@@ -204,11 +212,14 @@ class Kernel:
         packed = any("nonzeros" in output.axes for output in self.function.outputs)
         return replace(sizes, nonzeros=len(self.robot.compiled.pattern(name)[0])) if packed else sizes
 
-    @cached_property
-    def number(self) -> int:
-        """The number by which XLA calls the function, which is compiled now if it was not."""
+    def number(self, by_rows: bool) -> int:
+        """Return the number under which XLA finds the compiled function. If the function is not compiled yet, psdmc
+        compiles it.
+
+        by_rows  whether each state has its own theta_b
+        """
         compiled, function = self.robot.compiled, self.function
-        name = function.name + ("_theta" if self.theta else "")
+        name = function.name + (THETA_ROWS if by_rows else "_theta" if self.theta else "")
         number = xla.number_of(f"{self.robot._key} {name}")
         given = (*function.inputs, *((THETA,) if self.theta else ()))
         xla.add(
@@ -216,7 +227,7 @@ class Kernel:
             compiled.address_of(name),
             bool(function.factorises),
             compiled.dtype == np.float32,
-            len(function.inputs) if self.theta else None,
+            len(function.inputs) if self.theta and not by_rows else None,
             tuple(self._sizes.size(quantity) for quantity in (*given, *function.outputs)),
         )
         return number
@@ -263,7 +274,8 @@ def _called(*given: Array, kernel: Kernel) -> list[Array]:
         jax.ShapeDtypeStruct(kernel.with_tail(lead, output), given[0].dtype)
         for output in kernel.function.outputs
     ]
-    return list(jax.ffi.ffi_call(xla.TARGET, shapes)(*given, function=np.int64(kernel.number)))
+    number = kernel.number(by_rows=kernel.theta and given[-1].ndim > 1)
+    return list(jax.ffi.ffi_call(xla.TARGET, shapes)(*given, function=np.int64(number)))
 
 
 _call.def_abstract_eval(_shapes)

@@ -1,7 +1,7 @@
-"""A robot's generated functions as PyTorch operators on CPU tensors, with derivatives in both modes.
+"""A robot's generated functions as PyTorch operators on CPU tensors, with derivatives in forward and reverse mode.
 
-Each function is an operator of torch.library, so torch.compile keeps it in its graph. Its kernel gives the tensors' memory
-to the compiled C code. Its autograd kernel follows the function's rule (differentiation.py).
+psdmc registers each function as an operator of torch.library, so torch.compile keeps it in its graph. The operator
+passes the memory of the tensors to the compiled C code. Its derivatives follow the rules of differentiation.py.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
+from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
@@ -65,7 +66,7 @@ def torch_robot(
     trig: Trig | None = None,
     target: str | Target = NATIVE,
 ) -> TorchRobot:
-    """Return the robot of a model, the same one for the same options; `psdmc.torch` explains them."""
+    """Return the robot of a model for PyTorch. Equal options give the same object; `psdmc.torch` explains the options."""
     found = model_of(model)
     key = hashlib.sha256(repr((found.content_hash, lowering, trig, target)).encode()).hexdigest()
     if key not in _ROBOTS:
@@ -74,14 +75,16 @@ def torch_robot(
 
 
 class TorchRobot:
-    """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such robots.
+    """A robot whose methods, one for each generated function, take and return CPU tensors. `psdmc.torch` makes such
+    robots.
 
-    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64, or
-    all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite,
-    the results of this state are NaN. A method with several results returns a named tuple.
+    The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64,
+    or all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
+    definite, the results of this state are NaN. A method with several results returns a named tuple.
 
-    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the derivative by
-    its nq entries, and zero along the quaternion. Second derivatives are not available.
+    The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
+    derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
+    zero. Second derivatives are not available.
     """
 
     def __init__(self, model: DynamicsModel, options: tuple[Any, ...], key: str) -> None:
@@ -106,7 +109,8 @@ class TorchRobot:
         return f"TorchRobot {self.model.mechanism.name!r}: {self.model.n} joints"
 
     def compiled(self, dtype: Any = torch.float64) -> CompiledRobot[Any]:
-        """Return the same robot for NumPy arrays, with the C code that the methods call for tensors of this dtype."""
+        """Return the CompiledRobot (functions in C for NumPy arrays) that the methods call for tensors of the given
+        floating-point type."""
         if dtype not in self._compiled:
             lowering, trig, target = self._options
             self._compiled[dtype] = compiled(
@@ -116,19 +120,21 @@ class TorchRobot:
 
     @property
     def theta_b(self) -> Tensor:
-        """Return the model's base parameters, a new tensor (l,), float64, SI units; None if they are unknown."""
+        """Return the base parameters of the model as a new float64 tensor (l,), in SI units, or None if they are
+        unknown."""
         known = self.compiled().theta_b
         return None if known is None else torch.tensor(known)
 
     def shape(self, quantity: Quantity) -> tuple[int, ...]:
-        """Return the axes of an input or output of one state."""
+        """Return the shape of a function's input or output for one state."""
         model, chain = self.model, self.model.mechanism
         rows = chain.rows_of_contacts
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=rows)
         return sizes.shape(quantity.axes)
 
     def operator(self, function: str) -> Any:
-        """Return PyTorch's operator for a generated function, whose arguments are tensors, and theta_b or None."""
+        """Return PyTorch's operator that calls a generated function. The operator's arguments are tensors, and theta_b
+        or None."""
         return self._operators[function]
 
     def _on_coordinates(self, function: Signature, tensors: Sequence[Tensor]) -> Tensor:
@@ -218,7 +224,7 @@ class _Operator:
     function: Signature
 
     def registered(self, name: str) -> Any:
-        """Register the operator with PyTorch under this name, and return it."""
+        """Register this generated function with PyTorch as an operator of the given name, and return the operator."""
         given = [f"Tensor {quantity.name}" for quantity in self.function.inputs]
         given += ["Tensor? theta_b=None"] if self.function.theta else []
         returned = ", ".join(["Tensor"] * len(self.function.outputs))
@@ -232,31 +238,37 @@ class _Operator:
         return operator
 
     def compute(self, *given: Tensor) -> Any:
-        """Call the C function with the tensors' memory. Only what is not contiguous rows of all states is copied."""
+        """Compute the results by a call of the C function on the memory of the tensors. A tensor is copied only if its
+        entries are not contiguous for each state."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
-        pairs = zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
-        rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in pairs]
-        robot, states = self.robot.compiled(inputs[0].dtype), math.prod(lead)
-        kernel = self.function.name + ("" if theta_b is None else "_theta")
-        thetas = () if not states else ((),) if theta_b is None else _apart(theta_b, lead).split(1)
-        for k, theta in enumerate(thetas):
-            ins, outs = ([x.data_ptr() + k * (x.nbytes // len(thetas)) for x in xs] for xs in (rows, made))
-            own = [part.data_ptr() for part in theta]
-            robot.call_at(kernel, states // len(thetas), [*ins, *own, *outs])
+        named = list(
+            zip(self.function.inputs, map(self.normalized, self.function.inputs, inputs), strict=True)
+        )
+        kernel, own = self.function.name, []
+        if theta_b is not None and theta_b.numel() == theta_b.shape[-1]:
+            kernel, own = f"{kernel}_theta", [theta_b.contiguous()]
+        elif theta_b is not None:
+            kernel, named = f"{kernel}{THETA_ROWS}", [*named, (THETA_B, theta_b)]
+        rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in named]
+        places = [tensor.data_ptr() for tensor in (*rows, *own, *made)]
+        self.robot.compiled(inputs[0].dtype).call_at(kernel, math.prod(lead), places)
         return made[0] if len(made) == 1 else tuple(made)
 
     def without_values(self, *given: Tensor) -> Any:
-        """Return tensors of the results' shapes, for torch.compile."""
+        """Return tensors with the shapes of the results but without values. torch.compile needs these shapes when it
+        traces a program."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         return made[0] if len(made) == 1 else tuple(made)
 
     def differentiable(self, operator: Any) -> Callable[..., Any]:
-        """Return the operator's kernel for autograd, which calls the operator below autograd and keeps what its rule needs.
+        """Return the function that PyTorch calls for differentiable arguments. It calls the operator, and saves the
+        values that the differentiation rule needs.
 
-        PyTorch's own custom_op has no forward mode, and an autograd.Function with one breaks graphs of torch.compile. A
-        function for one level of autograd in the operator's own kernel has neither limit (decision 0156).
+        PyTorch's custom_op has no forward mode, and torch.compile cannot trace an autograd.Function with forward mode.
+        An autograd.Function within the operator's kernel (the function that PyTorch runs) has neither limit (decision
+        0156).
         """
 
         def forward(*given: Tensor) -> Any:
@@ -274,7 +286,8 @@ class _Operator:
         return kernel
 
     def over_batches(self, operator: Any) -> Callable[..., Any]:
-        """Return the operator's rule for vmap: the batch becomes the first of the leading axes, which broadcast."""
+        """Return the function by which torch.func.vmap calls the operator: the batch axis becomes the first leading
+        axis. Leading axes broadcast."""
         quantities = (*self.function.inputs, THETA_B)
 
         def rule(info: Any, dims: Sequence[int | None], *given: Tensor) -> Any:
@@ -363,9 +376,9 @@ class _Operator:
         return saved[:count], saved[count] if self.function.theta else None, saved[end:]
 
     def checked(self, given: Sequence[Tensor]) -> tuple[list[Tensor], Tensor, tuple[int, ...]]:
-        """Inputs, theta_b or None, and the leading axes that they broadcast to.
+        """Return the tensors of the inputs, theta_b or None, and the leading axes to which they broadcast.
 
-        TypeError for another dtype, ArgumentError for another shape.
+        Raises TypeError if a tensor has another dtype, ArgumentError if a tensor has another shape.
         """
         count, name = len(self.function.inputs), self.function.name
         pairs = [
@@ -408,11 +421,3 @@ class _Operator:
     def _is_wide(self, quantity: Quantity) -> bool:
         """Whether it is a position whose entries are not its tangent's."""
         return quantity.axes == Q.axes and not self.robot.coordinates.are_plain
-
-
-def _apart(theta_b: Tensor, lead: tuple[int, ...]) -> Tensor:
-    """(k, l) the parameters of k equal parts of the states, in order: those that neighbouring states share stand once."""
-    own = (1,) * (len(lead) - theta_b.ndim + 1) + tuple(theta_b.shape[:-1])
-    ends = max((k + 1 for k, length in enumerate(own) if length > 1), default=0)
-    values = theta_b.reshape(*own[:ends], theta_b.shape[-1])
-    return values.expand(*lead[:ends], -1).reshape(-1, theta_b.shape[-1]).contiguous()

@@ -1,4 +1,5 @@
-"""Functions of compiled robots as custom calls of XLA on a CPU: psdmc/frameworks/xla_call.c, compiled once a machine."""
+"""Makes functions of compiled robots callable from XLA programs on a CPU. The C code in psdmc/frameworks/xla_call.c is
+compiled once on each machine."""
 
 from __future__ import annotations
 
@@ -24,17 +25,19 @@ BITS = 63
 
 
 def number_of(key: str) -> int:
-    """The number that stands for a function in programs of XLA, the same in each process."""
+    """Return the number under which XLA programs find the function with the name `key`. The number is equal in every
+    process."""
     return int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big") >> (64 - BITS)
 
 
 def add(
     number: int, address: int, can_fail: bool, is_single: bool, theta: int | None, sizes: tuple[int, ...]
 ) -> None:
-    """Let XLA call a batch function, whose library must stay open, by a number.
+    """Register a batch function (one call for many states) with XLA under a number. The library of the function must
+    stay loaded as long as XLA can call it.
 
-    theta  the place of theta_b among the arrays
-    sizes  entries of each array for one state, of theta_b all: inputs, theta_b, outputs
+    theta  index of theta_b among the arrays, or None
+    sizes  number of entries of each array per state, in the order inputs, theta_b, outputs; of theta_b all entries
     """
     place, counts = -1 if theta is None else theta, (ctypes.c_int64 * len(sizes))(*sizes)
     if not _library().psdmc_xla_add(

@@ -16,10 +16,9 @@ enum { PLACES = 1024 };    /* of the table, a power of two; functions that share
 typedef struct Function {
     int64_t number;
     void (*batch)(void);
-    int failures, arrays, theta;            /* theta: the place of theta_b, or -1 */
-    size_t real;                            /* bytes */
+    int failures, arrays, theta;            /* theta: the place of the theta_b of all states, or -1 */
     XLA_FFI_DataType type;
-    size_t size[MOST_CALLED];               /* entries for one state; of theta_b all */
+    size_t size[MOST_CALLED];               /* entries for one state; of that theta_b all */
     struct Function *next;
 } Function;
 
@@ -43,7 +42,6 @@ int psdmc_xla_add(int64_t number, uintptr_t batch, int failures, int is_single, 
     made->failures = failures;
     made->arrays = arrays;
     made->theta = theta;
-    made->real = is_single ? sizeof(float) : sizeof(double);
     made->type = is_single ? XLA_FFI_DataType_F32 : XLA_FFI_DataType_F64;
     for (int k = 0; k < arrays; k++) made->size[k] = (size_t)sizes[k];
     _Atomic(Function *) *place = &table[(uint64_t)number % PLACES];
@@ -78,32 +76,16 @@ static size_t entries(const XLA_FFI_Buffer *buffer)
     return count;
 }
 
-/* The states of a call, and whether each has a theta_b of its own; 0 if an array does not fit. */
-static int fits(const Function *function, XLA_FFI_Buffer *const *buffers, size_t *states, int *is_own)
+/* The states of a call; 0 if an array does not fit. */
+static int fits(const Function *function, XLA_FFI_Buffer *const *buffers, size_t *states)
 {
     *states = function->size[0] == 0 ? 0 : entries(buffers[0]) / function->size[0];
     for (int k = 0; k < function->arrays; k++) {
         const size_t count = entries(buffers[k]);
         if (buffers[k]->dtype != function->type) return 0;
-        if (k == function->theta && count == function->size[k]) continue;
-        if (k == function->theta) *is_own = 1;
-        if (count != *states * function->size[k]) return 0;
+        if (count != (k == function->theta ? 1 : *states) * function->size[k]) return 0;
     }
     return 1;
-}
-
-/* Call for each run of states with the same theta_b. */
-static void run_by_theta(const Function *function, size_t states, void *const *data)
-{
-    const size_t row = function->size[function->theta] * function->real;
-    const char *thetas = data[function->theta];
-    for (size_t from = 0, to; from < states; from = to) {
-        to = from + 1;
-        while (to < states && memcmp(thetas + to * row, thetas + from * row, row) == 0) to++;
-        void *own[MOST_CALLED];
-        for (int k = 0; k < function->arrays; k++) own[k] = (char *)data[k] + from * function->size[k] * function->real;
-        run(function->batch, function->failures, to - from, function->arrays, own);
-    }
 }
 
 XLA_FFI_Error *psdmc_xla_call(XLA_FFI_CallFrame *frame)
@@ -125,9 +107,7 @@ XLA_FFI_Error *psdmc_xla_call(XLA_FFI_CallFrame *frame)
         data[k] = buffers[k]->data;
     }
     size_t states;
-    int is_own = 0;
-    if (!fits(function, buffers, &states, &is_own)) return refuse(frame, "psdmc: an array has another shape or dtype than the function's");
-    if (is_own) run_by_theta(function, states, data);
-    else if (states > 0) run(function->batch, function->failures, states, function->arrays, data);
+    if (!fits(function, buffers, &states)) return refuse(frame, "psdmc: an array has another shape or dtype than the function's");
+    if (states > 0) run(function->batch, function->failures, states, function->arrays, data);
     return NULL;
 }

@@ -1,4 +1,4 @@
-"""What a file with a friction law imports: the law, its values, and functions of its scalars."""
+"""The names that a Python file with a friction law imports: the classes Law, Value and At, and elementary functions."""
 
 from psdmc.friction.law import At as At
 from psdmc.friction.law import Law as Law

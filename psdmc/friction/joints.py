@@ -1,4 +1,4 @@
-"""Friction of a robot's joints: terms, and the values that a calibration found for them."""
+"""Friction of all joints of a robot: the terms, and the values that a calibration found for them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,14 @@ MOST_TERMS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Friction:
-    """Friction torque of n joints: the sum of terms, sizes against the motion first.
+    """Friction torque of n joints, as a sum of m terms such as Coulomb and viscous friction. Terms that act against the
+    motion come first.
 
-    terms       each with its law
-    values      (n, m) one row for each joint; zero where a joint lacks a term
-    sign_speed  rad/s (m/s) over which friction changes sign, so that it is smooth
-    beyond      what else the calibration found beside rigid bodies, in words without names
+    terms       each a friction law and, if the law has one, its exponent or velocity
+    values      (n, k) fitted values, such as coefficients: a row for each joint, columns in the order of the terms;
+                zero if a joint lacks a term
+    sign_speed  speed, rad/s (m/s), near which the sign of the motion changes smoothly
+    beyond      what else the calibration found in addition to rigid bodies, in words without names
     """
 
     terms: tuple[Term, ...]
@@ -37,20 +39,25 @@ class Friction:
 
     @property
     def by_position(self) -> bool:
-        """Whether the torque depends on the joints' positions."""
+        """Return whether the friction torque depends on the joints' positions."""
         return any("q" in term.reads for term in self.terms)
 
     def by_speed(self, qd: Array) -> Array:
-        """(..., n) torque of the terms that do not depend on positions."""
+        """Return the friction torque (..., n) at speeds qd (..., n), N m (N for a sliding joint), from the terms that
+        do not depend on positions."""
         here = [(term, own) for term, own in self._rows(list(self.values.T)) if "q" not in term.reads]
         return self._torque(here, np.asarray(qd), 0.0)
 
     def torque(self, qd: ArrayLike, q: ArrayLike = 0.0) -> Array:
-        """(..., n) N m (N) at speeds and positions (..., n), to be added to what the rigid bodies take."""
+        """Return the friction torque (..., n), N m (N for a sliding joint), at speeds and positions (..., n). The motor
+        torque is the sum of this torque and the torque of the rigid bodies."""
         return self._torque(self._rows(list(self.values.T)), np.asarray(qd, dtype=np.float64), np.asarray(q))
 
     def program(self) -> Program:
-        """One joint's friction tau[0] by its values p[...], its speed v[0] and its position q[0]."""
+        """Return a PROGRAM (list of operations) for one joint, which computes the friction torque tau[0].
+
+        The inputs of the PROGRAM are the joint's friction values p[...], the speed v[0] and the position q[0].
+        """
         tracer = Tracer()
         p = tracer.symbols("p", self.values.shape[1])
         v = tracer.symbol(Slot("v", 0))
@@ -70,7 +77,8 @@ class Friction:
 
 
 def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """What acts against the motion first, constants last."""
+    """Return friction terms in the order that psdmc uses: terms that act against the motion first, constant torques
+    last."""
     return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
 
 
@@ -81,11 +89,13 @@ def found_friction(
     laws: Mapping[str, Law],
     sign_speed: float,
 ) -> Friction:
-    """The friction of values by joint and name, without what depends on the load; KeyError or ValueError where these are
-    damaged.
+    """Return the Friction that has the given values, without terms that depend on the load.
 
-    everyone_s  terms that each joint must have
-    laws        that values may be of, by name
+    values      fitted values by the names of the joint and of the value
+    everyone_s  terms that every joint must have
+    laws        friction laws by name, among which psdmc finds the law of each value
+
+    Raises KeyError if a value is missing, ValueError if a value is not finite or belongs to no law.
     """
     if not sign_speed > 0.0:
         raise ValueError(f"sign_speed {sign_speed:g}")
@@ -110,10 +120,11 @@ def found_friction(
 
 
 def rows_of(values: Mapping[str, float], law: str, laws: Mapping[str, Law]) -> list[Row]:
-    """Terms of one joint with its values by name; names of no law are left out.
+    """Return the friction terms of one joint, each with its list of values. Values that belong to no law are left out.
 
-    law   the name of a law with a state, if the values are of one
-    laws  that values may be of, by name
+    values  values of the joint by name
+    law     name of the joint's friction law if it has an internal state (such as LuGre)
+    laws    friction laws by name, among which psdmc finds the law of each value
     """
     whole = WITH_STATE.get(law)
     if whole is not None and set(whole.parameters) <= set(values):

@@ -1,4 +1,4 @@
-"""A friction law: what it is called, which values of a joint it has, and the torque that these make."""
+"""Classes that describe a friction law: its name, the values that are fitted for each joint, and its torque."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Text = str | Callable[[float], str]
 
 @dataclass(frozen=True, slots=True)
 class At:
-    """One joint at an instant; a law that reads none of these is a constant.
+    """The state of one joint at an instant, from which a friction law computes its torque.
 
-    q, v  rad, rad/s (m, m/s)
-    sign  tanh(v / sign speed): the direction of motion, smooth at rest
-    load  N m (N), what the rigid bodies take of the joint
-    z     the law's state, where it has one
+    q, v  position and speed: rad, rad/s (m, m/s)
+    sign  tanh(v / sign speed): the direction of motion, a smooth function of v
+    load  N m (N for a sliding joint), the torque that the rigid bodies need at the joint
+    z     the internal state, if the law has one
     """
 
     q: Scalar = 0.0
@@ -40,15 +40,15 @@ class At:
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """One number that is found for each joint.
+    """The description of one number that is fitted for each joint.
 
-    name         in records and files
-    unit         of a joint that turns, such as "Nms/rad"; that of a sliding one follows
-    low, high    what is possible
-    start        what is kept where the data do not show it, and where a search begins
-    within       another value of the law's joint, which its size may not exceed
-    above        another value of the same law, below which it may not lie
-    logarithmic  whether a search changes its logarithm
+    name         its name in files
+    unit         its unit for a rotating joint, such as "Nms/rad"; the unit for a sliding joint is derived from it
+    low, high    bounds of the value
+    start        the value at the start of a search, and the result if the data do not determine the value
+    within       name of another value of the joint; the magnitude of this value may not exceed the other value
+    above        name of another value of the law; this value may not be less than the other value
+    logarithmic  whether a search varies the logarithm of the value
     """
 
     name: Text
@@ -61,7 +61,11 @@ class Value:
     logarithmic: bool = False
 
     def number_in(self, name: str, usual: float | None) -> float | None:
-        """The number for which the value has this name; None where there is none."""
+        """Return the number, such as an exponent, in a name of this friction value: 0.5 for 'viscous^0.5'. Return None
+        if the name belongs to another value.
+
+        usual  the number that is left out of a name
+        """
         if isinstance(self.name, str):
             return None
         last = re.search(r"[-+.\w]+$", re.split(r"[_^]", name)[-1])
@@ -73,11 +77,15 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """What a user gives a law, such as an exponent, once or several times.
+    """The description of a number that the user gives a friction law, such as an exponent. The user may give several;
+    each makes a separate term.
 
-    key        of the numbers in [friction];  unit  for messages
-    low, high  what is possible;  most  how many
-    usual      the number of the value whose name states none
+    key        name of the number in the section [friction] of a file
+    low, high  bounds of the number
+    most       how many of these numbers a user may give
+    unit       unit of the number, for messages
+    usual      the number that is left out of a value's name: 'viscous' has the usual exponent, 'viscous^0.5' another
+               one
     """
 
     key: str
@@ -90,11 +98,14 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """How a law's state z changes; p are the law's values.
+    """How the internal state z of a friction law changes with time. In all functions, p are the law's fitted values and
+    v is the joint's speed.
 
-    rate    dz/dt at (p, v, z)
-    step    z after dt, of (p, v0, v1, z, dt), the speed going evenly from v0 to v1, which have one sign
-    pieces  steps between two samples of one sign, less one, of (p, v0, v1)
+    rate    function of (p, v, z) that returns dz/dt
+    step    function of (p, v0, v1, z, dt) that returns z after the time dt. The speed changes linearly from v0 to v1,
+            which have the same sign
+    pieces  function of (p, v0, v1) that returns how many additional steps are needed from v0 to v1; 0: one step is
+            enough
     """
 
     rate: Callable[..., Scalar]
@@ -104,22 +115,23 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """One law, the only place where it is known.
+    """The complete description of one friction law.
 
-    name     its file's; key of [friction]
+    name     name of the law, of its file and of its key in the section [friction]
     about    one sentence for documents
-    formula  for people, s being the smooth sign
-    values   what is found for each joint
-    torque   N m (N) of (p, at), p being the values and `at` an At; with a number of (p, at, number). On floats, arrays and
-             symbols, with the functions of psdmc.friction
-    against  whether `torque` is a size, which acts against the motion: it is multiplied by the smooth sign
-    number   what a user gives, if anything
-    word     whether it is a term of --friction, so that every joint has it
-    key      whether [friction] has it
-    instead  a term of every joint, which a joint with this law has only if [friction] says so
-    line     constant torque and damping nearest to it, of (p, number, top speed), and what of it they lack ("": nothing);
-             None: a robot file cannot hold any of it
-    state    where it has one; the law is then no linear one
+    formula  formula for people; s is the smooth sign of the speed
+    values   the numbers that are fitted for each joint
+    torque   function of (p, at) that returns N m (N); p are the fitted values and `at` is the joint's state, an At. If
+             the law has a number, the arguments are (p, at, number). It is called with floats, arrays and symbols, and
+             uses the functions of psdmc.friction
+    against  True: `torque` returns a magnitude that acts against the motion, and psdmc multiplies it by the smooth sign
+    number   the number that a user gives, such as an exponent, if any
+    word     whether the option --friction accepts the law, which every joint has then
+    key      whether the section [friction] accepts the law
+    instead  name of a term that every joint has; a joint with this law lacks this term, unless [friction] asks for it
+    line     function of (p, number, top speed) that returns three things: the constant torque and the damping nearest
+             to the law, and in words what they leave out. None: a robot file cannot hold any part of the law
+    state    how the internal state changes, if the law has one; then the law is not linear in its values
     """
 
     name: str
@@ -137,11 +149,12 @@ class Law:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the values of a law without a number."""
+        """Return the names of the fitted values of a friction law that takes no number, such as an exponent, from the
+        user."""
         return tuple(str(value.name) for value in self.values)
 
     def require(self, p: Array) -> Array:
-        """The values; InputError where the law cannot have them."""
+        """Return the values of a friction law unchanged. Raises InputError if a value is outside its bounds."""
         own = dict(zip(self.parameters, p.tolist(), strict=True))
         for value, x in zip(self.values, p.tolist(), strict=True):
             low = max(own[value.above], 0.0) if value.above else min(value.low, 0.0)
@@ -153,7 +166,11 @@ class Law:
         return p
 
     def unknowns(self, p: Array) -> Array:
-        """What a search varies: logarithms of some values, of others the excess over the one that they are above."""
+        """Return the numbers that a search varies, (m,), from the law's m values p.
+
+        They are logarithms for the values that are marked `logarithmic`. For a value with `above`, the number is the
+        difference from the other value. All other values are unchanged.
+        """
         x = np.array(p, dtype=np.float64)
         for k, value in enumerate(self.values):
             if value.logarithmic:
@@ -163,7 +180,7 @@ class Law:
         return x
 
     def from_unknowns(self, x: Array) -> Array:
-        """The reverse of `unknowns`."""
+        """Return the law's m values from the m numbers that a search varies. It is the inverse of `unknowns`."""
         p = np.array(x, dtype=np.float64)
         for k, value in enumerate(self.values):
             if value.logarithmic:
@@ -173,7 +190,8 @@ class Law:
         return p
 
     def slopes(self, p: Array) -> Array:
-        """(m, m) d values / d unknowns."""
+        """Return the derivatives (m, m) of the law's m values by the m numbers that a search varies (see
+        `unknowns`)."""
         found = np.eye(len(self.values))
         for k, value in enumerate(self.values):
             if value.logarithmic:
@@ -184,7 +202,7 @@ class Law:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """(m,) lowest and highest unknowns."""
+        """Return the lowest and the highest number that a search may try for each of the law's m values, (m,) each."""
         low, high = (np.array([getattr(value, end) for value in self.values]) for end in ("low", "high"))
         for k, value in enumerate(self.values):
             if value.logarithmic:
@@ -196,7 +214,8 @@ class Law:
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A law with its number: what a joint can have."""
+    """One term of a joint's friction: a friction law, and its exponent or velocity if the law has one. A joint has
+    several terms."""
 
     law: Law
     number: float | None = None
@@ -210,7 +229,7 @@ class Term:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the values."""
+        """Return the names of the fitted values of this friction term, such as 'viscous^0.5'."""
         return tuple(self._text(value.name) for value in self.law.values)
 
     @property
@@ -218,27 +237,31 @@ class Term:
         return self._text(self.law.formula)
 
     def units(self, effort: str = "N m") -> tuple[str, ...]:
-        """Of the values, for a joint whose torque or force has this unit."""
+        """Return the units of the fitted values of this friction term, for a joint whose torque or force has the unit
+        `effort`."""
         return tuple(unit_of(effort, self._text(value.unit)) for value in self.law.values)
 
     @property
     def reads(self) -> frozenset[str]:
-        """Attributes of At that the torque depends on."""
+        """Return the names of the joint's quantities on which the torque depends, such as 'q' and 'v': attributes of
+        At."""
         seen = _Watched()
         self.torque([0.5] * len(self.law.values), seen)
         return frozenset(seen.read)
 
     def size(self, p: Sequence[Scalar], at: At | _Watched) -> Scalar:
-        """The law's own function."""
+        """Return the value of the law's function `torque`. For a law that acts against the motion, this is the
+        magnitude of the torque."""
         return self.law.torque(p, at) if self.number is None else self.law.torque(p, at, self.number)
 
     def torque(self, p: Sequence[Scalar], at: At | _Watched) -> Scalar:
-        """N m (N) of one joint."""
+        """Return the torque of this friction term for one joint, N m (N for a sliding joint)."""
         size = self.size(p, at)
         return at.sign * size if self.law.against else size
 
     def columns(self, at: At) -> list[Scalar]:
-        """Torque per unit of each value, of a linear law."""
+        """Return the torque that each value of the law causes if it is one and all other values are zero. The law must
+        be linear in its values."""
         return [self.torque(row, at) for row in np.eye(len(self.law.values)).tolist()]
 
     def _text(self, text: Text) -> str:
@@ -261,7 +284,11 @@ Row = tuple[Term, Sequence[Scalar]]
 
 
 def total(rows: Sequence[Row], at: At) -> Scalar:
-    """Torque of several terms: sizes against the motion first, which share the sign."""
+    """Return the friction torque of several terms of one joint. Terms that act against the motion are summed before
+    they are multiplied by the smooth sign.
+
+    rows  each term with the joint's values for this term
+    """
     sizes = [term.size(p, at) for term, p in rows if term.law.against]
     found = [at.sign * sum(sizes[1:], start=sizes[0])] if sizes else []
     found += [term.size(p, at) for term, p in rows if not term.law.against]
@@ -269,8 +296,10 @@ def total(rows: Sequence[Row], at: At) -> Scalar:
 
 
 def unit_of(effort: str, turning: str) -> str:
-    """The unit of a joint whose torque or force has the unit `effort`, given that of one that turns: for Nms/rad Ns/m where
-    it slides."""
+    """Return the unit of a friction value for a joint whose torque or force has the unit `effort`.
+
+    turning  the unit for a rotating joint: Nms/rad becomes Ns/m for a sliding joint
+    """
     return turning.replace("Nm", "N").replace("rad", "m") if effort == "N" else turning
 
 

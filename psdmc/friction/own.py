@@ -1,7 +1,7 @@
-"""A user's own friction law: a Python file that defines LAW, and the plain values by which model files hold it.
+"""Friction laws that users define in Python files, and how model files store these laws.
 
-A model file holds no code: the law's torque is there as the text of a PROGRAM. Code runs only from the file that a log
-description or a plant names.
+A model file holds no Python code. It stores the torque of a law as the text of a PROGRAM (a list of operations). psdmc
+runs Python code only from a file to which the user's log description or simulated robot refers.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ STATES, ROUNDED = 5, 1e-9
 
 
 def read_law(path: Path) -> dict[str, Any]:
-    """The LAW that a user's Python file defines, which is run, as plain values; InputError where it is none that a fit can
-    have."""
+    """Run a user's Python file and return the friction law LAW that it defines, as plain values (numbers, texts,
+    lists). Raises InputError if the file defines no LAW, or if psdmc cannot fit this law to data."""
     source = read_file(path, LARGEST_FILE, "a friction law is a few lines of Python")
     names: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
     try:
@@ -66,7 +66,7 @@ def _where(error: Exception, path: Path) -> str:
 
 
 def data_of(law: Law) -> dict[str, Any]:
-    """A user's law as plain values, which read back the same."""
+    """Return a user's friction law as plain values (numbers, texts, lists), from which `law_of` makes an equal law."""
     if law.number is not None or law.state is not None or law.word:
         raise ValueError("a law of your own has no `number`, `state` or `word`")
     _require_linear(law)
@@ -108,7 +108,8 @@ def _require_linear(law: Law) -> None:
 
 
 def laws_of(content: object) -> dict[str, Law]:
-    """Laws by name of their plain values; ValueError where these are damaged, or two laws share a name."""
+    """Return friction laws by name from plain values that `data_of` made. Raises ValueError if the values are damaged,
+    or if two laws or two values have one name."""
     if not isinstance(content, list | tuple) or len(content) > MOST_LAWS:
         raise ValueError(f"laws: expected a list of at most {MOST_LAWS}")
     laws = [law_of(data) for data in content]
@@ -119,7 +120,7 @@ def laws_of(content: object) -> dict[str, Law]:
 
 
 def law_of(data: object) -> Law:
-    """The law of plain values; ValueError where they are damaged."""
+    """Return the friction law that `data_of` converted to plain values. Raises ValueError if the values are damaged."""
     if not isinstance(data, Mapping):
         raise ValueError("a friction law is no table")
     values = data.get("values")

@@ -1,4 +1,5 @@
-"""Functions of scalars, for friction laws: of floats, of arrays of states, and of symbols that record a PROGRAM."""
+"""Elementary functions for friction laws. Arguments are floats, arrays with one value per state, or symbols that record
+a PROGRAM (list of operations)."""
 
 from __future__ import annotations
 
@@ -41,7 +42,7 @@ _PLAIN: dict[float, Callable[[Scalar], Scalar]] = {
 
 
 def power(x: Scalar, exponent: Scalar) -> Scalar:
-    """x^exponent for x not negative."""
+    """Return x to the power `exponent`, for x that is not negative."""
     plain = _PLAIN.get(exponent) if type(exponent) is float else None
     return _power(x, exponent) if plain is None else plain(x)
 

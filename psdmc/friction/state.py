@@ -1,4 +1,5 @@
-"""A law with a state as PROGRAMs of one joint: its torque, its step, and the number of steps between samples."""
+"""PROGRAMs (lists of operations) for the friction of one joint by a law with an internal state. They compute the
+torque, the next state, and the number of time steps."""
 
 from __future__ import annotations
 
@@ -15,7 +16,12 @@ from psdmc.program.trace import Tracer
 
 
 def state_programs(law: Law) -> dict[str, tuple[Program, tuple[str, ...]]]:
-    """By name the PROGRAMs, which put out `out`, and their inputs beside p."""
+    """Return the PROGRAMs (lists of operations) 'step', 'pieces' and 'torque' of a friction law, by name. Each comes
+    with the names of its inputs, apart from the law's fitted values p.
+
+    'step' computes the next state, 'pieces' the number of additional steps, 'torque' the friction torque. Each PROGRAM
+    has one output, `out`.
+    """
     state = law.state
     assert state is not None
     return {

@@ -1,4 +1,4 @@
-"""Terms by the names that records, options and files have for them."""
+"""Functions that find the friction term for a name in files and options, such as 'viscous^0.5'."""
 
 from __future__ import annotations
 
@@ -24,13 +24,19 @@ EXAMPLE = ",".join(law.name for law in (_ALWAYS, _GROWING, OPTIONAL))
 
 
 def every_joint_s(exponents: Iterable[float], offset: bool) -> tuple[Term, ...]:
-    """The terms of every joint in a linear fit with these options; ValueError where an exponent is out of range."""
+    """Return the friction terms that every joint has in a linear fit: Coulomb friction, and viscous friction with each
+    of the given exponents.
+
+    offset  whether each joint has a constant torque, too
+
+    Raises ValueError if an exponent is out of range.
+    """
     growing = (Term(_GROWING, float(d)) for d in exponents)
     return (Term(_ALWAYS), *growing, *((Term(OPTIONAL),) if offset else ()))
 
 
 def expected_words() -> str:
-    """The words of --friction, for messages and documents."""
+    """Return the words that the option --friction accepts, as text for messages and documents."""
     growing, number = _GROWING, _GROWING.number
     assert number is not None
     assert number.usual is not None
@@ -41,7 +47,8 @@ def expected_words() -> str:
 
 
 def options_of(words: Sequence[str]) -> tuple[tuple[float, ...], bool] | str:
-    """Exponents of a linear fit, and whether it has offsets, of words of --friction; else what is wrong."""
+    """Read the words of the option --friction. Return the exponents of viscous friction, and whether joints have a
+    constant torque. Return a text that describes the fault if a word is wrong."""
     number = _GROWING.number
     assert number is not None
     terms = [
@@ -63,7 +70,8 @@ def options_of(words: Sequence[str]) -> tuple[tuple[float, ...], bool] | str:
 
 
 def named(name: str, laws: Mapping[str, Law]) -> tuple[Term, int] | None:
-    """The term of a linear law that has a value of this name, and the value's place; None where there is none."""
+    """Return the friction term to which the value of this name belongs, and the position of the value among the term's
+    values. Return None if the value belongs to no law that is linear in its values."""
     for law in laws.values():
         if law.state is not None:
             continue
@@ -81,8 +89,12 @@ def named(name: str, laws: Mapping[str, Law]) -> tuple[Term, int] | None:
 def with_present_names(
     rows: Sequence[dict[str, Any]], exponents: Sequence[float]
 ) -> Sequence[dict[str, Any]]:
-    """Rows of friction as older model files hold them, with terms called by their exponents. psdmc 0.1 called the first one
-    by the name without an exponent, whatever its exponent."""
+    """Return the friction values of an older model file with the names that psdmc uses now, which contain exponents.
+
+    In files of psdmc 0.1 the first viscous term has a name without an exponent, whatever its exponent is.
+
+    rows  one mapping per friction value, with its name and unit
+    """
     first = Term(_GROWING, float(exponents[0])) if exponents else None
     if first is None or first.names[0] in [row.get("name") for row in rows]:
         return rows

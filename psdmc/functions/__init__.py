@@ -1,4 +1,5 @@
-"""The functions that psdmc generates: one file of this folder each, described by its RECIPE."""
+"""The functions that psdmc can generate. Each file of this folder describes one function by an object RECIPE: inputs,
+outputs and the computation."""
 
 from __future__ import annotations
 
@@ -39,10 +40,11 @@ DEFAULT_WHERE_WIDE = tuple(
 
 
 def recipe_of(name: str) -> Recipe:
-    """The recipe of a function, or of the function that this name is a variant of."""
+    """Return the recipe (specification) of a function that psdmc can generate. The name may be that of a variant, such
+    as NAME_theta_rows, which takes one theta_b per state."""
     return RECIPES[name.removesuffix(THETA_ROWS)]
 
 
 def default_of(robot: Mechanism) -> tuple[str, ...]:
-    """Names of the functions that are generated for a robot where none are named."""
+    """Return the names of the functions that psdmc generates for a robot if the user names none."""
     return DEFAULT if all(joint.type.about_z for joint in robot.joints) else DEFAULT_WHERE_WIDE

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Total mass times centre of the links' own bodies, over their mass."""
+    """Compute the centre of mass of the robot: the first moment of the links from the robot file, divided by their
+    total mass."""
     bodies = g.link_bodies()
     mass, moment = sum(body.mass for body in bodies), first_moment(g.frames, bodies, g.inputs["q"])
     axes, origin = g.root

@@ -1,4 +1,4 @@
-"""The matrix that gives the whole robot's momentum about its centre of mass from the joint rates."""
+"""The matrix that computes the whole robot's momentum about its centre of mass from the joint rates."""
 
 from __future__ import annotations
 

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The whole robot's momentum per unit rate of each joint, over its mass."""
+    """Compute the Jacobian of the centre of mass. Its columns are the robot's linear momentum per unit rate of each
+    joint, divided by the total mass."""
     bodies = g.link_bodies()
     mass = sum(body.mass for body in bodies)
     per_rate = zip(*momentum_matrix(g.frames, bodies, g.inputs["q"])[:3], strict=True)

@@ -83,7 +83,12 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """What contacts change of the accelerations that the torques were computed from, which are exact."""
+    """Return accelerations, contact forces and pivots for tests, from the given state and the accelerations without
+    contacts.
+
+    These accelerations are given, and the torques were computed from them, so they are exact. The change that the
+    contacts cause is added.
+    """
     free = given["qdd"]
 
     def wanted(jacobian: Array) -> Array:

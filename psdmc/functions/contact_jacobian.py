@@ -1,4 +1,4 @@
-"""Jacobian of the contacts in the base frame."""
+"""The Jacobian of the contacts in the base frame: their velocities per unit joint rate."""
 
 from __future__ import annotations
 

@@ -19,8 +19,12 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Column j is the Slotine-Li torque of a unit reference rate of joint j, without gravity. It takes the bodies that this
-    joint moves and those that carry them; the first column takes all, as what later ones share is in their order then."""
+    """Compute column j of the Coriolis matrix: the Slotine-Li torques of a unit reference rate of joint j, without
+    gravity.
+
+    Column j needs only the bodies that joint j moves, and the bodies between joint j and the base. The first column is
+    computed with all bodies: this fixes the order of the operations that later columns share.
+    """
     nv = len(g.still)
     columns = []
     for j in range(nv):
@@ -34,8 +38,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Column j is what the velocities qd do where qd_r is joint j's unit rate. All columns are computed together: as so many
-    states."""
+    """Compute column j of the Coriolis matrix as the Slotine-Li torques at the rates qd, with a unit reference rate of
+    joint j. All columns are computed in one call, as additional states."""
     nv, count = robot.nv, len(given["q"])
     q, qd = (np.tile(given[name], (nv, 1)) for name in ("q", "qd"))
     units = np.repeat(np.eye(nv), count, axis=0)

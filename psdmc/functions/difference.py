@@ -1,4 +1,4 @@
-"""The constant rates that lead from one position to another."""
+"""The constant rates at which a robot moves from one position to another in one second."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by articulated bodies."""
+"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by the articulated-body algorithm."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """The accelerations that the torques were computed from. They are exact; a solution would lose digits by the mass
-    matrix's condition number."""
+    """Return the accelerations from which the tests computed the torques. They are exact, whereas a solution with the
+    mass matrix loses digits if the matrix is badly conditioned."""
     return {"qdd": given["qdd"]}
 
 

@@ -25,10 +25,13 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration.
+    """Compute accelerations and their derivatives: d qdd = M^-1 (d tau - d tau_id). The function tau_id(q, qd, qdd) is
+    inverse dynamics, at the computed acceleration.
 
-    M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd. Both blocks
-    are multiplied by M^-1 behind the trace; that by qd comes first, so that its entries need not wait.
+    M and d tau_id / d qd do not depend on the acceleration. The torques of Coriolis forces and gravity are h = (d
+    tau_id / d qd) qd / 2 + g, because h - g is quadratic in qd. The derivatives of tau_id by q and qd are multiplied by
+    M^-1 after these operations, by matrix products. The derivative by qd comes first, because its entries are known
+    first.
     """
     if any_limbs(g.frames):
         return _in_limbs(g)
@@ -89,7 +92,8 @@ def _with_block(matrix: Matrix, block: Matrix, column: int) -> list[list[Scalar]
 
 
 def multiplied(g: Ingredients) -> Outputs:
-    """Return the function's outputs, for functions that continue with them."""
+    """Return accelerations and their derivatives like `trace`, with the products with M^-1 written out. Functions such
+    as the Runge-Kutta step use the result in further computations."""
     found = trace(g)
     by_tau = found["dqdd_dtau"]
     blocks = {

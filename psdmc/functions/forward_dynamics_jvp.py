@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration."""
+    """Compute accelerations and their derivative along a direction: d qdd = M^-1 (d tau - d tau_id). The function
+    tau_id(q, qd, qdd) is inverse dynamics, at the computed acceleration."""
     qdd, factors = accelerations(g, g.inputs["tau"])
     load = [given - own for given, own in zip(g.inputs[DTAU.name], torque_slopes(g, qdd), strict=True)]
     return {"qdd": qdd, "dqdd": factors.solved(load), "pivot": factors.pivots}

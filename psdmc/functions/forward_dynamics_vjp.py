@@ -1,4 +1,4 @@
-"""Forward dynamics and the gradient of its weighted accelerations (reverse mode)."""
+"""Forward dynamics, and the gradient of a weighted sum of its accelerations (reverse mode)."""
 
 from __future__ import annotations
 
@@ -26,8 +26,12 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration. With M
-    weights = cotangent, the gradient is that of weights . (tau - tau_id)."""
+    """Compute accelerations, and the gradients of the weighted sum cotangent . qdd by q, qd and tau.
+
+    The accelerations change by d qdd = M^-1 (d tau - d tau_id). The function tau_id(q, qd, qdd) is inverse dynamics, at
+    the computed acceleration. Let w be the solution of M w = cotangent. The gradients of cotangent . qdd are then the
+    gradients of w . (tau - tau_id).
+    """
     qdd, factors = accelerations(g, g.inputs["tau"])
     weights = factors.solved(g.inputs[COTANGENT.name])
     by_q, by_qd = torque_gradients(g, qdd, weights)

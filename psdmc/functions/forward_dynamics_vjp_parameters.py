@@ -1,4 +1,4 @@
-"""Forward dynamics and the gradient of its weighted accelerations, by theta_b too (reverse mode)."""
+"""Forward dynamics, and the gradient of a weighted sum of its accelerations, also by theta_b (reverse mode)."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """For the comparison: the gradient by theta_b, times theta_b, is - weights . tau, where the weights are the
-    gradient by tau."""
+    """Return what Pinocchio computes for this function, for tests. Pinocchio has no gradient by theta_b. The result
+    therefore has its product with theta_b, which is -(grad_tau . tau)."""
     found = STATE.pinocchio(robot, given)
     return found | {GRADIENT_THETA.name: -(found["grad_tau"] * given["tau"]).sum(axis=-1)}
 

@@ -1,4 +1,4 @@
-"""Geometric Jacobians of the named frames in the base frame."""
+"""Geometric Jacobians of the named frames, along the base's axes."""
 
 from __future__ import annotations
 

@@ -28,8 +28,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's derivatives along the frame's own axes, turned into the base's axes, plus what the turning of the
-    axes contributes."""
+    """Return Pinocchio's derivatives of the frames' velocities, along the base's axes. Pinocchio's derivatives along
+    the frame's axes are rotated. The derivative of this rotation, times the velocity, is added."""
     import pinocchio as pin
 
     def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:

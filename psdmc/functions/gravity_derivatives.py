@@ -1,4 +1,4 @@
-"""Gravity's torques and their derivatives by joint positions."""
+"""The gravity torques and their derivatives by joint positions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Trace derivatives at rest: d g / d q is symmetric, so the lower triangle is enough if joints have one coordinate
-    each. Tangents of turns do not commute: there both are needed."""
+    """Compute the gravity torques and their derivatives by joint positions. If all joints have one coordinate, d g / d
+    q is symmetric, and only one triangle is computed. With joints of several coordinates the matrix is not symmetric,
+    because rotations do not commute."""
     still = g.still
     found = inverse_dynamics_derivatives(
         g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base_acceleration, g.choices

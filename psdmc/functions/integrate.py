@@ -1,4 +1,4 @@
-"""Where a robot comes from a position by constant rates."""
+"""The position that a robot reaches from a given position at constant rates."""
 
 from __future__ import annotations
 

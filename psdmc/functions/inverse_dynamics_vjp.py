@@ -1,4 +1,4 @@
-"""Inverse dynamics and the gradient of its weighted torques (reverse mode)."""
+"""Inverse dynamics, and the gradient of a weighted sum of its torques (reverse mode)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inverse dynamics and the gradient of its weighted torques, by theta_b too (reverse mode)."""
+"""Inverse dynamics, and the gradient of a weighted sum of its torques, also by theta_b (reverse mode)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """For the comparison: the gradient by theta_b, times theta_b, is the sum of the weighted torques."""
+    """Return what Pinocchio computes for this function, for tests. Pinocchio has no gradient by theta_b. The result
+    therefore has its product with theta_b, which is the weighted sum of the torques."""
     found = STATE.pinocchio(robot, given)
     return found | {GRADIENT_THETA.name: (given[COTANGENT.name] * found["tau"]).sum(axis=-1)}
 

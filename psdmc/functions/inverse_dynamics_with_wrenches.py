@@ -46,7 +46,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Torques from Pinocchio with each wrench carried from its frame into the joint's, as Pinocchio's fext are given."""
+    """Compute torques by Pinocchio, for tests. The given wrenches are moved from the named frames to the joint frames,
+    as Pinocchio's argument fext needs them."""
     import pinocchio as pin
 
     def loaded(model: Any, data: Any, q: Array, qd: Array, qdd: Array, wrenches: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The tip's geometric Jacobian in the base frame."""
+"""The geometric Jacobian of the tip frame (end effector), along the base's axes."""
 
 from __future__ import annotations
 

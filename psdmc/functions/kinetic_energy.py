@@ -29,8 +29,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's energy of the links, plus that of the drives: Pinocchio 4.1 leaves out the armature of joints about
-    oblique axes, which its mass matrix has."""
+    """Return Pinocchio's kinetic energy of the links plus that of the drives. Pinocchio 4.1 leaves out the armature of
+    joints about oblique axes in the energy, but not in the mass matrix."""
     import pinocchio as pin
 
     links = pin.Model(robot.model)

@@ -1,4 +1,4 @@
-"""The mass matrix for sparse solvers: of its lower triangle the entries that can differ from zero."""
+"""The mass matrix for sparse solvers: the entries of its lower triangle that can differ from zero."""
 
 from __future__ import annotations
 

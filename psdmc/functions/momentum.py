@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The momentum of the links' own bodies. Bodies that stand for theta_b have the same torques, but not the same
-    momentum."""
+    """Compute the robot's momentum with the masses and inertias of the links in the robot file. Base parameters give
+    the right torques, but not the right momentum."""
     bodies = g.link_bodies()
     linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
     axes, origin = g.root
@@ -35,7 +35,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's momentum about the centre of mass, moved to the base's origin: L_O = L_C + c x p."""
+    """Return Pinocchio's momentum about the centre of mass c, moved to the base's origin: L_O = L_C + c x p."""
     import pinocchio as pin
 
     def moved(model: Any, data: Any, q: Array, qd: Array) -> Array:

@@ -1,4 +1,5 @@
-"""The position at which no joint has moved."""
+"""The neutral position q, at which no joint has moved: zero for each joint coordinate, and quaternions without
+rotation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nonlinear effects: the torques of motion at constant speed, and gravity's."""
+"""Nonlinear effects: the Coriolis and centrifugal torques of motion at constant joint rates, plus the gravity torques."""
 
 from __future__ import annotations
 

@@ -71,7 +71,8 @@ def _inverse_and_sign(rows: Rows, mu: Scalar) -> tuple[Rows, Scalar]:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Also what must be positive for Lambda to mean anything."""
+    """Compute the operational-space inertia matrices Lambda of the frames, for tests. Also return the pivots and signs
+    that must be positive, or Lambda does not exist."""
     q, mu = list(given["q"].T), np.reshape(given[MU.name], -1)
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])

@@ -1,4 +1,4 @@
-"""Potential energy, zero at q = 0: torques do not determine its constant."""
+"""The potential energy in gravity, which is zero at q = 0. Torques do not determine its constant."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's energy less its energy where no joint has moved."""
+    """Return Pinocchio's potential energy minus its value at q = 0."""
     import pinocchio as pin
 
     def energy(model: Any, data: Any, q: Array) -> Array:

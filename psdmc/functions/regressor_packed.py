@@ -1,4 +1,5 @@
-"""The torques' regressor in theta_b for recursive estimators: the entries that can differ from zero."""
+"""The regressor of the torques in theta_b for recursive estimators, as a vector of the matrix entries that can differ
+from zero."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The regressor in theta_b of Slotine and Li's control law."""
+"""The regressor in theta_b that Slotine and Li's adaptive control law uses, with reference rates in addition to rates."""
 
 from __future__ import annotations
 

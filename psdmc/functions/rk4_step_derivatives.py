@@ -50,7 +50,8 @@ Stage = tuple[Any, Any, Any, Any]
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The regions written out: forward dynamics' derivatives four times, and what they are multiplied with."""
+    """Compute one step and its Jacobians as straight-line code, without loops. The derivatives of forward dynamics are
+    computed four times, once per Runge-Kutta stage."""
     nq, nv = len(g.inputs["q"]), len(g.still)
 
     def call(_: str, given: list[list[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
@@ -65,15 +66,18 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame]) -> Regions:
-    """The state after dt and its derivatives: both are the start and a sixth of the stages' slopes, 1, 2, 2, 1 times.
+    """Return the function's body as loops and calls of forward dynamics: it computes the state after dt and its
+    derivatives.
 
-    Slopes are those of q's coordinates and of their derivatives; these are along the tangent of q between stages.
+    The state is the start plus dt / 6 times the weighted sum of four slopes, with the weights 1, 2, 2, 1. The
+    derivatives are summed with the weights of the slopes. Each stage has slopes of q's entries and of qd. Between
+    stages, derivatives are along the tangent of q. The arrays are:
 
-    here, there     q and qd of a stage, and
-    by_q, by_v      nv x 3 nv, their derivatives by q, qd and tau, those of q along its tangent
-    rate, turn      nq + nv and nq + nv x 3 nv, slopes of q's coordinates and of qd, and of their derivatives by the same
-    start           the derivatives of coordinates and qd at the start
-    total, totals   sums of slopes
+    here, there    q and qd of a stage
+    by_q, by_v     nv x 3 nv, derivatives of q (along its tangent) and of qd, by q, qd and tau
+    rate, turn     nq + nv and nq + nv x 3 nv, slopes of q's entries and of qd, and their derivatives by q, qd and tau
+    start          the derivatives of q's entries and of qd at the start
+    total, totals  sums of slopes, and of their derivatives
     """
     nq, nv = (sum(getattr(frame.joint, size) for frame in leading(frames)) for size in ("nq", "nv"))
     width, rows = 3 * nv, nq + nv
@@ -244,7 +248,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's accelerations and their derivatives along the stages; it has no such step of coordinates."""
+    """Return the step and its Jacobians from Pinocchio's accelerations and their derivatives at the four stages, for
+    tests. Pinocchio has no Runge-Kutta step."""
     maps = CoordinateMaps(robot.joint_types)
     return _on_arrays(given, maps, lambda q, qd: robot.forward_dynamics_derivatives(q, qd, given["tau"]))
 

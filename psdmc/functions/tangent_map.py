@@ -1,4 +1,5 @@
-"""How displacements follow from changes of the entries of q: from derivatives along the tangent to those by entries."""
+"""The matrix that maps changes of the entries of q to changes along the joint rates (the tangent). It converts
+derivatives along the tangent to derivatives by the entries of q."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """The pseudo-inverse of how coordinates change at unit rates."""
+    """Return the tangent map for tests: the pseudo-inverse of the matrix whose columns are the rates of q's entries at
+    unit joint rates."""
     rates = [robot.coordinate_rates(given["q"], unit) for unit in np.eye(robot.model.nv)]
     return {"T": np.linalg.pinv(np.stack(rates, axis=-1))}
 

@@ -1,4 +1,5 @@
-"""Links as pseudo-inertias: which rows of them a model's assumptions leave, and the body that each should resemble."""
+"""Pseudo-inertias (4 x 4 mass matrices) of links in fits: rows that are zero by assumption, and the bodies near which a
+fit keeps the links."""
 
 from __future__ import annotations
 
@@ -17,8 +18,11 @@ distribution of mass, and others are points."""
 
 
 def pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
-    """The pseudo-inertia of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in units of 0.1 m: entries of similar size suit
-    the solver."""
+    """Return the pseudo-inertia (4 x 4 mass matrix) of a link with the parameters m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz,
+    Izz.
+
+    Lengths are in units of 0.1 m, so that all entries have similar size in the solver.
+    """
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
     half = 0.5 * (ixx + iyy + izz)
     t = 10.0
@@ -31,7 +35,11 @@ def pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
 
 
 def reference_body(link: Array, held: list[int]) -> tuple[Array, bool]:
-    """The body that a link should resemble, and whether it is the file's: an ordinary one where the file has none."""
+    """Return the pseudo-inertia near which a fit keeps a link, and whether it comes from the robot file. If the file
+    gives no inertia, it is that of a 5 kg body of ordinary size.
+
+    held  numbers of the rows and columns of the 4 x 4 matrix that are not zero by assumption; the others are left out
+    """
     if not np.isfinite(link[:10]).all() or not link[0] > 0:
         return np.diag([ORDINARY_BODY[k] for k in held]), False
     body = np.array(pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
@@ -40,14 +48,22 @@ def reference_body(link: Array, held: list[int]) -> tuple[Array, bool]:
 
 
 def held_rows(span: Array, start: int) -> list[int]:
-    """Rows of a link's pseudo-inertia that are not zero by assumption; `start` is the place of its parameters in x."""
+    """Return the numbers (0 to 3) of the rows of a link's pseudo-inertia that are not zero by the model's assumptions.
+
+    span   (11 n, k)  basis of the standard parameters x that the assumptions allow
+    start  index of the link's first parameter in x (11 n,)
+    """
     flat = flat_rows(span, start)
     return [k for k in range(4) if k not in flat and not vanishes(span, start, k)]
 
 
 def flat_rows(span: Array, start: int) -> list[int]:
-    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow. A link without moment of inertia
-    about an axis has no extent across it, whatever its other moments are (a rod along x where Ixx is assumed zero)."""
+    """Return the numbers of the rows of a link's pseudo-inertia that are zero for every real body that the assumptions
+    allow.
+
+    If the moment of inertia about an axis is assumed zero, the link has no extent across that axis. An example is a rod
+    along x whose Ixx is assumed zero.
+    """
     rows: set[int] = set()
     for axis, inertia in enumerate((4, 6, 9)):
         if not np.any(np.abs(span[start + inertia]) > 1e-12):
@@ -56,7 +72,11 @@ def flat_rows(span: Array, start: int) -> list[int]:
 
 
 def flat_equations(span: Array, start: int) -> list[Array]:
-    """Rows over x (11 n,), zero for every body that the assumptions allow one link, whose parameters begin at `start`."""
+    """Return linear equations in x, the (11 n,) standard parameters, for one link: each row times x is zero. Every real
+    body that the assumptions allow fulfils the equations.
+
+    start  index of the link's first parameter in x
+    """
     if not np.any(span[start]):
         return []
     rows = []
@@ -69,7 +89,8 @@ def flat_equations(span: Array, start: int) -> list[Array]:
 
 
 def vanishes(span: Array, start: int, k: int) -> bool:
-    """Whether the assumptions leave the k-th row of a pseudo-inertia zero (a planar link has no extent along z)."""
+    """Return whether the assumptions make row k of a link's pseudo-inertia zero. An example is row z of a planar link
+    without extent along z."""
     mass, moments = start, (start + 1, start + 2, start + 3)
     if k == 3:
         return not np.any(span[mass])

@@ -1,4 +1,5 @@
-"""What makes links physical, for a solver: pseudo-inertias above a bound, drive inertias too, near the file's bodies."""
+"""Constraints and costs that keep links physically possible in a fit: positive definite pseudo-inertias, positive
+drive inertias, and a small distance from the bodies in the robot file."""
 
 from __future__ import annotations
 
@@ -17,13 +18,14 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array
 
 @dataclass(frozen=True, slots=True)
 class PhysicalOptions:
-    """Bounds of the physical estimate, and weights of the distance from the file's bodies.
+    """Bounds of the physically consistent fit, and weights of the distance from the bodies in the robot file.
 
-    smallest        eigenvalue of each link's pseudo-inertia, kg with lengths in units of 0.1 m
-    smallest_drive  kg m^2, of each drive inertia that is a parameter
-    known_body      variances that one unit of divergence from the file's body costs (Lee, Wensing, Park 2020: the
-                    divergence of one distribution of mass from another, the same in any unit and frame)
-    unknown_body    the same for an ordinary body, where the file has none: enough to stay off the boundary
+    smallest        smallest eigenvalue of each link's pseudo-inertia, in kg, with lengths in units of 0.1 m
+    smallest_drive  smallest value of each drive inertia that is a parameter, kg m^2
+    known_body      weight of the distance (divergence) from the file's body, if the file has one. The divergence
+                    compares two distributions of mass and does not depend on unit or frame (Lee, Wensing, Park 2020)
+    unknown_body    weight of the distance from an ordinary body if the file has none: enough to keep the pseudo-inertia
+                    positive definite
     """
 
     smallest: float = 1e-6
@@ -33,7 +35,8 @@ class PhysicalOptions:
 
 
 def known_inner(model: DynamicsModel) -> Array:
-    """The span's coordinates of the file's standard parameters; zero where it has none."""
+    """Return the coordinates of the file's standard parameters in the basis `parameter_span`, which the assumptions
+    allow. Unknown parameters count as zero."""
     span = model.mechanism.parameter_span
     known = np.nan_to_num(model.mechanism.parameters.reshape(-1))
     return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
@@ -42,8 +45,12 @@ def known_inner(model: DynamicsModel) -> Array:
 def link_terms(
     cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
 ) -> tuple[list[Any], Any]:
-    """Constraints, pseudo-inertia above its bound, and divergence from the file's body; none of them for a link that
-    the chain assumes massless."""
+    """Return the constraints for one link in a fit, and the weighted divergence (distance between distributions of
+    mass) from the body in the robot file.
+
+    The constraints keep the pseudo-inertia and the drive inertia above their bounds. A link that is assumed massless
+    has no divergence, and only the constraint of the drive inertia.
+    """
     start = PARAMETERS_PER_LINK * link
     span: Array = model.mechanism.parameter_span
     constraints: list[Any] = []
@@ -62,7 +69,7 @@ def link_terms(
 
 
 def require_cvxpy() -> Any:
-    """cvxpy; InputError with the remedy where it or its solver is not installed."""
+    """Return the module cvxpy. Raises InputError with the remedy if cvxpy or its solver is not installed."""
     missing = [name for name in ("cvxpy", "clarabel") if find_spec(name) is None]
     if missing:
         raise InputError(

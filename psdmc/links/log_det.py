@@ -1,10 +1,12 @@
-"""The nearest positive definite matrices of an affine family, by Newton's method.
+"""Finds the symmetric matrices P(z) nearest to given matrices among all positive definite ones. They depend linearly on
+parameters z.
 
     minimise the sum over blocks of  weight (tr(N P(z)) - log det P(z)),  P(z) = constant + sum of z_k slopes_k
 
-whose N is the inverse of what P should resemble. It is convex and its own barrier: no step leaves the positive definite
-matrices. Newton's method does not depend on the units of z or P and ends at rounding, where conic solvers, which weigh
-one link of a gram against one of ten kilograms, stop at 1e-8 or fail (Boyd, Vandenberghe 2004, chapters 9 and 11).
+Each block is one matrix P, for example of one link. N is the inverse of the given matrix that P should be near to. The
+problem is convex, and -log det P keeps every step within the positive definite matrices. Newton's method does not
+depend on the units of z or P and reaches rounding accuracy. Conic solvers stop at 1e-8 or fail if links of a gram and
+of ten kilograms occur together. Source: Boyd, Vandenberghe 2004, chapters 9 and 11.
 """
 
 from __future__ import annotations
@@ -39,7 +41,13 @@ MARGIN = 1e-13
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """One symmetric matrix, constant (m, m) + z slopes (k, m, m), and the body that it should resemble (m, m)."""
+    """One symmetric matrix that depends linearly on z: P(z) = constant + sum of z_k slopes_k.
+
+    constant  (m, m)
+    slopes    (k, m, m)  derivatives of P by the k entries of z
+    near      (m, m)  the matrix that P should be near to
+    weight    factor of the distance between P and `near`
+    """
 
     constant: Array
     slopes: Array
@@ -51,7 +59,8 @@ class Block:
 
 
 def nearest_definite(blocks: Sequence[Block], z: Array) -> Array | None:
-    """(k,) the minimiser, begun at z; None where no z makes all blocks positive definite."""
+    """Return the z (k,) for which the blocks are positive definite and nearest to their given matrices. Newton's method
+    starts from the given z. Return None if no z makes all blocks positive definite."""
     found = feasible_point(blocks, z)
     if found is None:
         return None
@@ -66,10 +75,10 @@ def nearest_definite(blocks: Sequence[Block], z: Array) -> Array | None:
 
 
 def feasible_point(blocks: Sequence[Block], z: Array) -> Array | None:
-    """(k,) some z that makes all blocks positive definite; None where there is none.
+    """Return some z (k,) that makes all blocks positive definite; None if there is none.
 
-    Each block is shifted by s times a rounder form of what it should resemble, s is weighed ever more against the distance
-    from that form, and the search ends as soon as the blocks without their shift are positive definite.
+    The search adds s times a positive definite matrix to each block. It makes s smaller, until the blocks are positive
+    definite without this addition.
     """
     if _are_definite(blocks, z):
         return z

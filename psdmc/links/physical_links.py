@@ -1,5 +1,5 @@
-"""Links that have given base parameters exactly, nearest to the file's: for programs that read link
-masses and inertias, not base parameters."""
+"""Finds link masses and inertias that have given base parameters exactly and are nearest to those of the robot file.
+Programs that read links, and not base parameters, need these masses and inertias."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ STATES, SEED = 200, 77_011
 
 
 class NoSuchLinks(InputError):
-    """No links with a distribution of mass have these base parameters.
+    """This error says that no physically possible masses and inertias of the links have the given base parameters.
 
-    distance  the smallest difference of torques that links can come to: root of the mean square over random states, as a
+    distance  smallest difference of torques that possible links can reach: root mean square over random states, as a
               share of each joint's largest torque
     """
 
@@ -55,11 +55,12 @@ class NoSuchLinks(InputError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicalLinks:
-    """Links with the model's base parameters.
+    """Standard parameters of links that have the base parameters of the model.
 
     parameters  (n, 11)  standard parameters about the link frames: B @ parameters = theta_b
-    divergence  (n,)     of each link from the file's, tr(P0^-1 P) - log det(P0^-1 P) - 4 (0: the same); NaN where the file
-                         does not know the link, or either is flat
+    divergence  (n,)  distance of each link from the link in the robot file, tr(P0^-1 P) - log det(P0^-1 P) - 4, with
+                      the pseudo-inertias P and P0 (0: equal); NaN if the file does not give the link, or if P or P0 is
+                      singular
     """
 
     parameters: Array
@@ -67,13 +68,14 @@ class PhysicalLinks:
 
 
 def physical_links(model: DynamicsModel) -> PhysicalLinks:
-    """The links that have the model's theta_b and are nearest to those of its file.
+    """Return the standard parameters of links that have the model's theta_b and are nearest to those of the robot file.
 
-    Nearest is the smallest sum of divergences of one distribution of mass from another (Lee, Wensing, Park 2020), the
-    metric of the physical fit, over all links whose pseudo-inertias are positive definite and whose drive inertias are
-    not negative. Where the file's own links are such and have theta_b, they are the answer to the last digit.
+    The distance is the sum of the divergences (differences between two distributions of mass) of all links (Lee,
+    Wensing, Park 2020). The physically consistent fit uses this distance, too. All pseudo-inertias of the result are
+    positive definite, and no drive inertia is negative. If the links of the file fulfil this and have theta_b, they are
+    returned unchanged.
 
-    InputError where theta_b is unknown, NoSuchLinks where there are none.
+    Raises InputError if theta_b is unknown, NoSuchLinks if no such links exist.
     """
     theta = model.known_theta_b()
     own = model.mechanism.parameters
@@ -172,7 +174,8 @@ def _solved(cp: Any, problem: Any) -> bool:
 
 
 def moments(link: Array) -> Array:
-    """(4, 4) integrals of r r^T, r and 1 over a link's mass, from its standard parameters; kg and m."""
+    """Return a link's 4 x 4 pseudo-inertia in kg and m, from its standard parameters: integrals over the mass of the
+    products of x, y, z and 1."""
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = second_moments(inertia_matrix(link))
     matrix[:3, 3] = matrix[3, :3] = link[1:4]

@@ -1,7 +1,8 @@
-"""Error of the torques that an arrangement gives, relative to the model's own.
+"""The torque errors of generated code with certain link frames, nonzero link parameters and recursion options, relative
+to the model's torques. These choices together are called an arrangement.
 
-Frames at other feet, or other carriers, lose digits on robots of many scales: where carriers of 100 kg stand for the
-parameters of a gram at a micrometre too, that gram's torque is beyond their last digit.
+On robots of many scales, some choices lose digits. An example is a robot on which parameters of 100 kg also represent a
+mass of 1 g at 1 um from a joint axis. The torque of this mass is below the last digit of the large parameters.
 """
 
 from __future__ import annotations
@@ -33,11 +34,12 @@ WRONG = 1e-8
 
 
 class Accuracy:
-    """Errors of a model's arrangements, most by inverse dynamics, which runs the arithmetic of other functions; and of
-    PROGRAMs.
+    """Computes the errors of generated code for one model: of an arrangement (frames, nonzero parameters, recursion
+    options), or of one PROGRAM (list of operations). Most arrangements are judged by inverse dynamics, whose operations
+    other functions share.
 
-    robot    constants of the traces, with theta_b or with theta_b as an input
-    theta_b  (l,)
+    robot    constants of the model; theta_b is a constant or an input
+    theta_b  (l,) base parameters
     """
 
     def __init__(self, robot: RobotConstants, theta_b: Array) -> None:
@@ -46,17 +48,24 @@ class Accuracy:
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement, recipe: Recipe = inverse_dynamics.RECIPE) -> float:
-        """Return the error of a function in an arrangement: the mass matrix is compared by itself, others by inverse
-        dynamics. Entries of the mass matrix may be small compared with gravity torques."""
+        """Return the error of a function in an arrangement (frames, nonzero parameters, recursion options), as
+        `error_of` does.
+
+        For the mass matrix, the error of the matrix is returned, because its entries may be small compared with gravity
+        torques. For all other functions, the error of inverse dynamics in this arrangement is returned.
+        """
         if recipe.polynomials is not Polynomials.MASS:
             recipe = inverse_dynamics.RECIPE
         return self.error_of(recipe, trace_dynamics(recipe, arrangement, self.robot))
 
     def error_of(self, recipe: Recipe, program: Program) -> float:
-        """Return the largest difference from Newton-Euler of a function that is a part of the torques. Newton-Euler and
-        composite bodies are about the file's link frames. The difference is a torque (accelerations times the mass
-        matrix) relative to the joint's largest one, or one of the mass matrix relative to its row's largest entry;
-        absolute if that is zero."""
+        """Return the largest difference between a PROGRAM's outputs and reference values at random states. The
+        reference is the Newton-Euler or composite-body algorithm in the link frames of the robot file.
+
+        The difference is one of torques, relative to the joint's largest torque. Differences of accelerations are
+        multiplied by the mass matrix first. For the mass matrix, the difference is relative to the row's largest entry.
+        If the largest torque or entry is zero, the difference is absolute.
+        """
         signature, part = recipe.signature, recipe.polynomials
         given = self._states | {"tau": self._torques, "theta_b": self.theta_b}
         with np.errstate(all="ignore"):  # accelerations of a mass matrix that has no inverse

@@ -1,5 +1,5 @@
-"""Functions that a model can have. Some need a positive definite mass matrix, or links whose parameters are all known;
-baked code needs a known theta_b."""
+"""Which functions psdmc can generate for a model. Some need a positive definite mass matrix, or links whose parameters
+are all known. Code that contains theta_b as constants needs a known theta_b."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ REMEDY = {
 
 
 def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
-    """InputError where a wanted function (None: the default ones) needs what the model has not."""
+    """Raise InputError if one of the functions needs something that the model lacks. None: the functions that psdmc
+    generates by default."""
     names = wanted(functions, model.mechanism)
     lacking = _lacking(model, names)
     for name, reason in lacking.items():
@@ -37,7 +38,8 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of all default functions that the model can have, and a sentence for each restriction."""
+    """Return the names of all default functions that psdmc can generate for the model, and one sentence for each
+    function left out or restricted."""
     default = default_of(model.mechanism)
     lacking = _lacking(model, default)
     names = tuple(name for name in default if name not in lacking)
@@ -46,8 +48,11 @@ def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
-    """Sentences that name those of `functions` (None: the default ones) that only take theta_b at run time, because the
-    model's is unknown. Empty where it is known or no function needs it."""
+    """Return a sentence that lists the functions whose code needs theta_b as an argument, because the model has no
+    theta_b.
+
+    The tuple is empty if theta_b is known, or if none of `functions` (None: the default ones) depends on theta_b.
+    """
     asked = wanted(functions, model.mechanism)
     names = [name for name in asked if name in RECIPES and RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:

@@ -1,8 +1,9 @@
-"""Estimate of the operations that an exchange of carriers saves, from the branches of a tree that it changes.
+"""An estimate of the operations that a change of carriers saves, from the changed branches of a robot's tree alone.
+Carriers are the link parameters that are not set to zero in generated code.
 
-The cost of a function of a tree is nearly a sum over its branches; the bodies that carry them add what branches share. The
-search of a large robot therefore traces the changed branches with these bodies alone, before and after the exchange, and
-traces the whole robot only where that is cheaper: 9 to 11 of talos's 33 joints are traced.
+In a tree, the cost of a function is nearly a sum over branches. For large robots, the search first traces (records on
+symbols) only the branches that a change affects and the bodies that carry them, before and after the change. It traces
+the whole robot only if these branches become cheaper. For talos, 9 to 11 of 33 joints are traced.
 """
 
 from __future__ import annotations
@@ -36,10 +37,14 @@ class Branches:
     def changed(
         self, recipe: Recipe, before: Arrangement, behind: Arrangement, groups: Sequence[Limbs] = ()
     ) -> tuple[int, ...] | None:
-        """Joints of the branches that two arrangements of one geometry differ in, and of the bodies that carry them; None
-        where that is most of the robot, or of a small one, or where a part of it is no robot for the function.
+        """Return the joints of the branches in which two arrangements of the code differ, with all joints between these
+        branches and the base. The arrangements have equal geometry, but different nonzero link parameters (carriers).
 
-        groups   limbs of which the same joints are kept
+        Return None if these are most of the robot's joints, if the robot is small, or if the function cannot be
+        computed for a part of the robot.
+
+        groups  groups of limbs: if a joint of one limb is in the result, the joints at its place in the other limbs
+                are, too
         """
         frames = before.reframed.frames
         is_told = self.robot.theta_b is not None or len(frames) >= MANY
@@ -54,7 +59,8 @@ class Branches:
         return found if len(found) <= WORTH * len(frames) else None
 
     def part(self, whole: Arrangement, kept: tuple[int, ...]) -> tuple[Arrangement, RobotConstants]:
-        """The arrangement of these joints alone, and the constants of a robot of them."""
+        """Return an arrangement (frames, nonzero parameters, recursion options) for a robot that has only the joints
+        `kept`, and the constants of this robot."""
         number = {joint: i for i, joint in enumerate(kept)}
         links = [divmod(carrier, PARAMETERS_PER_LINK) for carrier in whole.carriers]
         rows = [row for row, (joint, _) in enumerate(links) if joint in number]
@@ -68,8 +74,8 @@ class Branches:
 
 
 def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
-    """Return the limb of each of these joints, and all joints that carry it, ascending. Of a body that carries several
-    limbs the first one: what limbs take from it is needed anyway."""
+    """Return each given joint, all joints that carry it, and one limb that it carries, as joint numbers in ascending
+    order. One limb is enough to make use of the values that a body computes for its limbs."""
     children: dict[int, list[int]] = {i: [] for i in range(BASE, len(frames))}
     for i, frame in enumerate(frames):
         children[frame.parent].append(i)
@@ -84,7 +90,8 @@ def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
 
 
 def limbs_in(groups: Sequence[Limbs], kept: tuple[int, ...]) -> tuple[Limbs, ...]:
-    """The groups as far as their limbs are among these joints, which are numbered anew."""
+    """Return the groups of limbs, restricted to the joints in `kept`. Joints are numbered by their position in
+    `kept`."""
     number = {joint: i for i, joint in enumerate(kept)}
     left = (
         tuple(tuple(number[joint] for joint in limb if joint in number) for limb in limbs) for limbs in groups

@@ -1,6 +1,7 @@
-"""The carriers' space of a model: regressor columns of all link parameters, and which of them are independent.
+"""The regressor columns of all link parameters. Parameters with independent columns can be carriers: link parameters
+that represent all others in generated code.
 
-Columns that double precision cannot tell apart are treated in extended precision.
+Columns that double precision cannot distinguish are treated in extended precision.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ SEED = 20211
 
 
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
-    """The carriers' space of a model. `representative` takes theta_b to standard parameters about the link frames."""
+    """Return the possible sets of carriers of a model: link parameters that represent all others in generated code.
+
+    representative  matrix from theta_b to standard parameters about the link frames
+    """
     n = len(reframed.frames)
     is_sampled = n <= SAMPLED_JOINTS or any_follows(reframed.frames)
     samples = _sampled_columns(reframed) if is_sampled else _torque_rows(reframed)
@@ -71,8 +75,11 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
 
 
 def every_parameter(reframed: Reframed, representative: Array) -> tuple[tuple[int, ...], Array]:
-    """Return all link parameters that theta_b contains, and the (count, l) matrix from theta_b to their values. These
-    are more than the carriers, but none of them stands for another, whatever its size."""
+    """Return the indices of all link parameters that theta_b contains, and the (count, l) matrix from theta_b to their
+    values.
+
+    If code uses all of these parameters, no parameter represents another one, and small values keep their digits.
+    """
     lift = _lifted(reframed, representative).astype(np.float64)
     reached = np.flatnonzero(lift.any(axis=1))
     return tuple(reached.tolist()), lift[reached]

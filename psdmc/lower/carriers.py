@@ -1,9 +1,10 @@
-"""Carriers: a few link parameters that give the same torques as all of the model's, every other one being exactly zero.
+"""Carriers: a few link parameters that give the same torques as all parameters of the model. All other parameters are
+set to exactly zero.
 
-Infinitely many link parameters give the same torques. Any set of parameters whose regressor columns form a basis of all
-columns can carry a model. Such sets are the bases of a matroid, so that the greedy choice by weight has the least total
-weight. What a parameter costs depends on its neighbours, so that a search by PROGRAM cost refines the choice
-(lower/search.py).
+Infinitely many vectors of link parameters give the same torques. Any set of parameters whose regressor columns are a
+basis of all columns can be carriers. These sets form a matroid. Therefore the least total weight results if parameters
+are taken one by one, the lightest independent one first. The cost of a parameter depends on which other parameters are
+nonzero. A search that counts operations therefore refines the choice (lower/search.py).
 """
 
 from __future__ import annotations
@@ -38,18 +39,18 @@ unit."""
 
 
 class Careful(NamedTuple):
-    """Columns that double precision cannot tell apart.
+    """Regressor columns that double precision cannot distinguish, in extended precision.
 
-    rows    (r, 11 n + l)  the parameters' and the model's columns
-    units   (11 n,)  one unit of each parameter in SI, for a unit of length near the chain's size
+    rows   (r, 11 n + l)  the columns of all link parameters, then those of the model's base parameters
+    units  (11 n,)  one unit of each parameter in SI, for a unit of length near the size of the robot
     """
 
     rows: Long
     units: Array
 
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
-        """A basis of little weight, ascending. A column is not taken where its part beside the others is much smaller
-        than another column's."""
+        """Return a basis among the parameters' columns with a small sum of weights, as indices in ascending order. A
+        column is not chosen if, after subtraction of the chosen columns, it is much smaller than another column."""
         count = len(self.units)
         order = np.array(sorted(range(count), key=lambda j: (weights[j], j)))
         work = (self.rows[:, :count] * self.units)[:, order]
@@ -60,16 +61,17 @@ class Careful(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarrierSpace:
-    """Sets of link parameters that can carry a model, and the values that theta_b gives them.
+    """The sets of link parameters that can be the carriers of a model, and the carriers' values as functions of
+    theta_b. Carriers are the parameters that represent all others in generated code.
 
-    r, the rank of all columns; l, the model's base parameters
+    r is the rank of all columns, and l the number of the model's base parameters.
 
-    columns   (r, 11 n)  regressor columns in pseudo-inertia form about the re-framed joint frames, as coordinates in a
-                         basis of their span
-    tableau   the same columns in a basis of themselves, followed by the model's l columns, which theta_b weights
-    whole     (l,)  lengths of the model's columns
-    lengths   (11 n,)  those of `columns`
-    careful   the same in extended precision, where columns are nearly dependent; None where none are
+    columns  (r, 11 n)  regressor columns of the link parameters in pseudo-inertia form, about the new joint frames of
+                        generated code; they are coordinates in a basis of the columns' span
+    tableau  the columns as combinations of a basis among them, followed by the columns of the l base parameters
+    whole    (l,)  lengths of the base parameters' columns
+    lengths  (11 n,)  lengths of `columns`
+    careful  the columns in extended precision, if some are nearly dependent; else None
     """
 
     columns: Array
@@ -92,8 +94,9 @@ class CarrierSpace:
         return int(self.columns.shape[1])
 
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
-        """The basis of least weight, ascending; of equal weights the earlier parameter is taken. Where rounding hides
-        the last directions from that order: the basis that the tableau started with."""
+        """Return the carriers (parameters that represent all others) with the least sum of weights, as indices in
+        ascending order. Of equal weights the earlier parameter is chosen. If rounding makes this basis incomplete,
+        return the basis of the tableau."""
         key = tuple(weights)
         if key not in self._lightest:
             self._lightest[key] = self._chosen(key)
@@ -106,18 +109,18 @@ class CarrierSpace:
         return chosen if len(chosen) == len(self.tableau.basis) else self.tableau.basis
 
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
-        """Return pairs (out, in) whose exchange leaves a basis: the parameter that enters has a fair share of the one
-        that leaves."""
+        """Return pairs (out, in): the parameter `in` can take the place of the carrier `out`. The carriers (parameters
+        that represent all others) then remain a basis. Pairs that would make the carriers' values too large are left
+        out."""
         others = [j for j in range(self.count) if j not in carriers and self.lengths[j]]
         share = np.abs(self._coordinates(carriers, others)) * self.lengths[list(carriers), None]
         fair = np.argwhere((share > FAIR_SHARE * self.lengths[others]).T)
         return [(carriers[row], others[column]) for column, row in fair.tolist()]
 
     def transfer(self, carriers: Sequence[int]) -> Array:
-        """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones.
+        """Return the matrix (len(carriers), l) from theta_b to the carriers' values, with exact zeros and ones.
 
-        An entry is zero where its contribution is rounding, compared with what the base parameter contributes as a
-        whole.
+        An entry becomes zero if it is only rounding, compared with the whole effect of the base parameter.
         """
         key = tuple(carriers)
         if key in self._transfers:
@@ -149,7 +152,8 @@ class CarrierSpace:
 
 
 def lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
-    """The basis of least weight among columns; of equal weights the earlier column is taken."""
+    """Return the indices of a basis among the columns, with the least sum of weights. Of equal weights the earlier
+    column is chosen."""
     size = {j: np.linalg.norm(columns[:, j]) for j in range(columns.shape[1])}
     order = sorted((j for j in size if size[j] != 0.0), key=lambda j: (weights[j], j))
     chosen: list[int] = []

@@ -1,4 +1,5 @@
-"""Common normals of two axes: their feet and directions, and what takes their place where axes are nearly parallel."""
+"""Common normals of two joint axes: directions, and feet (the points where a normal meets the axes). Nearly parallel
+axes have no unique normal, and another direction perpendicular to them is used."""
 
 from __future__ import annotations
 
@@ -17,12 +18,14 @@ LITTLE = 1e-2
 
 
 def nearly_parallel(a: Array, b: Array) -> bool:
-    """Whether two unit vectors along axes are parallel to within NEARLY_PARALLEL."""
+    """Return whether two unit vectors are nearly parallel or opposite: the sine of their angle is less than
+    NEARLY_PARALLEL."""
     return float(np.linalg.norm(cross(a, b))) < NEARLY_PARALLEL
 
 
 def foot_towards(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
-    """Point of the line (point, axis) nearest to the other line; None where they are nearly parallel."""
+    """Return the point of a line that is nearest to another line; None if the lines are nearly parallel. A line is
+    given by a point and a unit vector."""
     if nearly_parallel(axis, other_axis):
         return None
     normal = cross(axis, other_axis)
@@ -32,8 +35,9 @@ def foot_towards(point: Array, axis: Array, other_point: Array, other_axis: Arra
 
 
 def common_normal(axis: Array, following: Array, step: Array) -> Array | None:
-    """Direction of the common normal of two axes; None where every perpendicular would do. For nearly parallel axes the
-    step from one origin to the next takes its place."""
+    """Return the unit vector of the common normal of two axes, given by their directions. For nearly parallel axes, it
+    is the part of `step` (from one origin to the next) that is perpendicular to them. Return None if this part is
+    zero."""
     normal = cross(axis, following)
     if nearly_parallel(axis, following):
         normal = perpendicular(step, axis)
@@ -43,8 +47,9 @@ def common_normal(axis: Array, following: Array, step: Array) -> Array | None:
 
 
 def normal_on_side_of(axis: Array, following: Array, step: Array, x: Array) -> Array:
-    """The common normal of a body's axis and a further child's, on the side of x; x where every perpendicular would do: the
-    body's own x looks along the normal to its first child."""
+    """Return the unit vector of the common normal of a body's axis and a child's axis. Of its two directions, the one
+    nearer to x is chosen. Return x itself if the axes coincide. x is the body's x axis, along the normal to its first
+    child."""
     own = common_normal(axis, following, step)
     if own is None:
         return x
@@ -52,13 +57,14 @@ def normal_on_side_of(axis: Array, following: Array, step: Array, x: Array) -> A
 
 
 def across(direction: Array, axis: Array) -> Array:
-    """The part of a unit direction across an axis; the direction itself where nearly all of it is across."""
+    """Return the part of a unit direction that is perpendicular to an axis, scaled to length one. If the part along the
+    axis is only rounding, return the direction unchanged."""
     along = times(axis, direction)
     return direction if abs(along) < EXACT else clean_direction(direction - along * axis)
 
 
 def perpendicular(vector: Array, axis: Array) -> Array:
-    """The part of a vector across a unit axis, at right angles to it even where little is left."""
+    """Return the part of a vector that is perpendicular to a unit axis, even if this part is small."""
     part = vector - axis * times(axis, vector)
     if length(part) < LITTLE * length(vector):
         part = part - axis * times(axis, part)

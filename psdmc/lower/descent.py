@@ -1,4 +1,5 @@
-"""A descent by score: candidates are tried in order, and a strictly lower score is moved to, until the budget is spent."""
+"""A search for the cheapest arrangement (frames, parameters and recursion of generated code). It tries candidates in
+order and takes each one with a strictly lower score, until its budget of candidates is spent."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ ROUNDING = 1e-6
 
 
 class Descent:
-    """The cheapest arrangement so far, and the rest of the budget."""
+    """The state of a search: the cheapest arrangement so far, and the number of candidates that may still be tried. An
+    arrangement is a choice of frames, parameters and recursion."""
 
     arrangement: Arrangement
 
@@ -28,9 +30,10 @@ class Descent:
     def consider(
         self, candidates: Iterator[Arrangement], expected: Callable[[Arrangement], float] | None = None
     ) -> bool:
-        """Try candidates in order, moving to each that is cheaper. Returns whether any was.
+        """Try candidates in order, and take each one with a lower score. Return whether any candidate was taken.
 
-        expected  a score that costs less to find: candidates that are no cheaper by it are not tried
+        expected  a rough estimate of the score that takes less time; candidates whose estimate is not lower are not
+                  tried
         """
         improved = False
         for candidate in candidates:

@@ -1,8 +1,9 @@
-"""A check of one function's trace for sums of unlike quantities.
+"""A check that a generated function adds no unlike quantities, such as a mass and a length.
 
-A function is traced once more, on a tracer that knows dimensions (program/dimensioned.py). There each length, mass and so on
-of the robot is an input with its dimension, so that no two of them are merged into a number. The search's own traces, of
-which there are hundreds, cost what they did before.
+The function is traced (recorded on symbols) once more, with symbols that have dimensions (program/dimensioned.py). Each
+length, mass and so on of the robot is then an input with its dimension, not a constant. Otherwise constants of
+different dimensions could be combined to one number. The search uses traces without dimensions, so the check does not
+slow it down.
 """
 
 from __future__ import annotations
@@ -48,9 +49,12 @@ HINT = (
 def check_dimensions(
     recipe: Recipe, reframed: Reframed, robot: RobotConstants, choices: Choices = PLAIN
 ) -> None:
-    """InputError where the function adds, compares or chooses between unlike quantities, takes such a function as exp of one
-    that is no number, or puts out one that has not its signature's unit. Robots with a joint type that contains a length, as
-    a screw does its pitch, are not checked: to the tracer this length is a number."""
+    """Raise InputError if the function adds, compares or chooses between unlike quantities. Raise InputError also if
+    exp or a similar function has an argument with a unit, or if an output has another unit than its signature says.
+
+    Robots with a joint type that contains a length, such as the pitch of a screw, are not checked, because the check
+    sees this length as a number without a unit.
+    """
     if any(frame.joint.has_length for frame in reframed.frames):
         return
     signature = recipe.signature
@@ -115,7 +119,8 @@ class _Measured:
         return replace(frame, translation=self.vector(frame.translation, LENGTH), follows=follows)
 
     def bodies(self, of: Callable[[Dimension], Scalar]) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:
-        """All bodies and drives, of which each entry is made from its dimension."""
+        """Return all bodies and drive inertias as symbols: `of` makes the symbol for each entry, from the entry's
+        dimension."""
         bodies = []
         for _ in self.reframed.frames:
             mass, *entries = (of(each) for each in (MASS, *(MOMENT,) * 3, *(INERTIA,) * 6))
@@ -123,7 +128,8 @@ class _Measured:
         return tuple(bodies), tuple(of(each) for each in self.standard[DRIVE::PARAMETERS_PER_LINK])
 
     def by_theta(self) -> ByTheta:
-        """Each entry has a part in one of the base parameters, which take turns."""
+        """Return all bodies and drive inertias as functions of theta_b, for the check of dimensions. Each entry is
+        proportional to one base parameter; the base parameters are used in turn."""
         theta_b = [
             self.tracer.measured(Slot("theta_b", k), dimension) for k, dimension in enumerate(self.theta_b)
         ]

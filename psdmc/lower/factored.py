@@ -1,6 +1,8 @@
-"""The factored lowering: trace the rigid-body algorithms over a re-framed chain with sparse equivalent parameters.
+"""The factored lowering: a method that makes code from recursive rigid-body algorithms. They are recorded on symbols,
+for a robot with new link frames and few nonzero parameters.
 
-One PROGRAM per generated function. What can be chosen freely is in an Arrangement; lower/search.py chooses.
+There is one PROGRAM (list of operations) per generated function. An Arrangement contains everything that can be chosen
+freely, and lower/search.py chooses it.
 """
 
 from __future__ import annotations
@@ -35,10 +37,11 @@ from psdmc.robot.mechanism import Array, Mechanism, Placement
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotConstants:
-    """The parts of a model that every trace needs.
+    """The data of a model that are needed to record any function: the robot, its sizes, and its parameters as functions
+    of theta_b.
 
-    representative  (11 n, l)  theta_b to standard parameters about the link frames
-    theta_b         (l,)       None: an input of the PROGRAM
+    representative  (11 n, l)  matrix from theta_b to standard parameters about the link frames
+    theta_b         (l,)  values; None: theta_b is an input of the PROGRAM
     """
 
     chain: Mechanism
@@ -49,14 +52,15 @@ class RobotConstants:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrangement:
-    """One way to lower a model.
+    """One possible form of the code of a model: link frames, unit of length, nonzero parameters and options of the
+    recursions.
 
-    reframed  geometry
-    unit      m, unit of length inside the code (units.py); a length equal to it costs no multiplication
-    carriers  which link parameters carry the model (indices, 11 per link)
-    transfer  (len(carriers), l)  theta_b to their values
-    choices   how the recursions are arranged
-    is_basis  whether no carrier could be left out; else they are all parameters that theta_b has a part in
+    reframed  joint frames and placements
+    unit      m, unit of length inside the code (units.py); a multiplication by a length of one unit is left out
+    carriers  indices (11 per link) of the link parameters that represent the model; all others are zero
+    transfer  (len(carriers), l)  matrix from theta_b to the carriers' values
+    choices   options of the recursions
+    is_basis  True if no carrier can be left out; else the carriers are all parameters that theta_b contains
     """
 
     reframed: Reframed
@@ -72,18 +76,20 @@ class Arrangement:
 
 
 def trace_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Program:
-    """The PROGRAM of one function that needs bodies. Unknown base parameters become an input."""
+    """Return the PROGRAM (list of operations) of one function that uses masses and inertias. If theta_b is unknown, it
+    is an input."""
     return Recording.of(recipe, arrangement, robot).program()
 
 
 def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Cost:
-    """The cost of the PROGRAM that trace_dynamics would return."""
+    """Return the numbers of operations of the PROGRAM that trace_dynamics would return."""
     return Recording.of(recipe, arrangement, robot).cost()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """What one function does in an arrangement, on a tracer's symbols: to be counted, and to become a PROGRAM."""
+    """The operations of one function in an arrangement (frames, parameters, options), recorded on symbols. They can be
+    counted, or become a PROGRAM."""
 
     tracer: Tracer
     outputs: Recorded
@@ -119,7 +125,8 @@ def _recorded(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, t
 
 
 def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) -> Program:
-    """The PROGRAM of one function that needs no theta_b."""
+    """Return the PROGRAM (list of operations) of one function that depends on the robot's geometry, but not on masses
+    and inertias."""
     tracer = Tracer()
     inputs = _inputs(recipe, robot, tracer)
     return tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
@@ -140,7 +147,8 @@ def traced(
     unit: float,
     by_theta: Callable[[], ByTheta],
 ) -> Recorded:
-    """Record a recipe on these frames, bodies and symbols: every entry of its outputs with its slot."""
+    """Record the operations of a function on symbols, for the given frames, bodies and inputs. Return every entry of
+    the outputs with its slot (output name and index)."""
     is_scaled = unit != 1.0 and are_scaled((*recipe.signature.inputs, *recipe.signature.stored))
     axes = own_axes(reframed.frames, reframed.named, [NUMBER] * robot.sizes.l) if is_scaled else {}
     for quantity in recipe.signature.inputs if is_scaled else ():
@@ -183,8 +191,8 @@ def _inputs(recipe: Recipe, robot: RobotConstants, tracer: Tracer) -> dict[str, 
 
 
 def stored_entries(signature: Signature, outputs: Outputs) -> Recorded:
-    """Every entry of a trace's outputs with its slot, in order of storing; InternalError where they do not fit the
-    signature."""
+    """Return every entry of a function's recorded outputs with its slot (output name and index), in order of storing.
+    Raises InternalError if the outputs do not fit the signature."""
     if outputs.keys() != signature.traced:
         raise InternalError(f"{signature.name}: its trace gives {', '.join(outputs)}")
     found: list[tuple[Slot, Symbol | Number]] = []
@@ -200,7 +208,7 @@ def _flat(values: Any) -> list[Symbol | Number]:
 
 
 def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
-    """Values of the carriers; of a theta_b that is not known as symbols."""
+    """Return the values of the carriers (the nonzero link parameters): numbers, or symbols if theta_b is unknown."""
     transfer = arrangement.transfer
     rows, columns = np.nonzero(transfer)
     factors = transfer[rows, columns]
@@ -217,7 +225,8 @@ def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Trac
 
 @lru_cache(maxsize=64)
 def in_unit(reframed: Reframed, unit: float) -> Reframed:
-    """The geometry in another unit of length; a length equal to it becomes exactly one."""
+    """Return frames and placements with all lengths in another unit. A length equal to this unit becomes exactly
+    one."""
     if unit == 1.0:
         return reframed
 

@@ -1,4 +1,5 @@
-"""Frames of a model by where they sit on their axes, and the carriers there: computed once, for all searches."""
+"""New joint frames of a model, for each choice of their origins on the joint axes, and the possible carriers (nonzero
+parameters). All searches share these results."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ LARGE = 10
 
 
 class Geometry:
-    """The geometry of one model, which does not depend on the function that is lowered, nor on whether theta_b is
-    compiled in."""
+    """The new joint frames of one model and the possible carriers (nonzero parameters). They depend neither on the
+    generated function, nor on whether theta_b is constant in the code."""
 
     def __init__(self, chain: Mechanism, representative: Array) -> None:
         self.chain, self.representative = chain, representative
@@ -25,7 +26,8 @@ class Geometry:
 
     @cached_property
     def feet(self) -> tuple[tuple[Foot, ...], ...]:
-        """Return those of `all_feet` that give different frames: parallel and crossing axes have one foot."""
+        """Return the choices of `all_feet` that give different frames. For parallel or crossing axes, both positions on
+        an axis give the same frame."""
         seen: dict[tuple[Foot, ...], Reframed] = {}
         for feet in all_feet(self.chain):
             reframed = self.reframed(feet)
@@ -34,7 +36,10 @@ class Geometry:
         return tuple(seen)
 
     def reframed(self, feet: tuple[Foot, ...]) -> Reframed:
-        """The frames with their origins on these feet."""
+        """Return the robot's new joint frames, with each origin where a common normal meets the joint's axis.
+
+        feet  for each joint, whether this is the normal to the previous or to the next axis
+        """
         if feet not in self._reframed:
             self._reframed[feet] = reframe(self.chain, feet)
         return self._reframed[feet]
@@ -45,15 +50,19 @@ class Geometry:
         return unmoved(self.chain)
 
     def space(self, reframed: Reframed) -> CarrierSpace:
-        """The sets of link parameters that can carry the model in these frames."""
+        """Return the possible carriers in these frames: sets of link parameters that can represent all others."""
         if reframed not in self._spaces:
             self._spaces[reframed] = carrier_space(reframed, self.representative)
         return self._spaces[reframed]
 
 
 def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
-    """Where frames may sit: all on the normal to the axis before, then each single one on the next, then all on the
-    next. A leaf has no next axis. Of large robots only all of them together."""
+    """Yield choices of the frames' origins on the joint axes. First, all frames are on the normal to the previous axis.
+    Then each single frame is on the normal to the next axis, and then all frames. Joints without children have no next
+    axis.
+
+    For large robots, only the first choice and the last one are yielded.
+    """
     n, leaves = len(chain), chain.leaves
     singly = [(i,) for i in range(n) if i not in leaves] if n <= LARGE else []
     for moved in [(), *singly, tuple(range(n))]:

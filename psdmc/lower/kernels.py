@@ -1,4 +1,5 @@
-"""Lowering of a model to the kernels that emission prints: each function in its cheapest form."""
+"""Lowering of a model to kernels. A kernel is the list of operations of one function, from which C code is printed.
+Each function gets its cheapest form."""
 
 from __future__ import annotations
 
@@ -62,12 +63,14 @@ def lower(
     theta_variants: bool = True,
     costs: Costs = COSTS,
 ) -> dict[str, Kernel]:
-    """Kernels by name, `_theta` variants included where wanted, in the order of psdmc.functions.
+    """Return the kernel (operations) of each function by name, in the order of psdmc.functions.
 
-    functions  names, or NAME_theta_rows; None takes the default ones; without theta_b only those variants that need none are
-               made
-    costs      of the target
-    Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
+    functions       names of functions, also NAME_theta_rows (one theta_b per state); None: the default ones. If theta_b
+                    is unknown, only functions and variants that do not need its value are made
+    theta_variants  whether to make also the variants NAME_theta, with theta_b as an argument
+    costs           costs of operations on the target processor
+
+    Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
     lowered = _Lowered(model, lowering, costs)
@@ -93,9 +96,13 @@ def lower(
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
-    """The names in the order of psdmc.functions, with NAME_theta_rows behind them; None and the word 'default': the default
-    ones, of this robot where one is given; 'all': all but NAME_theta_rows; a text is one name. What a function calls comes
-    along. InputError for one that is unknown."""
+    """Return the names of the functions that the user asked for, in the order of psdmc.functions. Variants
+    NAME_theta_rows (one theta_b per state) come last.
+
+    None and the word 'default' mean the default functions, of this robot if one is given. 'all' means all functions
+    except NAME_theta_rows. A text is one name. The functions that these functions call are added. Raises InputError for
+    an unknown name.
+    """
     default = DEFAULT if robot is None else default_of(robot)
     if functions is None:
         return default
@@ -149,7 +156,7 @@ class _Lowered:
         self._short: list[tuple[Program, Program]] = []
 
     def check(self, recipe: Recipe) -> None:
-        """InputError where a function's trace adds unlike quantities."""
+        """Raise InputError if the recipe's function adds unlike quantities, such as a mass and a length."""
         traced = RECIPES[recipe.packs.function] if recipe.packs else recipe
         if traced.regions is None or self.model.nv <= TRACED:
             check_dimensions(
@@ -159,7 +166,8 @@ class _Lowered:
             )
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
-        """The kernel of one function, made once: another one may be a part of it."""
+        """Return the kernel (operations) of one function. It is computed at the first call only, because another kernel
+        may contain it."""
         key = recipe.name, theta
         if key not in self._kernels:
             self._kernels[key] = (

@@ -1,5 +1,5 @@
-"""A robot whose limbs of equal structure are one limb: its joints, frames and bodies, with a constant per limb where they
-differ."""
+"""Several limbs of equal structure (such as legs) as one limb. Numbers that differ between the limbs become constants
+with one value per limb."""
 
 from __future__ import annotations
 
@@ -25,8 +25,11 @@ LARGEST = 8
 
 
 def possible_groups(frames: Sequence[Frame]) -> tuple[tuple[Limbs, ...], ...]:
-    """Ways to see limbs in a robot, none twice: all branches with joints of equal types, or only those whose frames have
-    the same zeros. A joint of a limb may follow one of its own limb, at the same place in all of them."""
+    """Return the possible ways to divide a robot into groups of equal limbs.
+
+    In one way, a group consists of all branches with joints of equal types. In another way, also the joint frames must
+    have equal zeros. A mimic joint must follow a joint of its own limb, at the same place in all limbs of the group.
+    """
     parents = [frame.parent for frame in frames]
     ways: list[tuple[Limbs, ...]] = []
     for label in (_type_of, _pattern_of):
@@ -67,7 +70,8 @@ def _pattern_of(frame: Frame) -> Hashable:
 
 
 class LinkFrame(NamedTuple):
-    """A frame on the body of a limb: axes and origin in the joint's frame, with a constant per limb where they differ."""
+    """A frame that is fixed to a limb's body: axes and origin in the joint's frame. Numbers that differ between the
+    limbs of a group have one value per limb."""
 
     rotation: NDArray[Any]
     translation: NDArray[Any]
@@ -75,11 +79,12 @@ class LinkFrame(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A joint of the core, or those at one place of all limbs of a group.
+    """A joint outside all limbs (a joint of the core, such as a trunk), or the corresponding joints of all limbs, such
+    as all knees.
 
-    joints    one, or limb by limb
-    group     number of the group; None: of the core
-    is_first  whether it is where limbs hang on the core
+    joints    number of the one joint, or the numbers limb by limb
+    group     number of the group of limbs; None: a joint of the core
+    is_first  whether it is the joint at which limbs are attached to the core
     """
 
     joints: tuple[int, ...]
@@ -87,11 +92,13 @@ class Place:
     is_first: bool = False
 
     def constant(self, values: Sequence[float]) -> Scalar:
-        """One constant, from one for each of the joints."""
+        """Return one constant for this place, from the numbers of its joints: the number itself, or a constant with one
+        number per limb."""
         return values[0] if self.group is None else lanes(self.group, values)
 
     def placed(self, frames: Sequence[Placement]) -> LinkFrame | Placement:
-        """One frame on a body, from one for each joint."""
+        """Return one placement for this place, from the placements of its joints. Numbers that differ between limbs
+        become constants with one number per limb."""
         if self.group is None:
             return frames[0]
         rotation, translation = np.empty((3, 3), object), np.empty(3, object)
@@ -109,7 +116,8 @@ class Place:
 
 
 def places(count: int, groups: Sequence[Limbs]) -> tuple[Place, ...]:
-    """Return the places of a robot of `count` joints, in the order of their first joints."""
+    """Return the places of a robot of `count` joints, in the order of their first joints. A place is one joint outside
+    the limbs, or the joints at one place in all limbs of a group."""
     found = [
         Place(joints, number, k == 0)
         for number, limbs in enumerate(groups)
@@ -121,7 +129,8 @@ def places(count: int, groups: Sequence[Limbs]) -> tuple[Place, ...]:
 
 
 def one_limb(frames: Sequence[Frame], among: Sequence[Place]) -> tuple[Frame, ...]:
-    """The frames of the places; Frame.limbs is not set."""
+    """Return the joint frame of each place (one joint, or corresponding joints of all limbs), without setting
+    Frame.limbs."""
     new = {joint: i for i, place in enumerate(among) for joint in place.joints} | {BASE: BASE}
     return tuple(
         replace(

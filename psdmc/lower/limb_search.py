@@ -1,8 +1,10 @@
-"""Whether a function's limbs run in lanes, and in which arrangement: by the cost of its PROGRAMs, like search.py.
+"""Decides by cost whether equal limbs (such as legs) are computed at once in SIMD lanes, and with which frames and
+parameters.
 
-The search starts from the arrangement of the PROGRAM without lanes. There, the carriers of one leg may be other parameters
-than those of another leg. In lanes, a parameter that one limb has costs the same as if all had it. Therefore each limb's
-carriers are tried for all limbs of its group; then exchanges are made in all limbs at once.
+The search starts from the code without lanes. There, the carriers (nonzero parameters) of one leg may be other
+parameters than those of another leg. In lanes, a parameter of one limb costs the same as the parameter of all limbs.
+Therefore the carriers of each limb are tried for all limbs of its group. Then carriers are exchanged in all limbs at
+once.
 """
 
 from __future__ import annotations
@@ -53,7 +55,10 @@ LIKELY = 1.1
 
 
 def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
-    """Cost of one call with vectors of that many lanes, in the same weights as a straight line's."""
+    """Return the cost of one call, in the units of straight-line code's cost, if equal limbs are computed in vectors.
+
+    lanes  number of slots of a vector, each of which computes one limb
+    """
     found = weight_of_stages(limbs.groups, stage_costs(limbs), lanes, costs)
     if limbs.products is None:
         return found
@@ -63,7 +68,8 @@ def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
 def weight_of_stages(
     groups: Sequence[LimbGroup], stages: Iterable[StageCost], lanes: int, costs: Costs
 ) -> float:
-    """Return the weight of groups and the costs of their stages."""
+    """Return the cost of one call, from the groups of limbs and the costs of the function's stages. A stage is a part
+    that one group, or the core outside the limbs, computes."""
     one, each = for_one_state(costs), for_lanes(costs)
     parts_of = {group.number: -(-group.count // lanes) for group in groups}
     total = 0.0
@@ -83,7 +89,10 @@ def weight_of_stages(
 def usable_groups(
     recipe: Recipe, arrangement: Arrangement, robot: RobotConstants
 ) -> tuple[tuple[Limbs, ...], ...]:
-    """Ways to see limbs. A function with a column for each base parameter needs limbs that have the same ones."""
+    """Return the possible divisions of the robot into groups of equal limbs for this function.
+
+    If an output has a column per base parameter, all limbs of a group must have corresponding base parameters.
+    """
     found = possible_groups(arrangement.reframed.frames)
     if not has_columns(recipe):
         return found
@@ -92,7 +101,8 @@ def usable_groups(
 
 @dataclass(frozen=True, slots=True)
 class LimbArrangement:
-    """An arrangement, the groups of limbs that run in lanes, and what one call costs then (`weight`)."""
+    """The frames and parameters of a function's code, the groups of limbs that run in SIMD lanes, and the cost of one
+    call (`weight`)."""
 
     arrangement: Arrangement
     groups: tuple[Limbs, ...]
@@ -100,7 +110,8 @@ class LimbArrangement:
 
 
 class LimbSearch:
-    """The search for one function of one model with known base parameters."""
+    """The search for the cheapest code of one function with limbs in SIMD lanes, for a model with known base
+    parameters."""
 
     def __init__(self, search: Search, recipe: Recipe, costs: Costs) -> None:
         self.search, self.recipe, self.costs = search, recipe, costs
@@ -108,7 +119,8 @@ class LimbSearch:
         self._weights: ByChoices[float] = ByChoices()
 
     def best(self, start: Arrangement) -> LimbArrangement | None:
-        """The cheapest arrangement with limbs in lanes; None where there is none."""
+        """Return the cheapest arrangement (frames, parameters) with limbs in SIMD lanes, searched from `start`. Return
+        None if the function or the target processor does not allow any."""
         if not self.costs.has_vectors or self._is_eliminated(start):
             return None
         ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]
@@ -117,7 +129,9 @@ class LimbSearch:
         return min(found, key=lambda each: each.weight) if found else None
 
     def among(self, geometries: Iterable[Reframed]) -> LimbArrangement | None:
-        """The cheapest of these for a function without bodies, with limbs in lanes; None where there is none."""
+        """Return the cheapest arrangement (frames and options of the code) with limbs in SIMD lanes and with one of
+        these choices of joint frames. Return None if there is none. The function must not depend on masses and
+        inertias."""
         if not self.costs.has_vectors:
             return None
         starts = [self.search.uncarried(each) for each in geometries]
@@ -130,12 +144,14 @@ class LimbSearch:
         return min(ways, key=lambda each: each.weight, default=None)
 
     def within(self, shared: LimbArrangement) -> LimbArrangement:
-        """The cheapest choices of this function within an arrangement that was found for another one."""
+        """Return the cheapest options of the recursion for this function. Frames, parameters and groups of limbs are
+        those that were found for another function."""
         own = self._weighed(shared.arrangement, shared.groups)
         return self._cheapest(own, self._rearranged(shared.arrangement))
 
     def lowered(self, found: LimbArrangement, straight: Program) -> LimbProgram | None:
-        """The function so arranged; None where no width makes it worth while against the straight line."""
+        """Return this function with limbs in SIMD lanes, with the frames, parameters and groups of limbs that a search
+        found. Return None if no number of lanes makes it cheaper than straight-line code."""
         limbs = self._ordered(self._traced(found.arrangement, found.groups))
         if limbs.products is not None and limbs.products.narrowest < AT_ONCE:
             return None

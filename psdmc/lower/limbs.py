@@ -1,4 +1,5 @@
-"""Trace a function of a robot with limbs of equal structure: one limb of each group, with a constant per limb."""
+"""Recording of a function's operations for a robot with equal limbs: one limb of each group is recorded. Numbers that
+differ between limbs are constants with one value per limb."""
 
 from __future__ import annotations
 
@@ -30,7 +31,13 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Placement
 
 @dataclass(frozen=True, slots=True)
 class TracedLimbs:
-    """A PROGRAM of core and limbs, as psdmc.program.limb_stages cuts it, its groups, and products behind it."""
+    """The recorded function of a robot with limbs.
+
+    program   operations of the core (all bodies outside limbs) and of one limb of each group, not yet divided into
+              stages
+    groups    the groups of equal limbs
+    products  matrix products that follow, if any
+    """
 
     program: Program
     groups: tuple[LimbGroup, ...]
@@ -40,7 +47,8 @@ class TracedLimbs:
 def trace_limbs(
     recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
 ) -> TracedLimbs:
-    """One function of a robot whose theta_b is known, limbs of each group traced once."""
+    """Record the operations of one function for a robot with known theta_b. Of each group of equal limbs, only one limb
+    is recorded."""
     trace = _Trace(recipe, arrangement, robot, groups)
     return trace.needed(list(trace.outputs(trace.recorded())))
 
@@ -48,7 +56,8 @@ def trace_limbs(
 def cost_of_limbs(
     recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
 ) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
-    """The groups of what trace_limbs would return, and what its stages cost."""
+    """Return the groups that trace_limbs would return, and the cost of each stage. A stage is a part that one group, or
+    the core outside the limbs, computes."""
     trace = _Trace(recipe, arrangement, robot, groups)
     return trace.counted(list(trace.outputs(trace.recorded())))
 
@@ -72,18 +81,23 @@ class _Group:
 
 
 def has_columns(recipe: Recipe) -> bool:
-    """Whether it puts out a matrix with a column for each base parameter."""
+    """Return whether an output of the recipe's function has one column for each base parameter."""
     return any("l" in quantity.axes for quantity in recipe.signature.outputs)
 
 
 def selected(lift: Array) -> dict[int, int]:
-    """The base parameters that are standard ones: column by row of the lift."""
+    """Return, for each row of the matrix `lift` with an entry one, the column of this entry.
+
+    lift  (11 n, l)  from base parameters to standard parameters. If a base parameter is a single standard parameter,
+                     the row is this parameter and the column is the base parameter
+    """
     rows, columns = np.nonzero(lift == 1.0)
     return dict(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
 def have_columns_alike(lift: Array, groups: Sequence[Limbs]) -> bool:
-    """Whether each base parameter is a standard one, and those of a group's limbs are the same."""
+    """Return whether each base parameter is a single standard parameter, and all limbs of a group have base parameters
+    at corresponding places."""
     found = selected(lift)
     if not len(found) == len(set(found.values())) == lift.shape[1] == np.count_nonzero(lift):
         return False
@@ -152,7 +166,8 @@ class _Trace:
         return [name for name in range(PARAMETERS_PER_LINK) if row + name in self.selected]
 
     def recorded(self) -> Mapping[Slot, Scalar]:
-        """Return the recipe's outputs by slots whose indices count places."""
+        """Return the recorded value of each output entry, by slot (output name and index). Indices count places: a
+        place is one joint, or the corresponding joints of all limbs."""
         arrangement, unit = self.arrangement, self.arrangement.unit
         values = carrier_values(arrangement, self.robot.theta_b, self.tracer)
         bodies, drives = bodies_from_carriers(arrangement.n, arrangement.carriers, values, unit)
@@ -192,7 +207,8 @@ class _Trace:
         return [tuple(first[joint] + k for joint in place.joints) for k in counts]
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
-        """Return the stored outputs by slots of the core and of limbs. Zeros are not stored."""
+        """Yield the output values to store, with slots (name and index) of a group of limbs or of the core (everything
+        outside limbs). Zeros are not stored."""
         self.products = self._products(found)
         for quantity in self.signature.stored:
             entries = [
@@ -261,7 +277,8 @@ class _Trace:
         return flat
 
     def counted(self, outputs: list[tuple[Slot, Scalar]]) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
-        """The groups, and the cost of each stage, sums that nothing needs left out."""
+        """Return the groups of limbs and the cost of each stage (a part that one group, or the core, computes). Sums
+        over limbs that no output needs are not counted."""
         groups = tuple(group.vectors for group in self.groups)
         stored = self.tracer.stored(outputs)
         return groups, traced_stage_costs(self.tracer.steps, stored, self.sums.summed, groups)

@@ -1,4 +1,5 @@
-"""A link's parameters in pseudo-inertia form: names, units, what each costs, and maps from and to standard parameters."""
+"""A link's parameters in pseudo-inertia form: names, units, costs, and conversions from and to standard parameters.
+This form has the integrals of xx, yy and zz over the mass in place of moments of inertia."""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ WEIGHTS = {
 
 
 def pseudo_map() -> Array:
-    """(11, 11): standard parameters of one link to its pseudo-inertia form, about the same frame."""
+    """Return the (11, 11) matrix that converts a link's standard parameters to pseudo-inertia form, about an unchanged
+    frame. In this form, the integrals of xx, yy and zz over the mass replace the moments of inertia."""
     matrix = np.zeros((11, 11))
     matrix[:4, :4] = np.eye(4)
     for row, inertia in enumerate((4, 6, 9), start=4):
@@ -48,7 +50,8 @@ def pseudo_map() -> Array:
 
 
 def link_map(place: Placement) -> Array:
-    """(11, 11): standard parameters about a link frame to pseudo-inertia form about the joint frame it is placed in."""
+    """Return the (11, 11) matrix that converts a link's standard parameters about the link frame to pseudo-inertia form
+    about the joint frame. This form has integrals of xx, yy, zz in place of moments of inertia."""
     matrix = np.zeros((11, 11))
     matrix[:BODY_PARAMETERS, :BODY_PARAMETERS] = joint_frame_map(place)
     matrix[10, 10] = 1.0
@@ -58,8 +61,11 @@ def link_map(place: Placement) -> Array:
 def bodies_from_carriers(
     n: int, carriers: Sequence[int], values: Sequence[Scalar], unit: float
 ) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:
-    """Bodies and drive inertias whose carriers have these values, every other parameter being zero; lengths in units of
-    `unit` m."""
+    """Return the bodies and drive inertias of n links if the carriers (nonzero link parameters) have these values and
+    all other parameters are zero.
+
+    unit  m, the unit of all lengths in the result
+    """
     rows: list[list[Scalar]] = [[0.0] * PARAMETERS_PER_LINK for _ in range(n)]
     powers = (2, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0)
     for carrier, value in zip(carriers, values, strict=True):

@@ -1,4 +1,4 @@
-"""Whether products of matrices behind a PROGRAM become loops."""
+"""Decides whether the matrix products after a function's other operations become loops or straight-line code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ SPAN = 4
 
 
 def in_loops(program: Program, products: tuple[Product, ...], n: int, costs: Costs) -> bool:
-    """Whether loops over n x n matrices pay: lines would be too many, or hardly an entry is always zero."""
+    """Return whether loops over n x n matrices are better than straight-line code for these products. They are if
+    straight-line code would be too long, or if hardly any entry is always zero."""
     if not products or n < costs.loops_from:
         return False
     widths = [n - zero_columns(program, product) for product in products]

@@ -1,4 +1,5 @@
-"""Packing of a matrix function's kernel: the part that computes some entries of the matrix."""
+"""Kernels (operations) of packed matrices, that is, of vectors with the entries of a matrix that can differ from zero.
+They are parts of the kernels of whole matrices."""
 
 from __future__ import annotations
 
@@ -17,10 +18,11 @@ Kept = Mapping[Slot, Slot]
 
 
 def packed(kernel: Kernel, function: Signature, columns: int, places: Places) -> Kernel:
-    """The kernel of `function`, whose one output has these entries of the other kernel's matrix one after the other. Its
-    arithmetic is the same, less what no entry needs.
+    """Return the kernel (operations) of `function`, whose only output is a vector of matrix entries. It is the kernel
+    of the whole matrix, without operations that these entries do not need.
 
-    columns  of the matrix
+    columns  number of columns of the matrix
+    places   (row, column) of each entry
     """
     (matrix,), (values,) = kernel.function.outputs, function.outputs
     kept = {

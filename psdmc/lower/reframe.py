@@ -1,13 +1,14 @@
-"""Re-frame a robot to modified DH for cheap arithmetic: z along the joint's axis, frames turned about it and moved
-along it.
+"""New joint frames for a robot, with which arithmetic is cheap: modified DH, with z along the joint's axis.
 
-The new frames are for generated code alone. E, P and theta_b do not depend on them, and joint variables keep their
-zero. A frame's x points along the common normal from its axis to its child's, so that the constant rotation between the
-two frames is about x alone and a right angle costs nothing. A body with several children does so towards the first; the
-frames of the others are turned about both z and x. Where on its axis a frame's origin sits is free (`feet`): on the
-normal to its parent's axis ("previous") or to its first child's ("next"). The axis of a sliding joint has only a
-direction and is put through a neighbour's origin. A joint of several coordinates keeps its frame, along whose axes its rates
-are.
+The new frames are used in generated code alone. E, P and theta_b do not depend on them, and joint variables keep their
+zero. The x axis of a frame is along the common normal of the joint's axis and the axis of the child joint. The constant
+rotation from frame to frame is then about x alone, and a right angle costs nothing. If a body has several children,
+this holds for the first child. The frames of the other children are rotated about both z and x.
+
+The origin of a frame on the joint's axis can be chosen (`feet`). It is where the axis meets the normal to the parent's
+axis ("previous") or the normal to the first child's axis ("next"). The axis of a sliding joint has only a direction,
+and is put through a neighbour's origin. A joint of several coordinates keeps its frame, because its rates are along
+this frame's axes.
 """
 
 from __future__ import annotations
@@ -52,16 +53,16 @@ Foot = Literal["previous", "next"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reframed:
-    """A robot's geometry for lowering.
+    """A robot's geometry with new joint frames, from which code is generated.
 
-    frames             n joint frames
-    base_acceleration  m/s^2, minus gravity, along base_axes
-    link_frames        n, the file's link frames in the new joint frames
-    tip                the tip frame in the new joint frame of `tip_body`
-    base_axes          3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
-    tip_body           the body that the tip frame is fixed to
-    base_origin        m, the point that frames on the base have their translations from, in the robot's base frame
-    named              the robot's named frames in the new joint frames
+    frames             n joint frames, each placed in the parent's frame
+    base_acceleration  acceleration of the base minus gravity, m/s^2, along base_axes
+    link_frames        n placements of the link frames of the robot file, in the new joint frames
+    tip                placement of the tip frame in the new joint frame of the body `tip_body`
+    base_axes          3 x 3, the axes in which the first frame is given, as columns in the robot's base frame
+    tip_body           number of the body to which the tip frame is fixed
+    base_origin        m, the origin from which frames on the base are given, in the robot's base frame
+    named              the robot's named frames, placed in the new joint frames
     """
 
     frames: tuple[Frame, ...]
@@ -74,7 +75,7 @@ class Reframed:
     named: tuple[NamedFrame, ...]
 
     def is_same(self, other: Reframed) -> bool:
-        """Whether every number of the two is equal."""
+        """Return whether all numbers of the two robots' frames are equal."""
         return (
             (self.frames, self.base_acceleration, self.base_axes)
             == (other.frames, other.base_acceleration, other.base_axes)
@@ -88,7 +89,10 @@ def _is_same(a: Placement, b: Placement) -> bool:
 
 
 def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
-    """The robot in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
+    """Return the robot with new joint frames in modified DH convention.
+
+    feet  for each joint, whether the frame's origin is on the common normal to the previous axis or to the next axis
+    """
     placed, reach = _placed_at_zero(chain), _reach(chain)
     axes = [clean_direction(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
@@ -129,7 +133,8 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
 
 
 def unmoved(chain: Mechanism) -> Reframed:
-    """The robot's own joint frames, turned and moved nowhere: more arithmetic, and no digit but those that its file has."""
+    """Return the robot with the joint frames of its file. They need more arithmetic than new frames, but the numbers of
+    the file are used without rounding."""
     return Reframed(
         frames_of(chain),
         base_acceleration(chain),

@@ -1,4 +1,5 @@
-"""Cost of a PROGRAM on a target, as one number that a search compares."""
+"""The cost of a PROGRAM (list of operations) on a target processor, as one number by which a search compares
+PROGRAMs."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ from psdmc.target.native import COSTS
 
 @dataclass(frozen=True, slots=True)
 class Scoring:
-    """The score of PROGRAMs on a target. In code for one state, the angles share vector sincos calls; with one state
-    per lane each angle has its own."""
+    """The rules by which a PROGRAM's cost on a target processor is computed. In code for one state, several angles
+    share a vector call of sincos. In code with one state per SIMD lane, each angle has its own call."""
 
     costs: Costs
     angles_per_sincos: int
@@ -35,12 +36,12 @@ class Scoring:
 
 
 def for_one_state(costs: Costs) -> Scoring:
-    """The scoring of code for one state a call."""
+    """Return the rules for the cost of code that computes one state per call."""
     return Scoring(costs, costs.angles_per_sincos)
 
 
 def for_lanes(costs: Costs) -> Scoring:
-    """The scoring of code for one state per lane."""
+    """Return the rules for the cost of code that computes one state per SIMD lane (slot of a vector)."""
     return Scoring(costs, 1)
 
 

@@ -1,8 +1,9 @@
-"""Choose among a model's many lowerings by PROGRAM cost.
+"""The search for the cheapest code of a model's functions. It chooses link frames, nonzero parameters and options of
+the recursion; these choices together are an arrangement.
 
-A coordinate descent over where frames sit on their axes, how the recursions are arranged, the unit of length and which
-parameters carry the model. Deterministic: candidates come in a fixed order, only a strictly lower cost is taken, and the
-budget is a number of traced programs, not a time.
+The search changes one choice at a time: origins of frames on the axes, options of the recursion, unit of length, and
+nonzero parameters. The result is deterministic. Candidates come in a fixed order, and only a strictly lower cost is
+taken. The budget is a number of traced PROGRAMs, not a time.
 """
 
 from __future__ import annotations
@@ -62,13 +63,14 @@ own."""
 
 
 def distinct(recipe: Recipe, choices: Sequence[Choices]) -> tuple[Choices, ...]:
-    """The choices that make a difference to a function: of equivalent ones the first."""
+    """Return the options of the recursion that make a difference to a function: of equivalent ones, only the first."""
     kinds = {tuple(getattr(each, field) for field in recipe.matters): each for each in reversed(choices)}
     return tuple(each for each in choices if each in kinds.values())
 
 
 class Search:
-    """The descent for one model; `geometry` is shared between functions and searches."""
+    """The search for the arrangements of one model's functions, that is, for frames, nonzero parameters and recursion.
+    `geometry` (the possible frames) is shared between functions and searches."""
 
     def __init__(
         self,
@@ -96,13 +98,16 @@ class Search:
 
     @property
     def has_many_joints(self) -> bool:
-        """Whether less than all that a search knows is tried."""
+        """Return whether the robot has so many joints that the search tries fewer candidates."""
         return len(self.robot.chain) > MANY_JOINTS
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
-        """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
-        kept. Where the cheapest is not accurate enough, the search is made again among those that are; InternalError where
-        all are beyond what rounding does."""
+        """Return the cheapest arrangement (frames, nonzero parameters, recursion) found for one function. If `start` is
+        given, its frames are kept.
+
+        If the torques of the cheapest arrangement are not accurate enough, the search is repeated among accurate
+        arrangements. Raises InternalError if all errors are larger than rounding explains.
+        """
         found = self._descended(recipe, scoring, start)
         accuracy = self.accuracy
         if accuracy is None or accuracy.error(found, recipe) <= LIMIT:
@@ -192,14 +197,18 @@ class Search:
         return best
 
     def uncarried(self, reframed: Reframed) -> Arrangement:
-        """Return the arrangement in which each parameter is separate. Which of them may stand for others is found by
-        columns of all joints' torques together, of which a small joint's are a small part: on robots of many scales its
-        digits are lost there."""
+        """Return the arrangement with these frames in which no link parameter represents another one.
+
+        Carriers (parameters that represent others) are chosen by the columns of all joints' torques together. On robots
+        of many scales, a small joint's part of these columns is so small that its digits are lost. The returned
+        arrangement keeps these digits.
+        """
         carriers, transfer = every_parameter(reframed, self.robot.representative)
         return Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0], is_basis=False)
 
     def keeps_digits(self, reframed: Reframed) -> bool:
-        """Whether torques computed on these frames are accurate enough; True where no base parameters are known."""
+        """Return whether torques computed in these joint frames are accurate enough; True if no base parameters are
+        known."""
         return self.accuracy is None or self.accuracy.error(self.uncarried(reframed)) <= LIMIT
 
     def _admits(self, accurate: Arrangement | None, recipe: Recipe) -> Callable[[Arrangement], bool]:
@@ -210,11 +219,13 @@ class Search:
         return lambda arrangement: accuracy.error(arrangement, recipe) <= limit
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
-        """Compute the cost of a function's PROGRAM in an arrangement; it is traced once."""
+        """Return the numbers of operations of a function in an arrangement (frames, nonzero parameters, recursion). The
+        result is computed once and cached."""
         return self._recorded(recipe, a, [])
 
     def _recorded(self, recipe: Recipe, a: Arrangement, new: list[Recording]) -> Cost:
-        """The cost of a function in an arrangement; its recording is added to `new` if it is made now."""
+        """Return the numbers of operations of a function in an arrangement. If the function is recorded for this, its
+        recording is added to `new`."""
 
         def make(choices: Choices) -> Cost:
             new.append(Recording.of(recipe, replace(a, choices=choices), self.robot))
@@ -243,14 +254,18 @@ class Search:
         return other if costs[1] < costs[0] else start
 
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
-        """The PROGRAM of a function in an arrangement that was found for another function or target. Only the choices
-        within the recursion are made again."""
+        """Return the PROGRAM (list of operations) of a function. Frames and nonzero parameters are those that were
+        found for another function or target processor; only the options of the recursion are chosen again."""
         return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes; of a robot
-        of more than MANY_JOINTS joints the latter alone, which its long functions share. All others are only counted, those
-        like the found one's first, and no more than have OPERATIONS together."""
+        """Yield the PROGRAMs (lists of operations) from which `rearranged` chooses. They are the cheapest one for one
+        state per call, and the cheapest one for one state per SIMD lane.
+
+        For a robot with more than MANY_JOINTS joints, only the second is yielded. All candidates are counted, and only
+        the best become PROGRAMs. The candidates most similar to the given arrangement (frames, parameters, options)
+        come first. Counting ends when the counted candidates have OPERATIONS operations together.
+        """
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
         recorded: dict[int, Recording] = {}

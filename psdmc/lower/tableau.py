@@ -1,7 +1,9 @@
-"""Columns as combinations of some of them, in extended precision, so that exact zeros and ones come out as such.
+"""Columns of a matrix as linear combinations of some of its columns, in extended precision. Exact zeros and ones stay
+exact.
 
-LAPACK's results differ in the last digit from one processor to the next, and so which numbers are equal. Here every
-operation is elementwise, in NumPy's longest float: generated code is the same on every x86.
+The results of LAPACK differ in the last digit between processors. It would then depend on the processor which numbers
+are equal. Here every operation is elementwise, in NumPy's longest float. Generated code is therefore equal on every x86
+processor.
 """
 
 from __future__ import annotations
@@ -22,10 +24,10 @@ SPARSE = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
-    """Coordinates of all columns in a basis of some of them.
+    """The coordinates of all columns of a matrix in a basis that consists of some of the columns.
 
     basis    r column indices; row i belongs to basis[i]
-    entries  (r, columns) columns = columns[:, basis] @ entries; unit vectors in the basis's own columns
+    entries  (r, columns) columns = columns[:, basis] @ entries; the basis's columns have unit vectors
     """
 
     basis: tuple[int, ...]
@@ -33,9 +35,11 @@ class Tableau:
 
     @staticmethod
     def of(columns: Long, basis: Sequence[int]) -> Tableau:
-        """Build the tableau by Gauss-Jordan elimination with row pivots; the basis's columns must be independent.
+        """Return the coordinates of all columns in the given basis, by Gauss-Jordan elimination with row pivots. The
+        columns of the basis must be independent.
 
-        The other columns are needed in the pivots' rows only: what the basis's ask of those is done to them afterwards.
+        The columns of the basis are eliminated first. Of the other columns, only the rows with pivots are needed, and
+        they are computed afterwards.
         """
         inside = set(basis)
         others = [j for j in range(columns.shape[1]) if j not in inside]
@@ -51,7 +55,8 @@ class Tableau:
         return Tableau(tuple(basis), entries)
 
     def within(self, basis: Sequence[int], wanted: Sequence[int] | slice) -> Long:
-        """(r, wanted) some columns' coordinates in another basis, which must be one."""
+        """Return the coordinates (r, wanted) of the columns `wanted` in another basis, which also consists of columns
+        of the matrix."""
         old, new = set(self.basis), set(basis)
         entering = [j for j in basis if j not in old]
         leaving = [i for i, j in enumerate(self.basis) if j not in new]

@@ -1,9 +1,10 @@
-"""The units inside a trace. Who writes a function does not see them.
+"""The units inside a trace, that is, while a function's operations are recorded. Authors of functions need not know
+these units.
 
-Lowering chooses a unit of length, u metres, so that one length of the robot is exactly one. Energies stay in J, times in s.
-Masses are then in kg/u^2, and a quantity of dimension kg^a m^b s^c is its value in SI times u^(2a - b). The ingredients of a
-trace are in these units. Inputs and outputs of a signature are SI, and this file converts them. If a coordinate of the robot
-is a length, u is 1. Base parameters stay in SI.
+psdmc chooses a unit of length, u metres, so that one length of the robot is exactly one. Energies stay in J, times in
+s. Masses are then in kg/u^2. A quantity of dimension kg^a m^b s^c is its value in SI times u^(2a - b). The robot's data
+in a trace are in these units. The inputs and outputs of a function are in SI, and this file converts them. If a
+coordinate of the robot is a length, u is 1. Base parameters stay in SI.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ STANDARD = (MASS, *(MOMENT,) * 3, *(INERTIA,) * 7)
 
 
 def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequence[Dimension]) -> Axes:
-    """The axes of a robot with these frames."""
+    """Return the physical dimensions of the entries along each kind of array axis (such as nq or nv), for a robot with
+    these frames."""
     joints = [frame.joint for frame in leading(frames)]
     nq, nv = (
         [Dimension(0, order) for joint in joints for order in getattr(joint, orders)]
@@ -53,7 +55,11 @@ def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequ
 
 
 def dimensions_of_traced(signature: Signature, axes: Axes) -> dict[str, list[Dimension]]:
-    """The dimensions of all entries that a trace gives. The right factor of a product has a row per column of the output."""
+    """Return the physical dimensions of all entries that a trace (recorded function) computes, by output.
+
+    If an output is a matrix product, the trace computes its two factors. The right factor has a row per column of the
+    output.
+    """
     found = {quantity.name: quantity.dimensions(axes) for quantity in signature.stored}
     for product in signature.products:
         n = isqrt(len(found[product.output]))
@@ -63,21 +69,24 @@ def dimensions_of_traced(signature: Signature, axes: Axes) -> dict[str, list[Dim
 
 
 def multiple(unit: float, dimension: Dimension) -> float:
-    """What a quantity in SI is multiplied with inside of a trace whose unit of length is `unit` m."""
+    """Return the factor that converts a quantity of this dimension from SI to the units inside a trace, whose unit of
+    length is `unit` m."""
     order = int(dimension.order)
     size = math.prod([unit] * abs(order))
     return size if order >= 0 else 1.0 / size
 
 
 def are_scaled(quantities: Iterable[Quantity]) -> bool:
-    """Whether values of some of these differ inside of a trace, for robots without sliding joints."""
+    """Return whether one of these quantities has another value in the units inside a trace than in SI, for robots
+    without sliding joints."""
     return any(
         quantity.dimension.order or {"6", "contact_rows"} & {*quantity.axes} for quantity in quantities
     )
 
 
 def scaled_parameters(x: Array, unit: float) -> Array:
-    """Standard parameters, 11 per link along the first axis or the last, in a trace's units."""
+    """Return standard parameters in the units inside a trace, whose unit of length is `unit` m. There are 11 per link,
+    along the first axis of x or the last."""
     if unit == 1.0:
         return x
     row = np.array([multiple(unit, each) for each in STANDARD])

@@ -1,4 +1,5 @@
-"""Directions, lengths, rotations and placements with the rounding of exact zeros, ones and decimals removed."""
+"""Removal of rounding errors from directions, lengths, rotations and placements. Numbers that are nearly zero, one or a
+short decimal become exactly so."""
 
 from __future__ import annotations
 
@@ -21,18 +22,19 @@ centimetres would lose digits."""
 
 
 def without_rounding(place: Placement, reach: float) -> Placement:
-    """A placement with the rounding of exact zeros and ones removed."""
+    """Return a placement in which numbers that differ from zero or one only by rounding are exactly zero or one."""
     return Placement(exact_rotation(place.rotation), clean_lengths(place.translation, reach) + 0.0)
 
 
 def clean_direction(direction: Array) -> Array:
-    """The unit vector along a direction, its smallest entries made zero."""
+    """Return the unit vector along a direction. Entries that are only rounding become zero."""
     cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
     return np.asarray(cleaned / length(cleaned))
 
 
 def clean_lengths(lengths: Array, scale: float) -> Array:
-    """Lengths without rounding: zeros made exact, decimal lengths made decimal, so that equal lengths stay equal."""
+    """Return lengths without rounding errors. Lengths that are nearly zero become zero. Lengths that are nearly a short
+    decimal become this decimal, so that equal lengths stay equal."""
     return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
 
 
@@ -42,13 +44,15 @@ def _decimal(lengths: Array, scale: float) -> Array:
 
 
 def exact_rotation(rotation: Array) -> Array:
-    """A rotation with the rounding of exact zeros and ones removed."""
+    """Return a rotation matrix in which entries that differ from zero or one only by rounding are exactly zero or
+    one."""
     near = np.round(rotation)
     return np.asarray(np.where(np.abs(rotation - near) < EXACT, near, rotation) + 0.0)
 
 
 def constant_rotation(rotation: Array) -> Array:
-    """The constant rotation between two frames: about x, except where axes are nearly parallel."""
+    """Return the constant rotation between two frames. It is a rotation about x and is made exactly so, unless the
+    joint axes are nearly parallel."""
     turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
     return rotation if turns_x else _about_x(rotation)
 

@@ -1,7 +1,8 @@
-"""A model's functions beyond E, P and theta_b: those that compiled robots have, by the same names, in NumPy.
+"""The methods of a model for the functions that compiled robots have, such as forward_dynamics, computed in NumPy.
 
-Their arithmetic (psdmc.model_functions) imports the model, so that the model cannot import it: `psdmc` registers it here
-when it is imported. Type checkers read the methods from answers.pyi, which `python -m psdmc.toolchain.stubs` writes.
+The module psdmc.model_functions has the code of these functions. It imports the model, so the model cannot import it.
+The package `psdmc` registers it here instead. Type checkers read the methods from answers.pyi, which `python -m
+psdmc.toolchain.stubs` writes.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from typing import Any, NamedTuple
 
 
 class Provider(NamedTuple):
-    """Where answers come from.
+    """The object from which models get functions such as forward_dynamics.
 
-    names  of all functions
+    names  returns the names of all functions
     bound  (model, name) -> the function of that model
     """
 
@@ -25,7 +26,8 @@ _PROVIDERS: list[Callable[[], Provider]] = []
 
 
 def provide(provider: Callable[[], Provider]) -> None:
-    """Let models answer by what `provider` returns; it is called when a model is first asked."""
+    """Register the provider (a function without arguments that returns a Provider). Models call it when a function such
+    as forward_dynamics is first used."""
     _PROVIDERS[:] = [provider]
 
 

@@ -1,4 +1,4 @@
-"""The arrays of an untrusted .npz file: sizes are checked before memory is allocated, and nothing is unpickled."""
+"""Reader for the arrays of an untrusted .npz file. It checks sizes before it allocates memory, and unpickles nothing."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ _BROKEN = (
 
 
 class BrokenArchiveError(ValueError):
-    """The file begins as an archive and is damaged."""
+    """The file begins like a zip archive, but is damaged."""
 
 
 def opened(data: bytes) -> zipfile.ZipFile:
-    """The archive in a file's bytes; ValueError where it is none, BrokenArchiveError where it is a damaged one."""
+    """Return the archive in the bytes of a file, ready for reading. Raises ValueError if the bytes are no archive, and
+    BrokenArchiveError if the archive is damaged."""
     if not data.startswith(BEGINS):
         raise ValueError("no zip archive")
     try:
@@ -54,10 +55,10 @@ def opened(data: bytes) -> zipfile.ZipFile:
 
 
 def read_arrays(archive: zipfile.ZipFile, names: Iterable[str], size: int) -> dict[str, NDArray[Any]]:
-    """Named arrays of an archive in a file of `size` bytes.
+    """Return the named arrays of an archive in a file of `size` bytes.
 
-    ValueError where one is missing, is larger than a file of that size can hold, or holds objects; BrokenArchiveError
-    where it cannot be unpacked.
+    Raises ValueError if an array is missing, is larger than a file of that size can hold, or contains Python objects.
+    Raises BrokenArchiveError if an array cannot be unpacked.
     """
     members = {info.filename: info for info in archive.infolist()}
     wanted = {name: members.get(f"{name}.npy") for name in names}

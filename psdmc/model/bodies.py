@@ -1,4 +1,5 @@
-"""Standard parameters of a robot from bodies that a user gives: masses, centres of mass, inertias about these."""
+"""Standard parameters of a robot from bodies that a user gives: masses, centres of mass, and inertias about these
+centres."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def parameters(
     inertias: ArrayLike,
     drive_inertias: ArrayLike | None = None,
 ) -> Array:
-    """(11 n,) standard parameters about the link frames; arguments and errors as of DynamicsModel.theta_for."""
+    """Return the robot's standard parameters (11 n,) about the link frames, from masses, centres of mass and inertias
+    of the links. DynamicsModel.theta_for explains the arguments and errors."""
     n, links = len(chain), [joint.link_name for joint in chain.joints]
     kilograms = _numbers("masses", masses, (n,), limits.MASS, links)
     centres = _numbers("coms", coms, (n, 3), limits.LENGTH, links)
@@ -47,8 +49,11 @@ def parameters(
 
 
 def refuse_outside(chain: Mechanism, vectors: Sequence[Array], who: str) -> None:
-    """InputError where the chain's assumptions exclude one of these vectors (11 n,) of standard parameters; `who` begins
-    the message, which names the parameters."""
+    """Raise InputError if the robot's assumptions exclude one of the given vectors of standard parameters, (11 n,)
+    each. The message lists the excluded parameters.
+
+    who  text with which the message begins
+    """
     excluded: set[int] = set()
     for x in vectors:
         missed = outside(chain.parameter_span, x).reshape(len(chain), -1)

@@ -1,4 +1,4 @@
-"""The result of a calibration, as model files hold it and everything that uses a calibrated model reads it."""
+"""The result of a calibration, as model files contain it and as other parts of psdmc read it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ WHOLE = "All"
 
 
 class Remark(str):
-    """A sentence for people. Programs go by its code, which is empty if none depends on it."""
+    """A sentence for people, with a code by which programs recognise it. The code is empty if no program depends on the
+    sentence."""
 
     code: str
 
@@ -44,7 +45,8 @@ class Remark(str):
 
 
 def code_of(text: str) -> str:
-    """The code of a remark; empty for any other sentence."""
+    """Return the code of a sentence that is a Remark (sentence with a code for programs); empty for any other
+    sentence."""
     return getattr(text, "code", "")
 
 
@@ -57,12 +59,14 @@ SHOWN = (IDENTIFIED.code, WEAK.code)
 
 @dataclass(frozen=True, slots=True)
 class ParameterRow:
-    """One base parameter of table 4.
+    """One base parameter in a calibration report: the calibrated value, its standard deviation, and what the data show
+    of it.
 
-    std           infinite where the data do not fix it by itself; value then as near to the prior as they allow
-    identifiable  whether it is "identified": fixed by itself, to less than half of its value
-    visibility    what the data show of it: a Remark
-    file          value by the file that was calibrated; None where it has none
+    value         if the data do not determine the parameter alone, the value nearest to the prior that fits the data
+    std           standard deviation; infinite if the data do not determine the parameter alone
+    identifiable  whether the parameter is "identified": determined alone, with std less than half of its value
+    visibility    what the data show of the parameter: a Remark
+    file          value by the file that was calibrated; None if the file has none
     """
 
     name: str
@@ -82,10 +86,11 @@ class ParameterRow:
 
 @dataclass(frozen=True, slots=True)
 class NumberRow:
-    """A number of one joint (or of the spring of that name) with its standard deviation.
+    """One calibrated number of a joint or of a spring, with its standard deviation.
 
-    parameters  the number of a friction term that its name states: `exponent` of |v|^d, `speed` of exp(-(v / speed)^2)
-    seen        whether the data determine it
+    joint       name of the joint or of the spring
+    parameters  the number in the name of a friction term: `exponent` of |v|^d, `speed` of exp(-(v / speed)^2)
+    seen        whether the data determine the number
     visibility  what the data show of it: a Remark, empty if that is not known
     """
 
@@ -101,7 +106,8 @@ class NumberRow:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """RMSE (target's unit) and R^2 of one joint in one step; R^2 is NaN where the target does not vary."""
+    """The errors of one joint's prediction in one calibration step: RMSE, in the unit of the predicted quantity, and
+    R^2. R^2 is NaN if the measured quantity does not vary."""
 
     rmse: OrNaN
     r2: OrNaN
@@ -109,7 +115,8 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class JointQuality:
-    """Fit and held-out quality of one joint in one step."""
+    """The errors of one joint's prediction in one calibration step: on fitted data, and on held-out data that the fit
+    does not use."""
 
     fit: Quality
     held_out: Quality
@@ -117,7 +124,8 @@ class JointQuality:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """A stretch of measured and predicted torque, for plots: held-out part marked."""
+    """A section of measured and predicted torque of one joint for plots. `held_out` marks the samples that the fit did
+    not use."""
 
     joint: str
     abscissa: str
@@ -129,7 +137,8 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepQuality:
-    """One column of table 3: per joint name, and samples to look at, which files do not hold."""
+    """The errors of the prediction in one calibration step, by joint name. The object also has samples for plots, which
+    files do not store."""
 
     step: str
     joints: dict[str, JointQuality]
@@ -138,8 +147,11 @@ class StepQuality:
 
 @dataclass(frozen=True, slots=True)
 class FrictionRunConstants:
-    """Constants of a joint's friction run that are not friction: inertia in that pose (kg m^2), constant torque (N m),
-    and the time between position and current (s)."""
+    """Results of a joint's friction run (a log for friction only), apart from the friction.
+
+    They are the inertia about the joint in the pose of the log (kg m^2), a constant torque (N m), and the delay between
+    position and current (s).
+    """
 
     inertia: float
     offset: float
@@ -148,7 +160,11 @@ class FrictionRunConstants:
 
 @dataclass(frozen=True, slots=True)
 class StepUsed:
-    """Filter and split of a step: cut-off (Hz), order and settling periods of the low-pass, share and blocks held out."""
+    """The low-pass filter that a calibration step used, and how it divided the data into fitted and held-out parts.
+
+    They are the filter's cut-off (Hz), order and settling time in periods, and the share and number of blocks of data
+    that are held out.
+    """
 
     cutoff: float
     order: int = 8
@@ -159,15 +175,17 @@ class StepUsed:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Numbers of the prediction that are neither theta_b nor a row of friction or motors.
+    """The results of a calibration that a prediction of torques needs, apart from theta_b and the tables of friction
+    and motors. "Linear" means that the friction is a sum of terms.
 
-    law         of friction: "linear" (a sum of terms), or the name of a law with a state
-    steps       by step: "all" of one log, else motor, gravity, friction, inertial
-    sign_speed  rad/s over which friction changes sign, linear law
-    exponents   of the terms of every joint, linear law;  offset  whether each joint has one
-    coupling    of the motors, whose the friction then is, linear law
-    runs        constants of the friction runs by joint, law with a state
-    columns     tables of springs and further friction with users' own laws, linear law (calibration's read_columns)
+    law         "linear", or the name of a friction law with an internal state, such as LuGre
+    steps       filters by calibration step: "all" for one log, else motor, gravity, friction, inertial
+    sign_speed  linear: speed near which the sign of the motion changes smoothly, rad/s
+    exponents   linear: exponents of the viscous friction terms that every joint has
+    offset      linear: whether every joint has a constant torque
+    coupling    linear: matrix between motors and joints, if friction is that of the motors
+    runs        law with a state: constants of the friction runs by joint
+    columns     linear: tables of springs and of further friction with users' own laws (calibration's read_columns)
     """
 
     law: str
@@ -185,27 +203,29 @@ class Prediction:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """Linear friction of every joint; ValueError where an exponent is out of range."""
+        """Return the friction terms that every joint has, if friction is linear (a sum of terms). Raises ValueError if
+        an exponent is out of range."""
         return every_joint_s(self.exponents, self.offset)
 
     @property
     def laws(self) -> dict[str, Law]:
-        """The laws that values may be of: psdmc's, and the user's own that the tables hold; ValueError where these are
-        damaged."""
+        """Return the friction laws that can occur, by name: psdmc's laws, and the laws in a Python file of the user.
+        Raises ValueError if the stored laws are damaged."""
         return LAWS | laws_of(self.columns.get("friction", {}).get("laws", ()))
 
 
 @dataclass(frozen=True, slots=True)
 class JointFigures:
-    """The figures by which one joint is judged; NaN where a figure does not exist.
+    """The figures by which the calibration of one joint is judged; NaN where a figure does not exist.
 
-    r2, rmse            on held-out data, whole torque (N m, N where the joint slides)
-    gain, gain_std      measured torque, without friction, per torque by the file's own theta_b: one where the file is
-                        right
-    visible             whether the file's torque is large enough for its gain to count
+    r2, rmse            of the whole torque on held-out data; rmse in N m, or N for a sliding joint
+    gain                ratio of the measured torque, without friction, to the torque by the theta_b of the robot file:
+                        one if the file is right
+    gain_std            standard deviation of the gain
+    visible             whether the torque by the file is large enough for the gain to count
     friction_power      W, mean power that friction takes: positive on any real joint
-    friction_power_std  its standard deviation
-    noise_ratio         residual over the sensor noise that passes the filter
+    friction_power_std  standard deviation of this power
+    noise_ratio         residual, divided by the sensor noise that passes the filter
     speed               rad/s (m/s), RMS
     """
 
@@ -223,14 +243,14 @@ class JointFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a calibration can be used, with all grounds.
+    """Whether a calibration can be used, with all reasons.
 
-    against    why it is not usable; empty where it is
-    doubted    what a user should know before using it
-    suspected  possible explanations of a bad fit: joints swapped, signs reversed, units
-    joints     figures, in the model's order
-    samples_per_unknown   independent samples per fitted unknown, the smallest of all steps
-    delays     of torques behind the motion, log by log
+    against              why the calibration is not usable; empty if it is usable
+    doubted              what a user should know before using the calibration
+    suspected            possible explanations of a bad fit: joints swapped, signs reversed, units
+    joints               figures of each joint, in the model's order
+    samples_per_unknown  independent samples per fitted unknown, the smallest of all steps
+    delays               of torques relative to the motion, log by log
     """
 
     against: tuple[Ground, ...]
@@ -267,25 +287,29 @@ class Verdict:
 
     @property
     def exit_status(self) -> int:
-        """Exit status of the command line: 0 for both usable verdicts."""
+        """Return the exit status of a psdmc command with this verdict: 0 if the calibration is usable, with or without
+        doubts."""
         return 0 if self.usable else NOT_USABLE_STATUS
 
     @property
     def grounds(self) -> tuple[tuple[str, str], ...]:
-        """Every ground as (kind, sentence), the gravest first."""
+        """Return every reason of the verdict as a pair (kind, sentence): first why the calibration is not usable, then
+        suspicions, then doubts."""
         kinds = (("not usable", self.reasons), ("likely", self.suspects), ("doubt", self.doubts))
         return tuple((kind, text) for kind, texts in kinds for text in texts)
 
     def lines(self) -> list[str]:
-        """The verdict as text: the word first, then its grounds."""
+        """Return the verdict as lines of text: first "usable", "usable, with doubts" or "not usable", then the
+        reasons."""
         return [f"verdict: {self.word}", *(f"  {kind}: {text}" for kind, text in self.grounds)]
 
 
 @dataclass(frozen=True, slots=True)
 class LogUsed:
-    """A log of a calibration: name, rows, length in seconds, date, and how it was used.
+    """A log that a calibration used: its name, number of rows, length in seconds, date, and how the calibration used
+    it.
 
-    use  "fit", "validate": held out as a whole, or "with_load": recorded with the known load
+    use  "fit"; "validate" if the whole log was held out; "with_load" if it was recorded with the known load
     """
 
     log: str
@@ -297,7 +321,13 @@ class LogUsed:
 
 @dataclass(frozen=True, slots=True)
 class LoadUsed:
-    """The known load: kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass."""
+    """The known load with which a log was recorded.
+
+    mass     kg
+    com      (3,) m, centre of mass in the frame
+    inertia  (6,) kg m^2, about the centre of mass
+    frame    name of the frame that carries the load
+    """
 
     mass: float
     com: tuple[float, ...]
@@ -318,18 +348,20 @@ SAME = {
 class Calibrated:
     """The whole result of a calibration.
 
-    parameters  base parameters in the model's order: l of them
+    parameters  l base parameters in the model's order
     motors      torque constants
     friction    values of each joint's friction law or terms
-    steps       table 3's columns, computed from the model file's content
-    warnings    a user should read; Remarks where a rule depends on one
+    steps       errors of the prediction in each calibration step, computed from the content of the model file
+    warnings    sentences that a user should read; Remarks if a rule depends on one
     facts       plain figures for people: ranks, condition numbers, singular values
-    prediction  what else a prediction needs
-    notes       remarks without consequences for its use
-    verdict     whether it can be used; None before it was judged, and of files of psdmc 0.1
-    springs     values of springs, whose names stand in place of a joint's
-    covariance  (l, l) of the base parameters, with the prior's in directions that the data do not show; None: not kept
-    logs, load, versions   what it was computed from and with: logs, known load, versions of programs
+    prediction  further numbers for the prediction of torques
+    notes       remarks without consequences for the use of the calibration
+    verdict     whether the calibration can be used; None before it was judged, and for files of psdmc 0.1
+    springs     values of springs, with the spring's name in place of a joint's
+    covariance  (l, l) of the base parameters; in directions that the data do not show, that of the prior; None: not
+                kept
+    logs, load  the logs of the calibration, and the known load
+    versions    of the programs that made the result
     """
 
     robot: str
@@ -358,18 +390,19 @@ class Calibrated:
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations of the base parameters; infinite where the data do not fix one by itself."""
+        """Return the standard deviations of the base parameters, (l,); infinite for a parameter that the data do not
+        determine alone."""
         return np.array([row.std for row in self.parameters])
 
     @property
     def unsaid(self) -> tuple[str, ...]:
-        """The warnings that no doubt of the verdict repeats."""
+        """Return the warnings that do not say what a doubt of the verdict already says."""
         doubts = () if self.verdict is None else self.verdict.doubted
         said = {ground.code for ground in doubts}
         return tuple(text for text in self.warnings if SAME.get(code_of(text)) not in said)
 
     def kept(self) -> Calibrated:
-        """What a model file holds of it: the same without samples."""
+        """Return the part of the result that a model file contains: everything except samples for plots."""
         values = {each.name: getattr(self, each.name) for each in fields(Calibrated)}
         steps = tuple(StepQuality(step.step, step.joints) for step in self.steps)
         return Calibrated(**values | {"steps": steps})
@@ -381,7 +414,8 @@ def by_joint(rows: Iterable[NumberRow]) -> dict[tuple[str, str], float]:
 
 
 def parameters_of(name: str) -> dict[str, float]:
-    """The number that the name of a friction term states, by what it is: an exponent, a speed."""
+    """Return the number in the name of a friction term, such as 0.5 in 'viscous^0.5', by its meaning: `exponent` or
+    `speed`. Return an empty mapping if the name has no number, or if the number is the usual one."""
     term, _ = named(name, LAWS) or (None, 0)
     if term is None or term.number is None or term.law.number is None or term.number == term.law.number.usual:
         return {}

@@ -1,6 +1,7 @@
-"""What psdmc 0.1 and 0.2 wrote of a calibration, as Calibrated's first schema has it.
+"""Conversion of calibration results that psdmc 0.1 and 0.2 wrote, to the first numbered format of Calibrated.
 
-They kept plain values without a schema: sentences in place of codes, and logs, load and versions among the facts.
+Results of these versions have no format number. They contain sentences in place of codes, and logs, load and versions
+among the facts.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ CODES = {
 
 
 def upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
-    """What psdmc 0.1 or 0.2 wrote, as the first schema has it; ValueError for what is no such thing."""
+    """Convert a result that psdmc 0.1 or 0.2 wrote to the first numbered format. Raises ValueError if it is no such
+    result."""
     facts = dict(json.record(old.get("facts", {}), "the calibration's facts"))
     logs = [
         {"date": "", "use": use, **json.record(row, "a log"), **({"use": use} if use != "fit" else {})}

@@ -1,4 +1,4 @@
-"""Calibrated as plain JSON values: in model files, of this and of older psdmc, and in documents for users."""
+"""The result of a calibration as plain JSON values, for model files of this and older versions, and for users."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ FIGURES = ("r2", "rmse", "gain", "gain_std", "friction_power", "friction_power_s
 
 
 def as_json(found: Calibrated) -> dict[str, Any]:
-    """Plain values for a model file, which `from_json` reads back; numbers that are not finite become null."""
+    """Return a calibration result as plain JSON values for a model file, from which `from_json` reads it. Numbers that
+    are not finite become null."""
     content = {
         "schema": SCHEMA,
         "robot": found.robot,
@@ -80,12 +81,12 @@ def as_json(found: Calibrated) -> dict[str, Any]:
 
 
 def packed(matrix: Array) -> list[float]:
-    """The lower triangle of a symmetric (l, l) matrix, row by row."""
+    """Return the lower triangle of a symmetric (l, l) matrix, row by row."""
     return [float(value) for value in matrix[np.tril_indices(len(matrix))]]
 
 
 def plain(value: Any) -> Any:
-    """JSON's own types: lists for tuples and arrays, null for numbers that JSON lacks."""
+    """Return a value converted to JSON's types: tuples and arrays become lists, and NaN and infinity become null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -132,8 +133,8 @@ def _verdict(found: Verdict) -> dict[str, Any]:
 
 
 def document(found: Calibrated) -> dict[str, Any]:
-    """What `show --json` and a report's JSON say: `as_json` with sentences in place of codes, and with what follows from
-    the rest."""
+    """Return the calibration result as `psdmc show --json` and reports print it: as `as_json` does, but with sentences
+    in place of codes. Values that follow from other values are added."""
     kept = as_json(found)
     kept.pop("schema")
     verdict, grounds = found.verdict, kept.pop("verdict")
@@ -189,7 +190,8 @@ def _log(log: LogUsed) -> dict[str, Any]:
 
 
 def from_json(value: object) -> Calibrated:
-    """The reverse of `as_json`, also for what psdmc 0.1 and 0.2 wrote; ValueError says what is wrong."""
+    """Return the calibration result from JSON values that `as_json` returned, or that psdmc 0.1 or 0.2 wrote. Raises
+    ValueError that says what is wrong."""
     content = json.record(value, "the calibration")
     if "schema" in content:
         json.whole(content["schema"], "the calibration's schema", 1, SCHEMA)

@@ -1,6 +1,6 @@
-"""A Mechanism as plain JSON values and back, every number exactly.
+"""Conversion of a Mechanism (the robot as read from its file) to plain JSON values and back. Every number stays exact.
 
-JSON has no NaN and no infinity: an unknown parameter and an absent limit are null.
+JSON has no NaN and no infinity. Unknown parameters and missing joint limits therefore become null.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ _NO_LIMIT["effort"] = math.inf
 
 
 def chain_to_json(chain: Mechanism) -> dict[str, Any]:
-    """Plain values; a serial chain's are those of every file before there were trees."""
+    """Return the robot as plain JSON values. For a serial chain, these are equal to those of psdmc versions that had no
+    trees."""
     rows, columns = np.nonzero(chain.parameter_span)
     values = chain.parameter_span[rows, columns]
     return (
@@ -69,7 +70,8 @@ def chain_to_json(chain: Mechanism) -> dict[str, Any]:
 
 
 def is_plain_chain(chain: Mechanism) -> bool:
-    """Whether every psdmc that reads model files knows such robots."""
+    """Return whether every version of psdmc can read this robot from a model file. It must be a serial chain of joints
+    with one coordinate each, without mimic joints."""
     is_known = all(kind.about_z for kind in chain.types)
     return is_known and chain.is_serial and chain.coordinates == own_coordinates(len(chain))
 
@@ -140,7 +142,7 @@ def _frame_from_json(data: object, joints: int) -> NamedFrame:
 
 
 def chain_from_json(data: object) -> Mechanism:
-    """The chain; ValueError names the value that is wrong."""
+    """Return the robot (a Mechanism) from plain JSON values. Raises ValueError with the name of the wrong value."""
     listed = entries(part(data, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
     if not listed:
         raise ValueError("the chain has no joints")

@@ -1,4 +1,5 @@
-"""MODEL: inverse dynamics as monomials times constants, and everything known about where it came from."""
+"""A MODEL: the inverse dynamics of a robot as data, monomials times constants, with the robot and the origin of the
+data."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Base parameters as equations in standard parameters: "m2 + mx2/a2 - mx3/a3", with unit and value.
 
-Standard parameters are named by their joint's number from the base, about the link frames: m2, mx2, Ixx3,
-Im1. Where the robot is a DH table its lengths have names too: a coefficient that is a length, its square, a
-product or quotient of two, or one of these upside down, is written so; every other number is printed.
+A standard parameter is named by its kind and the number of the joint, counted from the base: m2, mx2, Ixx3, Im1. It is
+about the link frame. In a DH table, lengths have names, too. These names are used if a coefficient is a length, a
+square, a product or a quotient of lengths, or the reciprocal of one of these. Every other coefficient is printed as a
+number.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ _UNITS = ("kg", "kg m", "kg m^2")
 
 @dataclass(frozen=True, slots=True)
 class BaseParameter:
-    """One base parameter.
+    """One base parameter: its equation, unit and value.
 
-    equation   in standard parameters about the link frames
-    unit       kg, kg m or kg m^2
-    value      SI; None while unknown
-    terms      those of the equation, as data
+    equation  sum of standard parameters about the link frames, as text
+    unit      kg, kg m or kg m^2
+    value     SI; None if unknown
+    terms     the terms of the equation as objects, from which the text is made
     """
 
     equation: str
@@ -62,11 +63,11 @@ class _Known:
 def base_parameters(
     chain: Mechanism, B: Array, pivots: Sequence[int], values: Sequence[float | None]
 ) -> tuple[BaseParameter, ...]:
-    """Equation, unit and value of each entry of theta_b.
+    """Return the equation, unit and value of each entry of theta_b.
 
-    B        (l, 11n)  theta_b = B @ x
-    pivots   l, the standard parameter (index into x) that stands first in each equation
-    values   l, None while unknown
+    B       (l, 11n)  theta_b = B @ x, with the standard parameters x
+    pivots  l indices into x: the standard parameter that is written first in each equation
+    values  l values of base parameters, None if unknown
     """
     known = list(_known_numbers(dh_lengths(chain)))
     return tuple(
@@ -80,13 +81,17 @@ def _base_parameter(terms: tuple[Term, ...], unit: str, value: float | None) -> 
 
 
 def standard_symbol(index: int) -> Symbol:
-    """Symbol of entry `index` of x, by joint number: m2, Ixx3, Im1."""
+    """Return the symbol of a standard parameter, such as m2, Ixx3 or Im1: its kind and the joint's number.
+
+    index  index into the standard parameters x, 11 per link
+    """
     joint, parameter = divmod(index, PARAMETERS_PER_LINK)
     return Symbol(PARAMETER_NAMES[parameter], joint + 1)
 
 
 def dh_lengths(chain: Mechanism) -> dict[Symbol, float]:
-    """a and d (m) of a DH table by symbol, zeros left out; empty for a URDF."""
+    """Return the lengths a and d (m) in the DH table of a robot by symbol, such as a3. Zero lengths are left out. The
+    result is empty for a robot from a URDF."""
     return {
         Symbol(letters, number): value
         for number, joint in enumerate(chain.joints, start=1)

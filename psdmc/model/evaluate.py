@@ -1,4 +1,4 @@
-"""Inverse dynamics in NumPy directly from E, P and theta_b: slow and simple, the reference for everything faster."""
+"""Inverse dynamics in NumPy from E, P and theta_b. This code is slow and simple; psdmc checks faster code with it."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ BLOCK_BYTES = 2**18
 
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
-    """The broadcast leading shape, and each vector as (states, nv) float64, q as (states, nq); InputError where a shape
-    does not fit or values are no real numbers."""
+    """Return the batch shape of the given state vectors q, qd and so on, and each vector as (states, nq) or (states,
+    nv) float64. Raises InputError if a shape does not fit, or if values are no real numbers."""
     names = {"nq": chain.q_names, "nv": chain.v_names}
     axes = {name: ("nq",) if name == "q" else ("nv",) for name in vectors}
     arrays = {name: real_array(name, value, axes=axes[name], names=names) for name, value in vectors.items()}
@@ -68,7 +68,8 @@ class _Monomials:
         self.factors = tuple(_factors(exponents[rows.rates]))
 
     def values(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """(p, states) from (states, n) arrays; each monomial's factors in the order of E's rows."""
+        """Compute the values of all p monomials, (p, states), from q, qd and qdd (states, n). The factors of a monomial
+        are multiplied in the order of E's rows."""
         placed = np.repeat(self.strength[:, None], q.shape[0], axis=1)
         for powers, row in zip(self.parts, np.concatenate([q.T, sine(q).T, cosine(q).T]), strict=True):
             for power in (1, 2):
@@ -111,13 +112,14 @@ def _factors(exponents: NDArray[np.uint8]) -> Iterator[NDArray[np.intp]]:
 
 
 def torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[Array]) -> Array:
-    """tau (states, n), N m or N, of base parameters (l,) along q, qd, qdd (states, n)."""
+    """Compute joint torques tau (states, n), N m or N, from base parameters (l,) and q, qd, qdd (states, n). There are
+    n joints."""
     weights = _weights(expansion, theta)
     return _by_chunks(expansion, chain, arrays, lambda y: (weights @ y).T)
 
 
 def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Array:
-    """Y (states, n, l) with tau = Y theta_b, along q, qd, qdd (states, n)."""
+    """Compute the regressor Y (states, n, l), with the torques tau = Y theta_b, at q, qd, qdd (states, n)."""
     transposed = [matrix.T.tocsr() for matrix in expansion.P]
 
     def rows(y: Array) -> Array:
@@ -127,7 +129,8 @@ def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Ar
 
 
 def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
-    """M (states, n, n) at q (states, n): column j is the value of the monomials with qdd_j for qdd_j = 1."""
+    """Compute the mass matrix M (states, n, n) at q (states, n), for n joints. Column j is the sum of the torques'
+    terms with qdd_j, at qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)
     columns = [np.flatnonzero(row) for row in expansion.E[RowBlocks.of(n).qdd]]
     parts = [weights[:, own] for own in columns]

@@ -1,4 +1,4 @@
-"""The monomials of a model and their coefficients: E and P, which belong together."""
+"""E and P of a model: E holds the exponents of the torques' monomials, P their coefficients per base parameter."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ BLOCKS = 5
 
 
 class RowBlocks(NamedTuple):
-    """The rows of E by what they are exponents of: five blocks of n rows, and two ranges of blocks.
+    """The rows of E, the matrix of exponents: five blocks of n rows, one for each of q, sin q, cos q, qd and qdd.
 
-    position  q, sin q and cos q
-    rates     qd and qdd
+    position  rows of q, sin q and cos q
+    rates     rows of qd and qdd
     """
 
     q: slice
@@ -41,9 +41,10 @@ class RowBlocks(NamedTuple):
 
 
 class Entries(NamedTuple):
-    """The entries of n sparse matrices P: joint by joint, row by row.
+    """The entries of n sparse matrices P[i], (p, l), one per joint torque. Entries are in the order of joints, then of
+    rows.
 
-    joint   (k,) int32    which matrix, 0 to n - 1
+    joint   (k,) int32    number i of the matrix, 0 to n - 1
     row     (k,) int32    monomial, 0 to p - 1
     column  (k,) int32    base parameter, 0 to l - 1
     value   (k,) float64
@@ -57,11 +58,12 @@ class Entries(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expansion:
-    """tau[i] = y @ P[i] @ theta_b: n joints, p monomials y, l base parameters.
+    """E and P, with which the torques of n joints are tau[i] = y @ P[i] @ theta_b. y are the values of the p monomials,
+    and theta_b are l base parameters.
 
-    E        (5n, p) uint8   exponents; row blocks q, sin q, cos q, qd, qdd
-    entries  of P
-    l        columns of each P
+    E        (5n, p) uint8   exponents of q, sin q, cos q, qd, qdd, n rows each
+    entries  nonzero entries of the matrices P[i]
+    l        number of columns of each P[i]
     """
 
     E: NDArray[np.uint8]
@@ -93,7 +95,8 @@ class Expansion:
 
     @staticmethod
     def of(E: NDArray[Any], P: Sequence[sparse.csr_array]) -> Expansion:
-        """From E and n matrices (p, l); ValueError where their shapes differ."""
+        """Return an Expansion from the matrix E and n matrices P (p, l). Raises ValueError if their shapes do not
+        fit."""
         from scipy import sparse
 
         shapes = {matrix.shape for matrix in P}
@@ -120,7 +123,8 @@ class Expansion:
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...]:
-        """n sparse matrices (p, l), one per joint; made when first asked for, as SciPy is slow to import."""
+        """Return the n sparse matrices P (p, l), one per joint. They are made on first access, because SciPy is slow to
+        import."""
         if not self._matrices:
             self._matrices.extend(self._made())
         return tuple(self._matrices)

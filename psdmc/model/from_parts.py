@@ -1,7 +1,8 @@
-"""A model from the arrays and the manifest of a file, checked against each other: the file may be forged.
+"""Construction of a model from the arrays and the manifest (a JSON text) of a file. All values are checked, because the
+file may be forged.
 
-All that the stages rely on is checked: kinds, shapes, ranges, finite numbers, and that the base parameters have pivots
-within the chain's span.
+The checks cover everything that other parts of psdmc assume: types, shapes, ranges and finite numbers. Base parameters
+must also have pivots within the standard parameters that the robot's assumptions allow.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ HIGHEST_POWER = 2
 
 
 def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
-    """The model; ValueError says which part is wrong, what was found and what was expected."""
+    """Return the model from the arrays and the manifest (a JSON text) of a file. Raises ValueError that says which part
+    is wrong, what was found and what was expected."""
     _check_kinds(arrays)
     chain = chain_from_json(json.part(manifest, "chain", "the manifest"))
     n, l = len(chain), arrays["B"].shape[0]

@@ -1,4 +1,4 @@
-"""A model in at most twelve lines, and as HTML for notebooks."""
+"""A summary of a model in at most twelve lines of text, and as HTML for notebooks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FRAMES = {"urdf": "URDF", "standard": "standard DH", "modified": "modified DH"}
 
 
 class Model(ModelParts, Protocol):
-    """The parts of a model that are shown."""
+    """The attributes of a model that the functions `text` and `html` show."""
 
     @property
     def p(self) -> int | None: ...
@@ -32,12 +32,12 @@ class Model(ModelParts, Protocol):
 
 
 def text(model: Model) -> str:
-    """The model in lines: robot, joints, gravity, sizes, certificate, source."""
+    """Return a summary of the model in lines of text: robot, joints, gravity, sizes, certificate, source."""
     return "\n  ".join([_title(model.mechanism), *_facts(model)])
 
 
 def html(model: Model) -> str:
-    """The model as HTML: what `text` says, then tables of joints and base parameters. Names are escaped."""
+    """Return the model as HTML: the summary of `text`, then tables of joints and base parameters. Names are escaped."""
     facts = "".join(f"<li>{escape(fact)}</li>" for fact in _facts(model))
     return (
         f"<div><p><b>{escape(_title(model.mechanism))}</b></p><ul>{facts}</ul>"
@@ -47,7 +47,7 @@ def html(model: Model) -> str:
 
 
 def joints_html(joints: Sequence[Joint]) -> str:
-    """A table of joints with their links, types and limits."""
+    """Return an HTML table of joints with their links, types and limits."""
     heads = ("", "joint", "link", "type", "position", "speed", "effort")
     rows = [[str(i), *_cells(joint)] for i, joint in enumerate(joints)]
     return table_html(heads, rows)
@@ -61,7 +61,7 @@ def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def joints_text(joints: Sequence[Joint]) -> str:
-    """Names and types of the first joints, and how many more there are."""
+    """Return text with the names and types of the first joints, and with the number of further joints."""
     named = [f"{shown(joint.name)} {joint.type.word}" for joint in joints[:MOST_JOINTS]]
     more = len(joints) - len(named)
     return ", ".join(named) + (f" and {more} more" if more else "")

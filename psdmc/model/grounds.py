@@ -1,4 +1,5 @@
-"""Grounds of a verdict: codes with their figures, and the one table that makes sentences of them."""
+"""The reasons of a calibration's verdict: codes with their figures, and the table that translates each code to a
+sentence."""
 
 from __future__ import annotations
 
@@ -17,10 +18,10 @@ OrInf = float
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """One ground of a verdict.
+    """One reason of a calibration's verdict.
 
-    code    of WORDS: what programs go by
-    values  plain figures that the sentence needs; NaN where one does not exist
+    code    a key of the table WORDS, by which programs identify the reason
+    values  figures for the sentence of this code, by name; NaN if a figure does not exist
     """
 
     code: str
@@ -28,12 +29,13 @@ class Ground:
 
     @property
     def words(self) -> str:
-        """The sentence; KeyError, TypeError or ValueError if the values are not those of the code."""
+        """Return the reason as a sentence. Raises KeyError, TypeError or ValueError if the figures are not those of the
+        code."""
         return WORDS[self.code](self.values)
 
 
 def listed(names: Sequence[str]) -> str:
-    """'a', 'a and b', 'a, b and c'."""
+    """Join names to a list in words: 'a', 'a and b', 'a, b and c'."""
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
@@ -50,9 +52,11 @@ def _each(values: Values, form: str, first: int | None = None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """s by which the torque of logs comes after their motion; std infinite where it may be longer still.
+    """The time in seconds by which the measured torque in a log comes after the motion.
 
-    shown  whether the logs show that there is one
+    value  the delay
+    std    standard deviation; infinite if the delay may be still longer than could be tested
+    shown  whether the log shows that there is a delay
     """
 
     log: str
@@ -62,7 +66,7 @@ class Delay:
 
     @property
     def size(self) -> str:
-        """The s without their sign, to two digits of the std."""
+        """Return the delay in seconds without its sign, as text, with two digits of the standard deviation."""
         if not math.isfinite(self.std):
             return f"{abs(self.value):.3g}"
         return f"{abs(self.value):.{self._digits}f}"
@@ -90,7 +94,8 @@ def _late(values: Values) -> str:
 
 
 def at_level(joint: str, level: float, unit: str, share: float) -> str:
-    """A joint whose effort stays at a level, in a share of its moving rows; the unit may be unknown."""
+    """Return words for a joint whose effort (torque or current) stays at one level in a share of the rows in which it
+    moves. The unit may be unknown (empty)."""
     return f"{joint} at {f'{level:.4g} {unit}'.rstrip()} in {share:.0%}"
 
 
@@ -102,7 +107,8 @@ def _at_levels(values: Values) -> str:
 
 
 def cycles(order: Sequence[int]) -> list[list[int]]:
-    """The cycles of a permutation that are longer than one."""
+    """Return the cycles of a permutation that contain more than one element. Element k is replaced by element
+    order[k]."""
     seen: set[int] = set()
     found = []
     for start in range(len(order)):
@@ -118,7 +124,7 @@ def cycles(order: Sequence[int]) -> list[list[int]]:
 
 
 def exchanges(order: Sequence[int]) -> int:
-    """Number of exchanges of pairs that make a permutation."""
+    """Return the smallest number of exchanges of two elements that make up a permutation."""
     return sum(len(cycle) - 1 for cycle in cycles(order))
 
 
@@ -129,8 +135,11 @@ def in_words(
     effort_order: Sequence[int],
     effort_signs: Sequence[int],
 ) -> str:
-    """A sentence for the hypothesis that joint k's position is signs[k] times column order[k] of the log, and its
-    effort likewise."""
+    """Return words for the suspicion that columns of a log are swapped or reversed.
+
+    Joint k's position is then signs[k] times column order[k] of the log, and its effort is effort_signs[k] times column
+    effort_order[k].
+    """
     parts = []
     if order == effort_order:
         parts += _permutation(order, names, "position and effort")

@@ -1,4 +1,4 @@
-"""Units of quantities that joints have by name: some turn, others slide."""
+"""Units of quantities such as torques, for a robot with revolute and sliding joints, whose units differ."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from collections.abc import Iterable
 
 
 def joined_units(pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """By a quantity's name the units of its values, each once and in order: 'Nm, N'."""
+    """Return, for each quantity's name, its units as one text, each unit once: 'Nm, N'.
+
+    pairs  (name, unit) of the quantity at each joint
+    """
     found: dict[str, dict[str, None]] = {}
     for name, unit in pairs:
         found.setdefault(name, {})[unit] = None

@@ -1,6 +1,7 @@
-"""Values of an untrusted JSON text, each checked for kind and size.
+"""Values of an untrusted JSON text, each checked for type and size.
 
-Every function returns its value, or raises ValueError that names it, says what was found and what was expected.
+Every function returns a value of the JSON text. If the value is wrong, it raises a ValueError with the name of the
+value, what was found and what was expected.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 
 def record(value: object, what: str) -> dict[str, Any]:
-    """A JSON object, whose keys are not checked."""
+    """Return a value that must be a JSON object; its keys are not checked. Raises ValueError if the value is no
+    object."""
     if not isinstance(value, dict):
         raise _wrong(value, what, "named values")
     return value

@@ -1,4 +1,5 @@
-"""Equations of a model as LaTeX. All of it is psdmc's own words and numbers: no name of a robot file is in it."""
+"""The equations of a model as LaTeX. They contain only symbols that psdmc chooses and numbers, and no name from a robot
+file."""
 
 from __future__ import annotations
 
@@ -19,9 +20,10 @@ _LETTERS = re.compile(r"(I|m)?([a-z]*)")
 
 
 def equations_latex(parameters: Sequence[BaseParameter]) -> str:
-    """An `aligned` environment (amsmath) with a line for each base parameter: its letter, its equation, its value.
+    """Return an `aligned` environment (amsmath) with a line for each base parameter: its symbol, its equation and its
+    value.
 
-    Entries of theta_b are numbered from 0, as in C and Python; joints from 1.
+    Entries of theta_b are numbered from 0, as in C and Python; joints are numbered from 1.
     """
     lines = [
         rf"\theta_{{{k}}} &= {terms_latex(parameter.terms)} && = {_valued(parameter)}"
@@ -43,7 +45,7 @@ def terms_latex(terms: Sequence[Term]) -> str:
 
 
 def number_latex(text: str) -> str:
-    """A decimal number, its power of ten as such."""
+    """Return a decimal number as LaTeX, with its exponent as a power of ten."""
 
     def power(found: re.Match[str]) -> str:
         sign = found[1].removeprefix("+")
@@ -53,7 +55,7 @@ def number_latex(text: str) -> str:
 
 
 def symbol_latex(symbol: Symbol) -> str:
-    """m3 as m_{3}, mx3 as m_{x,3}, Ixx3 as I_{xx,3}, a3 as a_{3}."""
+    """Return a symbol as LaTeX: m3 as m_{3}, mx3 as m_{x,3}, Ixx3 as I_{xx,3}, a3 as a_{3}."""
     found = _LETTERS.fullmatch(symbol.letters)
     if found is None or not found[1] or not found[2]:
         return rf"{symbol.letters}_{{{symbol.number}}}"

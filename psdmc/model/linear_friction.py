@@ -1,4 +1,5 @@
-"""Friction of a calibrated model, which its calibration found in plain logs."""
+"""The friction of a calibrated model, as a sum of terms. There is none for a measurement campaign with friction laws
+that have an internal state."""
 
 from __future__ import annotations
 
@@ -14,8 +15,9 @@ from psdmc.robot.limits import shown
 
 
 def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
-    """What a calibration found that neither rigid bodies nor `linear_friction` have, in words without names; none where
-    the model was not calibrated."""
+    """Return sentences about what a calibration found in addition to rigid bodies and `linear_friction`: springs, and
+    friction that depends on the load. The sentences contain no names. The result is empty if the model was not
+    calibrated."""
     found = model.calibrated
     if found is None:
         return ()
@@ -28,8 +30,9 @@ def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
 
 
 def linear_friction(model: DynamicsModel) -> Friction:
-    """The friction that the model's calibration found; InputError where it was not calibrated from plain logs, or what its
-    file says of friction is damaged."""
+    """Return the friction that the model's calibration found, as a sum of terms. Raises InputError if the model was not
+    calibrated, or if its friction has an internal state. Raises InputError also for coupled motors, for mimic joints,
+    and for damaged friction data in the file."""
     name = shown(model.mechanism.name)
     found = model.calibrated
     if found is None:

@@ -1,4 +1,4 @@
-"""Read a model file: one that store.py wrote, or any file that is passed for one."""
+"""Reading of model files. The reader expects that a file can be damaged, forged, or no model file."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ ROBOT_FILES = (".urdf", ".toml", ".xml", ".xacro", ".mjcf", ".sdf")
 
 
 def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
-    """The model itself, or the one in the model file of that path. InputError for a robot's file, as for anything else that
-    is no model."""
+    """Return the given model, or read the model file at the given path. Raises InputError if the argument is the path
+    of a robot file, or of any other file without a model."""
     if isinstance(given, DynamicsModel):
         return given
     if not isinstance(given, str | Path):
@@ -72,7 +72,8 @@ def load(path: str | Path) -> DynamicsModel:
 
 
 def load_bytes(data: bytes, source: Path) -> DynamicsModel:
-    """The model in a file's content; InputError, which names the file, as `load`."""
+    """Return the model from the bytes of a model file. Raises InputError with the file's name, in the cases in which
+    `load` does."""
     try:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):

@@ -1,7 +1,8 @@
-"""Whether the mass matrix is positive definite in all poses within the joint limits, which forward dynamics needs.
+"""A test of whether the mass matrix is positive definite in random poses within the joint limits, as forward dynamics
+needs.
 
-A measured or published theta_b need not belong to any distribution of mass. Then some accelerations have negative
-kinetic energy, and a controller that divides by the mass matrix acts in the wrong direction.
+A measured or published theta_b may belong to no possible bodies. Some accelerations then have negative kinetic energy,
+and a controller that divides by the mass matrix acts in the wrong direction.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ matrix's largest eigenvalue, every joint in its own unit."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassCheck:
-    """The mass matrix over `poses` poses within the joint limits.
+    """Result of a test of whether the mass matrix is positive definite in `poses` poses within the joint limits.
 
-    failing   number of poses in which it is not positive definite
-    smallest  smallest eigenvalue of all poses, kg m^2 (kg where only sliding joints take part)
-    pose      (nq,) pose of that eigenvalue, rad or m
-    joint     name of the joint that its eigenvector moves most
+    failing   number of poses in which the mass matrix is not positive definite
+    smallest  smallest eigenvalue of all poses, kg m^2 (kg if only sliding joints take part)
+    pose      (nq,) pose with the smallest eigenvalue, rad or m
+    joint     name of the joint with the largest entry in the eigenvector
     """
 
     poses: int
@@ -55,7 +56,8 @@ class MassCheck:
 
     @property
     def reason(self) -> str:
-        """A sentence about what is wrong, or that nothing is."""
+        """Return a sentence that says in how many poses the mass matrix is positive definite, with its smallest
+        eigenvalue."""
         pose = ", ".join(f"{value:.3g}" for value in self.pose)
         found = f"smallest eigenvalue {self.smallest:.3g} at q = [{pose}], mostly joint {self.joint!r}"
         if self.passed:
@@ -67,7 +69,8 @@ class MassCheck:
 
 
 def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
-    """M(q) in POSES seeded poses within the joint limits; None while the base parameters are unknown."""
+    """Return the result of a test of the mass matrix M(q) in POSES random poses within the joint limits. The poses are
+    equal in each call. The result is None if the base parameters are unknown."""
     if model.theta_b is None:
         return None
     poses, mass, rounding = _drawn(model)
@@ -80,11 +83,13 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
 
 
 def is_surely_positive(model: DynamicsModel) -> bool:
-    """Whether M(q) is positive definite in all poses of `check_mass_matrix`, by Cholesky's factors, which take a fraction of
-    the time of eigenvalues. False if eigenvalues have to decide, or if the base parameters are unknown.
+    """Return True if a fast test shows that M(q) is positive definite in all poses of `check_mass_matrix`. Return False
+    if eigenvalues have to decide, or if the base parameters are unknown.
 
-    A factor of A - s I, where A has a unit diagonal and is n x n, exists only if A's least eigenvalue is above s less the
-    error of the factor, n (n + 1) eps (Higham, Accuracy and Stability of Numerical Algorithms, theorem 10.3).
+    The test uses Cholesky factors, which take a fraction of the time of eigenvalues. Each mass matrix is scaled to an n
+    x n matrix A with ones on the diagonal. A - s I has a Cholesky factor only if A's least eigenvalue is above s, up to
+    the error of the factor, n (n + 1) eps. Source: Higham, Accuracy and Stability of Numerical Algorithms, theorem
+    10.3.
     """
     if model.theta_b is None:
         return False

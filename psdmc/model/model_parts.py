@@ -1,4 +1,5 @@
-"""What every model has, for files that DynamicsModel imports and that cannot import it."""
+"""The attributes that every model has, as an interface for files that cannot import DynamicsModel because DynamicsModel
+imports them."""
 
 from __future__ import annotations
 

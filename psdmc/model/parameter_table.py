@@ -1,4 +1,4 @@
-"""Base parameters as a table: for the terminal, a notebook, pandas."""
+"""Base parameters as a table for the terminal, for a notebook, and for pandas."""
 
 from __future__ import annotations
 
@@ -23,17 +23,19 @@ BETWEEN_TERMS = re.compile(r" (?=[-+] )")
 
 
 class BaseParameters(tuple[BaseParameter, ...]):
-    """The entries of theta_b in order: a tuple that shows itself as a table."""
+    """A tuple with the equation, unit and value of each entry of theta_b. Printed, it is a table."""
 
     __slots__ = ()
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Each one's number from 0 and equation, such as 'theta_b[7] Izz2 + a2 mx2': at most LABEL characters of it."""
+        """Return a label for each base parameter, such as 'theta_b[7] Izz2 + a2 mx2', with its index and equation.
+        Labels are cut to LABEL characters."""
         return tuple(f"theta_b[{k}] {_first_terms(parameter.equation)}" for k, parameter in enumerate(self))
 
     def plain(self) -> list[dict[str, Any]]:
-        """For JSON: number from 0, label, whole equation, unit and value (None while unknown) of each."""
+        """Return a list with one JSON object per base parameter: number from 0, label, whole equation, unit and value
+        (None if unknown)."""
         named = enumerate(zip(self.labels, self, strict=True))
         return [
             {"index": k, "name": name, "equation": each.equation, "unit": each.unit, "value": each.value}
@@ -41,9 +43,10 @@ class BaseParameters(tuple[BaseParameter, ...]):
         ]
 
     def to_frame(self) -> pd.DataFrame:
-        """A pandas data frame: index theta_b (0 to l - 1), columns equation, value (NaN while unknown), unit.
+        """Return a pandas data frame with one row per base parameter: equation, value (NaN if unknown) and unit. The
+        index, theta_b, runs from 0 to l - 1.
 
-        ToolchainError where pandas is not installed.
+        Raises ToolchainError if pandas is not installed.
         """
         try:
             import pandas as pd
@@ -57,7 +60,7 @@ class BaseParameters(tuple[BaseParameter, ...]):
         return pd.DataFrame(columns, index=pd.RangeIndex(len(self), name="theta_b"))
 
     def to_latex(self) -> str:
-        """All equations with values and units, as an `aligned` environment of amsmath."""
+        """Return all equations with values and units, as an `aligned` environment of amsmath."""
         return equations_latex(self)
 
     def __repr__(self) -> str:

@@ -1,4 +1,5 @@
-"""A rigid load on a frame, as standard parameters of its link. theta_b = B x follows; E, P and B stay."""
+"""A rigid load on a frame, added to the standard parameters x of the link that carries the frame. theta_b = B x
+changes; E, P and B do not."""
 
 from __future__ import annotations
 
@@ -24,11 +25,12 @@ ROTATION_SLACK = 1e-6
 
 
 def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
-    """The chain with the load on one of its links; InputError where the chain's assumptions do not admit it.
+    """Return the robot with a rigid load on one of its links. Raises InputError if the load has parameters that the
+    robot's assumptions set to zero.
 
-    load  (10,) standard parameters of `load_parameters`
-    mass  kg, for the note
-    body  number of the joint that the link moves with
+    load  (10,) standard parameters of the load about the link's frame, from `load_parameters`
+    mass  mass of the load, kg, for the note in the model
+    body  number of the joint that moves the link
     """
     _check_admitted(chain, load, body)
     parameters = chain.parameters.copy()
@@ -38,7 +40,8 @@ def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
 
 
 def body_parameters(body: int) -> NDArray[np.int64]:
-    """(10,) indices in x of the body parameters of the link that moves with a joint."""
+    """Return the (10,) indices, in the standard parameters x, of the mass, first moments and inertias of the link that
+    joint `body` moves."""
     return PARAMETERS_PER_LINK * body + np.arange(BODY_PARAMETERS)
 
 
@@ -49,8 +52,8 @@ def load_parameters(
     inertia: ArrayLike | None = None,
     frame: Placement | str | None = None,
 ) -> Array:
-    """(10,) the load's standard parameters about the frame of the link that carries it; arguments as in
-    DynamicsModel.with_payload."""
+    """Return the (10,) standard parameters of a load, about the frame of the link that carries the load.
+    DynamicsModel.with_payload explains the arguments."""
     centre, about_com = _checked(mass, com, inertia)
     kilograms = float(mass)
     about_frame = about_com + kilograms * (times(centre, centre) * np.eye(3) - np.outer(centre, centre))
@@ -60,9 +63,10 @@ def load_parameters(
 
 
 def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
-    """(l, 10): theta_b that a load at a frame adds, from its mass, first moment and inertia about that frame's origin.
+    """Return the (l, 10) matrix that computes the change of theta_b by a load at a frame. The load is given by its
+    mass, first moment and inertia about the frame's origin.
 
-    InputError where the chain's assumptions do not admit every load there.
+    Raises InputError if a load there can have parameters that the robot's assumptions set to zero.
     """
     place = chain.joints[frame.joint].link_frame.inverse() @ frame.placement
     moving = moving_map(place.rotation, place.translation)
@@ -72,7 +76,8 @@ def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
 
 
 def carrying_frame(chain: Mechanism, frame: Placement | str | None) -> NamedFrame:
-    """The frame in which a load's numbers are given, in the joint frame of the link that carries it."""
+    """Return the frame about which a load's numbers are given, placed in the joint frame of the link that carries the
+    load. The numbers are the centre of mass and the inertia."""
     tip = chain.tip_frame
     if isinstance(frame, Placement):
         return replace(tip, placement=tip.placement @ _checked_frame(frame))
@@ -132,7 +137,7 @@ def _numbers(values: ArrayLike, shape: tuple[int, ...], what: str, accepted: lim
 
 
 def array_of(values: ArrayLike) -> Array | None:
-    """The values as float64, None where they are none."""
+    """Return the values as float64; None if they are no numbers."""
     try:
         found = np.asarray(values)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Random physical parameters for a robot whose own are unknown."""
+"""Random masses and inertias, which could exist physically, for a robot whose real parameters are unknown."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ SEED = 14_630
 
 
 def random_parameters(chain: Mechanism) -> Array:
-    """(11 n,) standard parameters of physical bodies, as far as the chain's assumptions admit them."""
+    """Return (11 n,) random standard parameters of links that can exist physically, as far as the robot's assumptions
+    allow. Parameters that are assumed zero are zero."""
     rng = np.random.default_rng(SEED)
     x = np.zeros((len(chain), PARAMETERS_PER_LINK))
     for link in x:

@@ -16,13 +16,13 @@ RANGES = (np.pi, 3.0, 5.0)
 
 
 def random_states(rng: np.random.Generator, *shape: int) -> tuple[Array, Array, Array]:
-    """q, qd and qdd, arrays of this shape each."""
+    """Return three random arrays of the given shape: joint positions q, rates qd and accelerations qdd."""
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, shape) for limit in RANGES)
     return q, qd, qdd
 
 
 def states_of(robot: Mechanism, rng: np.random.Generator, count: int) -> tuple[Array, Array, Array]:
-    """q (count, nq), qd and qdd (count, nv) of a robot, quaternions of length one."""
+    """Return random q (count, nq), qd and qdd (count, nv) of a robot; quaternions have length one."""
     sizes = (robot.nq, robot.nv, robot.nv)
     q, qd, qdd = (
         limit * rng.uniform(-1.0, 1.0, (count, size)) for limit, size in zip(RANGES, sizes, strict=True)
@@ -31,5 +31,6 @@ def states_of(robot: Mechanism, rng: np.random.Generator, count: int) -> tuple[A
 
 
 def on_joints(robot: Mechanism, q: Array) -> Array:
-    """(k, nq) the nearest positions that the joints can have: quaternions of length one and so on."""
+    """Return, for each of k vectors q, the nearest positions that the joints can have, (k, nq). For example,
+    quaternions get length one."""
     return normalized(frames_of(robot), q.T).T

@@ -1,4 +1,5 @@
-"""The model's torques, mass matrix and regressor by the recursions of psdmc.dynamics: fast for any p, without E and P."""
+"""The model's torques, mass matrix and regressor, computed by the recursive algorithms of psdmc.dynamics without E and
+P. The time does not depend on the number of monomials of the torques."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ Array = NDArray[np.float64]
 
 
 def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:
-    """tau (states, n), N m or N, of standard parameters (11n,) along q, qd, qdd (states, n)."""
+    """Compute joint torques tau (states, n), N m or N, from the links' standard parameters (11n,) and q, qd, qdd
+    (states, n)."""
     q, qd, qdd = (list(array.T) for array in arrays)
     bodies, drives = bodies_of(chain, x), drive_inertia_of(x)
     found = newton_euler(frames_of(chain), bodies, drives, q, qd, qdd, base_acceleration(chain))
@@ -27,15 +29,16 @@ def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:
 
 
 def mass_matrix(chain: Mechanism, x: Array, q: Array) -> Array:
-    """M(q) (states, n, n) from (states, n) by composite bodies of standard parameters (11n,)."""
+    """Compute the mass matrix M(q), (states, n, n), from q (states, n) and the links' standard parameters (11n,), by
+    the composite-rigid-body algorithm."""
     rows = composite_bodies(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
     return np.stack([_columns(row, len(q)) for row in rows], axis=1)
 
 
 def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> Array:
-    """Y (states, n, l) along q, qd, qdd (states, n).
+    """Compute the regressor Y (states, n, l), with the torques tau = Y theta_b, at q, qd, qdd (states, n).
 
-    representative  (11n, l)  base parameters to standard ones
+    representative  (11n, l)  matrix from base parameters to standard parameters
     """
     wanted = np.flatnonzero(representative.any(axis=1)).tolist()
     q, qd, qdd = (list(array.T) for array in arrays)

@@ -1,4 +1,5 @@
-"""Whether the parameters of every single link are known, which torques alone do not determine."""
+"""A test of whether mass, centre of mass and inertia of each single link are known. Torques determine only combinations
+of them, the base parameters."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ BELONGS = 1e-9
 
 
 def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
-    """The reason why mass, centre and inertia of every link cannot be taken from the model's chain; None where they
-    can."""
+    """Return a sentence that says why the model does not have mass, centre of mass and inertia of every link. Return
+    None if the model has them."""
     parameters = model.mechanism.parameters
     if np.isnan(parameters).any():
         return "it needs mass and inertia of every link, and some are unknown"

@@ -1,9 +1,12 @@
-"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, the same bytes for the same model. Members are not
-compressed, because compressed bytes differ between versions of zlib.
+"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, with equal bytes for equal models. Arrays are
+not compressed, because compressed bytes differ between versions of zlib.
 
-Arrays: E (5n, p); theta_b (l,), all NaN while unknown; P as P_joint, P_row, P_col, P_value, one entry each,
-joint by joint and row by row; B (l, 11n); manifest, JSON text: format, schema, what the arrays hold, chain,
-certificate, provenance, calibration where there is one (calibrated_json), psdmc version, and the SHA-256 of all of that.
+Arrays: E (5n, p); theta_b (l,), all NaN if unknown; P as P_joint, P_row, P_col, P_value, with one entry of P each,
+joint by joint and row by row; B (l, 11n).
+
+The manifest is a JSON text. It contains format, schema, what the arrays hold, robot, certificate, provenance and psdmc
+version. If the model is calibrated, it also contains the calibration (calibrated_json). At the end is the SHA-256 of
+the arrays and of the rest of the manifest.
 """
 
 from __future__ import annotations
@@ -43,7 +46,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class Model(ModelParts, Protocol):
-    """The parts of a model that a file holds."""
+    """The attributes of a model that a model file contains."""
 
     @property
     def expansion(self) -> Expansion | None: ...
@@ -84,7 +87,7 @@ def file_bytes(model: Model) -> bytes:
 
 
 def content_hash(model: Model) -> str:
-    """SHA-256 of everything that a model file holds, as hexadecimal digits."""
+    """Return the SHA-256 of everything that a model file contains, as hexadecimal digits."""
     return hash_of(_arrays(model), _manifest(model))
 
 
@@ -124,7 +127,8 @@ def _manifest(model: Model) -> dict[str, Any]:
 
 
 def hash_of(arrays: Arrays, manifest: Mapping[str, Any]) -> str:
-    """SHA-256 of a file's arrays and manifest, its own content_hash left out."""
+    """Return the SHA-256 of a model file's arrays and manifest (a JSON text), without the entry content_hash of the
+    manifest."""
     digest = hashlib.sha256()
     plain = {key: value for key, value in manifest.items() if key != "content_hash"}
     digest.update(json.dumps(plain, sort_keys=True, allow_nan=False).encode())

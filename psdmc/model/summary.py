@@ -26,12 +26,12 @@ class Sizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """A model at a glance.
+    """The facts about a model that `psdmc show` prints.
 
-    ends         the tip's name, or how many ends a tree has
-    sizes        monomials by kind of acceleration; None where the model was not expanded
-    entries      non-zero entries of P; None likewise
-    certificate  largest torque error relative to the rate's largest torque, per rate of the joints
+    ends         name of the tip of a serial chain; for a tree, how many end links it has, and the tip
+    sizes        number of monomials by kind; None if the model was derived without E and P
+    entries      non-zero entries of P; None if the model was derived without E and P
+    certificate  for each joint rate, the largest torque error divided by the largest torque
     """
 
     name: str
@@ -81,7 +81,7 @@ def summary(model: DynamicsModel) -> Summary:
 
 
 def sizes_of(E: NDArray[np.uint8]) -> Sizes:
-    """Count the monomials of E (5n, p) by kind of acceleration."""
+    """Return the number of monomials in E (5n, p) by kind: gravity, acceleration, centrifugal and Coriolis."""
     rows = RowBlocks.of(E.shape[0] // BLOCKS)
     speeds, accelerations = E[rows.qd], E[rows.qdd]
     accelerating, moving = accelerations.any(axis=0), speeds.any(axis=0)
@@ -95,7 +95,10 @@ def sizes_of(E: NDArray[np.uint8]) -> Sizes:
 
 
 def term_texts(model: DynamicsModel) -> Iterator[str]:
-    """Every monomial y as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'."""
+    """Return every monomial of the torques as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'.
+
+    s2 is sin q2 and c2 is cos q2; g is the strength of gravity.
+    """
     exponents = model.expanded().E
     n, rows = model.n, RowBlocks.of(model.n)
     names = [f"{symbol}{j + 1}" for symbol in ("q", "s", "c", "qd", "qdd") for j in range(n)]

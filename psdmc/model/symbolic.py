@@ -25,14 +25,16 @@ MOST_MONOMIALS = 2000
 def torque_expression(
     robot: Mechanism, expansion: Expansion, joint: int | str, theta_b: Array | None
 ) -> sympy.Expr:
-    """tau of one joint (its number, 0 being the first, or its name) as a SymPy expression: the sum of its monomials times
-    combinations of theta_b.
+    """Return the torque of one joint as a SymPy expression: the sum of monomials times combinations of theta_b.
 
-    Symbols, real: q1, qd1, qdd1 and so on, joints numbered from 1 as in the base parameters' equations; theta_b0 and so on,
-    as the entries of theta_b. With theta_b (l,) numbers stand for the latter.
+    joint    number from 0, or name
+    theta_b  (l,) numbers that replace the symbols theta_b0, theta_b1 and so on; None: the symbols stay
 
-    InputError where there is no such joint or the torque has more than MOST_MONOMIALS monomials, ToolchainError where
-    SymPy is not installed.
+    The symbols q1, qd1, qdd1 and so on are real. In them, joints are numbered from 1, as in the equations of base
+    parameters. Symbols theta_b0 and so on are numbered as the entries of theta_b.
+
+    Raises InputError if there is no such joint, or if the torque has more than MOST_MONOMIALS monomials. Raises
+    ToolchainError if SymPy is not installed.
     """
     sp, number = _sympy(), _joint_number(robot, joint)
     entries = expansion.entries

@@ -1,4 +1,5 @@
-"""Terms of base parameters' equations as data: `2 d4 my4`, `mx1/a1`. Text and LaTeX are made of them."""
+"""Terms of the base parameters' equations as objects, such as `2 d4 my4` or `mx1/a1`, from which text and LaTeX are
+made."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from typing import NamedTuple
 
 
 class Symbol(NamedTuple):
-    """A quantity of one joint: `letters` followed by the joint's number, 1 being the first."""
+    """A quantity of one joint in an equation, such as mx2: letters, and the joint's number from 1."""
 
     letters: str
     number: int
@@ -29,13 +30,13 @@ class Power(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """One term of an equation: number * times * of / over, to be added or subtracted.
+    """One term of an equation of a base parameter: number * times * of / over, to be added or subtracted.
 
-    of         the standard parameter
-    is_minus   whether it is subtracted
-    number     decimal digits; None: one
-    times      lengths that it is multiplied by
-    over       lengths that it is divided by
+    of        the standard parameter
+    is_minus  whether the term is subtracted
+    number    decimal digits; None: one
+    times     lengths in the numerator
+    over      lengths in the denominator
     """
 
     of: Symbol
@@ -54,6 +55,6 @@ class Term:
 
 
 def equation(terms: Sequence[Term]) -> str:
-    """The terms as one line of text, the first of them without sign."""
+    """Return the sum of the terms as one line of text, without a plus before the first term."""
     first, *others = terms
     return str(first) + "".join(f" {'-' if term.is_minus else '+'} {term}" for term in others)

@@ -1,4 +1,5 @@
-"""Angles of a PROGRAM: which sines and cosines can be taken together, and what must be known before."""
+"""The angles (arguments of sines and cosines) of a PROGRAM, a list of scalar operations. They are grouped by which can
+be computed together, and what must be computed before."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ TRIGONOMETRIC = frozenset((Op.SIN, Op.COS))
 
 
 def angle_groups(program: Program) -> list[list[int]]:
-    """Angles by the number of nested sines they depend on: each group depends on earlier groups only."""
+    """Return the angles (arguments of sines and cosines) in groups. The angles of a group can be computed together,
+    because they depend on sines and cosines of earlier groups only."""
     first = next((i for i, (op, _, _, _) in enumerate(program.body) if op in TRIGONOMETRIC), None)
     if first is None:  # as in most parts of a long PROGRAM
         return []
@@ -24,7 +26,7 @@ def angle_groups(program: Program) -> list[list[int]]:
 
 
 def cone(program: Program, roots: list[int]) -> list[int]:
-    """All values that the roots depend on, the roots included, in the PROGRAM's order."""
+    """Return the given values `roots` and all values on which they depend, in the PROGRAM's order."""
     needed = [False] * len(program)
     for root in roots:
         needed[root] = True
@@ -36,8 +38,12 @@ def cone(program: Program, roots: list[int]) -> list[int]:
 
 
 def angles_first(program: Program) -> list[list[int]]:
-    """All values, each after its arguments and once, a list per group of angles and one for the rest: what a group's angles
-    are computed from, then their sines and cosines."""
+    """Return all values of the PROGRAM once, each after its arguments. There is one list per group of angles (see
+    `angle_groups`), and one for the rest.
+
+    The list of a group contains the values from which the angles are computed, then the sines and cosines of the
+    angles.
+    """
     taken: dict[int, list[int]] = {}
     for i, (op, args, _, _) in enumerate(program.body):
         if op in TRIGONOMETRIC:

@@ -1,4 +1,5 @@
-"""The rules that every PROGRAM obeys; the pipeline checks them between passes."""
+"""The rules that every PROGRAM (list of operations) obeys. They are checked after each pass, that is, after each change
+of a whole PROGRAM."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ _WITH_TWO = frozenset(op for op in Op if op.arity == 2)
 
 
 def check(program: Program, after: str = "tracing") -> Program:
-    """The same program; InternalError where a rule is broken, naming the pass that broke it."""
+    """Return the given PROGRAM (list of operations) unchanged. Raises InternalError if the PROGRAM breaks a rule; the
+    message names `after`, the step that changed it last."""
     for i, instr in enumerate(program.body):
         op, args, slot, value = instr
         if len(args) == 2 and op in _WITH_TWO and slot is None and value is None:

@@ -1,4 +1,4 @@
-"""What a PROGRAM costs, counted on its instructions."""
+"""The cost of a PROGRAM (list of operations): its operations, counted by kind."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ _ADD, _SUB, _MUL, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.SIN, Op.COS
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Operation counts. `add` includes subtractions; negations are free in most places and are counted apart.
+    """Numbers of operations by kind. `add` includes subtractions. Negations are counted separately, because most cost
+    nothing.
 
     div     divisions and square roots: both keep one unit of the processor busy for about as long
-    fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction, each of which
-            absorbs one
-    sincos  distinct angles whose sine or cosine is taken
+    fused   multiplications that the processor can do together with an addition or subtraction (fused multiply-add):
+            those whose result only one addition or subtraction uses. Each addition or subtraction counts at most once
+    sincos  distinct angles whose sine or cosine is computed
     choice  minima, maxima, magnitudes and selections
     call    elementary functions of the C library
     """
@@ -35,7 +36,7 @@ class Cost:
 
     @property
     def total(self) -> int:
-        """mul + add, the figure that the literature compares."""
+        """Return mul + add, the number of multiplications and additions, which papers compare."""
         return self.mul + self.add
 
     def __str__(self) -> str:
@@ -46,7 +47,8 @@ class Cost:
 
 
 def cost(program: Program) -> Cost:
-    """Operations of the PROGRAM by kind; `fused` counts the sums of which a term is a product without another use."""
+    """Count the operations of the PROGRAM (list of operations) by kind. `fused` counts the additions and subtractions
+    of which one argument is a product that no other operation uses."""
     body, uses = program.body, program.uses()
     mul = add = fused = 0
     others: list[Op] = []
@@ -66,7 +68,8 @@ def cost(program: Program) -> Cost:
 
 
 def counted(others: Iterable[Op], mul: int, add: int, sincos: int, fused: int) -> Cost:
-    """The cost of so many products, sums and angles, and of other operations by their units."""
+    """Return the Cost with the given numbers of products (`mul`), sums (`add`), angles (`sincos`) and fused operations.
+    `others` lists all further operations."""
     units = Counter(op.unit for op in others)
     rest = (units[Unit.DIV], units[Unit.NEG], sincos, fused, units[Unit.CHOICE], units[Unit.CALL])
     return Cost(mul, add, *rest)

@@ -1,7 +1,8 @@
-"""Derivatives of a PROGRAM as PROGRAMs: forward mode (tangents), reverse mode (adjoints), and Jacobians by either.
+"""Derivatives of a PROGRAM (list of operations) as new PROGRAMs: forward mode (tangents), reverse mode (adjoints), and
+Jacobians by either mode.
 
-They work for every PROGRAM, and are the reference for functions whose derivatives have a recursion of their own. Every
-result keeps the outputs of the PROGRAM that it differentiates.
+The methods work for every PROGRAM. Some functions have derivatives by a recursion of their own; tests compare these
+with the results here. A new PROGRAM also has the outputs of the given PROGRAM.
 """
 
 from __future__ import annotations
@@ -20,7 +21,12 @@ Mode = Literal["forward", "reverse"]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One matrix of derivatives: entry [i, j] = d of[i] / d by[j], stored row-major as vector `name`."""
+    """A matrix of derivatives: entry [i, j] is the derivative of output entry of[i] by input entry by[j].
+
+    name  name of the output vector that contains the matrix, row by row
+    of    name of an output vector, with `rows` entries
+    by    name of an input vector, with `columns` entries
+    """
 
     name: str
     of: str
@@ -30,10 +36,11 @@ class Block:
 
 
 def jvp(program: Program, tangents: Mapping[str, str], derivatives: Mapping[str, str]) -> Program:
-    """The outputs and their derivatives along given tangents of the inputs (forward mode).
+    """Return a PROGRAM with the outputs of the given PROGRAM and their derivatives along given directions of the inputs
+    (forward mode).
 
-    tangents     input vector -> name of a new input of the same length; inputs that are not named are held fixed
-    derivatives  output vector -> name of the new output that is its derivative along the tangents
+    tangents     input vector -> name of a new input of equal length, the direction; all other inputs are constant
+    derivatives  output vector -> name of the new output that is the derivative along the directions
     """
     replay = _Replay(program)
     moving = [slot for slot in program.inputs() if slot.vector in tangents]
@@ -54,11 +61,13 @@ def vjp(
     gradients_of: Mapping[str, str],
     sizes: Mapping[str, int],
 ) -> Program:
-    """The outputs and the gradient of (sum of cotangent . output) by inputs (reverse mode).
+    """Return a PROGRAM with the outputs of the given PROGRAM, and the gradients of the sum of cotangent . output by
+    inputs (reverse mode).
 
-    cotangents    output vector -> name of a new input of the same length; outputs that are not named do not count
-    gradients_of  input vector -> name of the new output that is the gradient by it
-    sizes         length of each of these input vectors; entries that the PROGRAM does not read get zero
+    cotangents    output vector -> name of a new input of equal length, the weights; other outputs have no part in the
+                  sum
+    gradients_of  input vector -> name of the new output that is the gradient by this input
+    sizes         length of each of these input vectors; the gradient by entries that the PROGRAM does not read is zero
     """
     replay = _Replay(program)
     of = [(slot, value) for slot, value in replay.outputs if slot.vector in cotangents]
@@ -75,10 +84,11 @@ def vjp(
 
 
 def jacobians(program: Program, blocks: Sequence[Block], mode: Mode) -> Program:
-    """The outputs and whole matrices of their derivatives, column by column (forward) or row by row (reverse).
+    """Return a PROGRAM with the outputs of the given PROGRAM and Jacobian matrices, computed column by column (forward
+    mode) or row by row (reverse mode).
 
-    Both modes give the same numbers up to rounding and differ in what they cost: forward mode a sweep per input,
-    reverse mode a sweep per output.
+    Both modes give equal numbers up to rounding, but cost differently. Forward mode repeats the derivatives of all
+    operations for each column, reverse mode for each row.
     """
     replay = _Replay(program)
     columns = _columns if mode == "forward" else _rows

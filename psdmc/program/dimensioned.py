@@ -1,4 +1,5 @@
-"""A tracer that knows the dimension of every value, and stops at the first operation whose arguments do not go together."""
+"""A tracer (recorder of operations on symbols) whose values have physical dimensions. It raises an error at the first
+operation with unlike arguments, such as the sum of a mass and a length."""
 
 from __future__ import annotations
 
@@ -14,11 +15,13 @@ _append = list.append
 
 
 class UnlikeArguments(Exception):
-    """The operation, and the units of its arguments."""
+    """This error says that an operation has arguments of unlike dimensions. The message has the operation and the units
+    of the arguments."""
 
 
 class DimensionedTracer(Tracer):
-    """Symbols do their arithmetic in place and append what they record to `steps`, where each step is looked at."""
+    """A tracer (recorder of operations on symbols) that checks the physical dimensions of each operation. Symbols
+    append each operation to the list `steps`, and this list makes the check."""
 
     __slots__ = ("_own",)
 

@@ -1,7 +1,7 @@
-"""Dimensions of quantities, and what operations make of them.
+"""Dimensions of physical quantities, and the dimensions that operations give to their results.
 
-A dimension is the exponents of mass, length and time; angles are numbers. None is the dimension of zero, which may stand for
-zero of any unit.
+A dimension consists of the exponents of mass, length and time. Angles have the dimension of pure numbers. None is the
+dimension of zero, because zero can have any unit.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from psdmc.errors import InternalError
 
 
 class Dimension(NamedTuple):
-    """Exponents of kg, m and s. Square roots make halves."""
+    """The exponents of kg, m and s in a unit. The square root of a quantity can have exponents such as 1/2."""
 
     mass: float = 0
     length: float = 0
@@ -33,7 +33,8 @@ class Dimension(NamedTuple):
 
     @property
     def order(self) -> float:
-        """Exponent k of a scaled trace: with lengths in a unit of u m, and energies in J, what is x in SI is x u^k."""
+        """Return the exponent k with which a quantity is converted to the units inside a trace (a recorded function).
+        If the unit of length there is u metres and that of energy is J, x in SI becomes x u^k."""
         return 2 * self.mass - self.length
 
 
@@ -57,7 +58,8 @@ _WORDS = {
 
 @cache
 def dimension_of(unit: str) -> Dimension:
-    """The dimension of a unit such as 'kg m^2/s' or '1/(J s^2)': all that stands behind the stroke divides."""
+    """Return the dimension of a unit such as 'kg m^2/s' or '1/(J s^2)'. All units after the slash are in the
+    denominator."""
     total = NUMBER
     for sign, part in zip((1, -1), unit.split("/"), strict=False):
         for factor in part.strip("() ").split():
@@ -82,14 +84,16 @@ def in_words(dimension: Known) -> str:
 
 
 class Unlike(Exception):
-    """Dimensions that an operation cannot have together. As text: their units."""
+    """This error says that an operation does not admit arguments of these dimensions together. The message contains
+    their units."""
 
     def __init__(self, *given: Known) -> None:
         super().__init__(" and ".join(map(in_words, given)))
 
 
 def alike(*given: Known) -> Known:
-    """That of sums, differences, least and largest values."""
+    """Return the common dimension of values that are added, subtracted or compared. Raises Unlike if their dimensions
+    differ."""
     found = given[0]
     for each in given[1:]:
         if found is None:
@@ -112,13 +116,15 @@ def root(a: Known) -> Known:
 
 
 def chosen(a: Known, b: Known, x: Known, y: Known) -> Known:
-    """That of x or y, by a comparison of a and b."""
+    """Return the dimension of the result if a comparison of a and b selects x or y. Raises Unlike if a and b, or x and
+    y, have different dimensions."""
     alike(a, b)
     return alike(x, y)
 
 
 def number(*given: Known) -> Known:
-    """That of functions of numbers, such as exp."""
+    """Return the dimension of the result of functions such as exp, which is that of a pure number. Raises Unlike if an
+    argument has another dimension."""
     if any(each is not None and each != NUMBER for each in given):
         raise Unlike(*given)
     return NUMBER
@@ -131,7 +137,8 @@ def angle(y: Known, x: Known) -> Known:
 
 
 def raised(base: Known, exponent: Known, value: float | None = None) -> Known:
-    """That of a power; of a base that is no number the exponent's value is known."""
+    """Return the dimension of a power. If the base has a unit, the value of the exponent must be known. Raises Unlike
+    if it is not, or if the exponent has a unit."""
     if value is None or base is None:
         return number(base, exponent)
     number(exponent)

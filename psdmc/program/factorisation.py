@@ -1,8 +1,8 @@
-"""The symmetric matrices that functions factorise: how their entries lie, what a pivot that is not positive means, and what
-the caller learns then.
+"""The symmetric matrices that functions factorise: which entries are zero, what a pivot means that is not positive, and
+how the caller is informed.
 
-A matrix A = L^T D L is positive definite if all pivots, the entries of D, are positive. C returns the number of the first
-pivot that is not; Python gives NaN or an error.
+A matrix A = L^T D L is positive definite if all pivots, the entries of D, are positive. If one is not, the generated C
+function returns the number of the first such pivot, from 1. Python gives NaN or an error.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from enum import StrEnum
 
 
 class Structure(StrEnum):
-    """How the entries of a symmetric matrix lie.
+    """Which entries of a symmetric matrix are zero at every state.
 
     DENSE   no entry is zero at every state
-    LIMBS   limbs on a core: entries of two joints are zero if neither joint carries the other. Elimination from the last
-            row up keeps these zeros (Featherstone 2008, section 6.5)
-    BLOCKS  square blocks on the diagonal, each factorised by itself; the other entries are zero
+    LIMBS   branches (limbs) on a common body: the entry of two joints is zero if neither joint carries the other.
+            Elimination from the last row up keeps these zeros (Featherstone 2008, section 6.5)
+    BLOCKS  square blocks on the diagonal, each factorised separately; the other entries are zero
     """
 
     DENSE = "dense"
@@ -27,17 +27,19 @@ class Structure(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SymmetricMatrix:
-    """A symmetric matrix that must be positive definite for a function to have a result.
+    """A symmetric matrix that a function factorises. If the matrix is not positive definite, the function has no
+    result.
 
-    name       in sentences
-    structure  how its entries lie
-    axes       lengths of what must be positive: pivots, or one sign for each block
-    number     which number a pivot or sign has that is not positive, from 0, in words; C returns 1 more
-    failure    what has happened then, in Python's documentation: words that follow "If "
-    unit, powers  of these, as Quantity has them
-    error      one line that Python raises as an error, in which {axis} stands for the name of an entry of that axis (such
-               as {frames}) and {input} for a scalar input; empty: the results of such a state are NaN
-    hint       the remedy, with the error
+    name       the matrix's name in sentences
+    structure  which entries are zero
+    axes       shape of the array of pivots, in words such as nv; for blocks, that of the array with one sign per block
+    number     words for the number, from 0, of the pivot or sign that is not positive; C returns this number plus 1
+    failure    the reason, in Python's documentation: words that follow "If "
+    unit       unit of the pivots
+    powers     how the unit depends on the axes, as in Quantity
+    error      one line that Python raises as an error; {axis} stands for the name of an entry of that axis (such as
+               {frames}), and {input} for a scalar input. Empty: the results of such a state are NaN
+    hint       the remedy that is printed with the error
     """
 
     name: str
@@ -55,7 +57,11 @@ class SymmetricMatrix:
             raise ValueError(f"{self.name}: {self.structure} with axes {self.axes}")
 
     def in_blocks(self, count: str, number: str, failure: str) -> SymmetricMatrix:
-        """So many of this matrix, one after the other."""
+        """Return the block-diagonal matrix whose blocks are several matrices like this one.
+
+        count            name of the number of blocks
+        number, failure  as in SymmetricMatrix, for the new matrix
+        """
         return replace(
             self,
             structure=Structure.BLOCKS,

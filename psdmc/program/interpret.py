@@ -14,9 +14,11 @@ Array = NDArray[np.float64]
 
 
 def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str, int]) -> dict[str, Array]:
-    """Outputs by vector name, (..., size), from inputs by vector name, (..., length); leading axes broadcast.
+    """Execute a PROGRAM (list of operations) on arrays, one state or many at once. Return each output vector by name,
+    (..., size).
 
-    `sizes` gives the length of each output vector; entries that the program does not store are zero.
+    inputs  input vectors by name, (..., length); leading axes broadcast
+    sizes   length of each output vector; entries that the PROGRAM does not store are zero
     """
     given = {name: np.asarray(array, dtype=np.float64) for name, array in inputs.items()}
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in given.values())) if given else ()
@@ -33,7 +35,12 @@ def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str,
 def evaluated(
     program: Program, load: Callable[[Slot], Any], constant: Callable[[float], Any] = float
 ) -> list[tuple[Slot, Any]]:
-    """The outputs of a PROGRAM on any scalars: numbers, arrays or symbols."""
+    """Return each output entry of a PROGRAM with its value. The values are computed on any scalars: numbers, arrays or
+    symbols.
+
+    load      function that returns the value of an input entry
+    constant  function that converts a constant of the PROGRAM to a scalar
+    """
     values: list[Any] = []
     for op, args, slot, value in program.body:
         if args:

@@ -1,4 +1,4 @@
-"""One generated function's arithmetic, as lowering hands it to emission."""
+"""The arithmetic of one generated function, as lists of scalar operations (PROGRAMs), from which C code is printed."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from psdmc.program.signature import Signature
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """A function and the PROGRAMs that compute it.
+    """A generated function and the PROGRAMs (lists of scalar operations) that compute it.
 
     function  which quantities it reads and writes
     theta     whether it also reads theta_b, the base parameters, at run time
-    single    arithmetic in an order for one state; empty where `regions` are too long to be written out
-    batch     arithmetic in an order for one state per SIMD lane; may be the same object
-    lowering  how it was made: 'expanded' or 'factored'
-    before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
-              lanes; single and batch have them written out
-    places    of a function that packs a matrix: (row, column) of each entry that it puts out
-    limbs     the same for one state, limbs of equal structure in the lanes of vectors, for machines whose vectors make it
-              worth while; None: none do
-    regions   the same as loops and calls, which the C is made of; None: it is made of the straight lines
+    single    operations for one state, in the best order for one state; empty if `regions` are too long to be written
+              out
+    batch     operations for one state in each SIMD lane (slot of a vector), in the best order for lanes; may be the
+              object `single`
+    lowering  the method that made it: 'expanded' (from polynomials) or 'factored' (from recursive algorithms)
+    before    if matrix products at the function's end are computed in loops: the operations before these loops, used
+              for one state and for lanes. `single` and `batch` have the products written out
+    places    for a function whose output is a vector of matrix entries: (row, column) of each entry
+    limbs     the function for one state, with equal limbs (such as legs) in the lanes of vectors, if that is cheaper on
+              some machine; else None
+    regions   the function as loops and calls of other functions, from which C is printed; None: C is printed from
+              `single` and `batch`
     """
 
     function: Signature
@@ -49,7 +52,8 @@ class Kernel:
 
     @property
     def is_loop_of_calls(self) -> bool:
-        """Whether it has no straight line: its C calls another function, and is too long to be written out."""
+        """Return whether this function's C code only calls other functions in loops, because straight-line code would
+        be too long."""
         return not self.single.outputs
 
     def _check(self, program: Program, inputs: set[str], outputs: set[str]) -> None:
@@ -60,10 +64,10 @@ class Kernel:
 
     @property
     def name(self) -> str:
-        """Function name, with '_theta' where parameters are given at run time."""
+        """Return the function's name, with '_theta' appended if base parameters are an argument at run time."""
         return self.function.name + ("_theta" if self.theta else "")
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the vectors that it reads, in the order of C's arguments."""
+        """Return the names of the vectors that the function reads, in the order of the C function's arguments."""
         return (*(q.name for q in self.function.inputs), *(("theta_b",) if self.theta else ()))

@@ -1,4 +1,5 @@
-"""Kernels as JSON text and back: the form in which a cache keeps a lowering."""
+"""Conversion of kernels (the operations of generated functions) to JSON text and back. A cache on disk stores kernels
+in this form."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ FORMAT = 6
 
 
 def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
-    """The text of kernels in their order; constants read back bit for bit."""
+    """Return the JSON text of kernels (the operations of generated functions) in their order. Constants can be read
+    back bit for bit."""
     # One kernel at a time: lists of all of a large robot's instructions together take more memory than its kernels.
     entries = ",".join(_text(_kernel_to_plain(kernel)) for kernel in kernels.values())
     return f'{{"format":{FORMAT},"kernels":[{entries}]}}'
@@ -47,9 +49,10 @@ def _kernel_to_plain(kernel: Kernel) -> dict[str, Any]:
 
 
 def kernels_from_json(text: str, functions: Mapping[str, Signature]) -> dict[str, Kernel]:
-    """Kernels by name, in the order of `kernels_to_json`; InternalError where that did not write the text.
+    """Return the kernels in a JSON text by name, in their order in the text. Raises InternalError if `kernels_to_json`
+    did not write the text.
 
-    functions  signatures by name, one of which each kernel must have
+    functions  signatures by name, among which each kernel's function must be
     """
     try:
         whole = json.loads(text)

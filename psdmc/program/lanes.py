@@ -1,4 +1,5 @@
-"""Constants of limbs that run in the lanes of a vector: one number per limb."""
+"""Constants that differ between equal limbs (such as legs), with one number per limb. Generated code computes the limbs
+at once, each in one SIMD lane (slot of a vector)."""
 
 from __future__ import annotations
 
@@ -14,8 +15,10 @@ Scalar = Any
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """Numbers that differ between the limbs of one group. Arithmetic with plain numbers, and with others of the group, is
-    done at once; where all become equal, the result is a plain number. Beside a symbol, the symbol's arithmetic is done.
+    """A constant that has one number for each limb of a group of equal limbs.
+
+    Arithmetic with numbers and with other constants of the group is done at once, limb by limb. If all results are
+    equal, the result is one number. Arithmetic with a symbol is recorded as an operation.
 
     group   number of the group of limbs
     values  limb by limb
@@ -57,7 +60,8 @@ class Lanes:
         return lanes(self.group, list(map(sin, self.values))), lanes(self.group, list(map(cos, self.values)))
 
     def operated(self, operation: Callable[..., float], arguments: Sequence[Scalar]) -> Scalar:
-        """An operation's value limb by limb; NotImplemented beside a symbol."""
+        """Return the value of an operation on constants of the group, limb by limb. Return NotImplemented if an
+        argument is a symbol."""
         if not all(isinstance(each, Lanes | float | int) for each in arguments):
             return NotImplemented
         columns = [
@@ -78,6 +82,6 @@ class Lanes:
 
 
 def lanes(group: int, values: Sequence[float]) -> float | Lanes:
-    """One constant per limb; a plain number where all are equal."""
+    """Return a constant with the given number per limb. If all numbers are equal, return one plain number."""
     numbers = tuple(float(x) for x in values)
     return numbers[0] + 0.0 if len(set(numbers)) == 1 else Lanes(group, numbers)

@@ -1,7 +1,8 @@
-"""What the stages of core and limbs cost, counted on PROGRAMs, or on a trace before it is one.
+"""The cost of a function with limbs, stage by stage. A stage is a part that equal limbs, or the core outside the limbs,
+compute. Costs are counted on PROGRAMs (lists of operations), or on a trace that is not yet a PROGRAM.
 
-A search weighs some hundred arrangements and cuts only the cheapest into stages. The count of a trace is that of the
-stages which `limb_stages.staged` would give.
+A search compares some hundred arrangements, and only the cheapest are divided into stages. The cost of a trace equals
+the cost of the stages that `limb_stages.staged` would return.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ _ADD, _SUB, _SIN, _COS = Op.ADD, Op.SUB, Op.SIN, Op.COS
 
 @dataclass(frozen=True, slots=True)
 class StageCost:
-    """Of one stage.
+    """The cost of one stage of a function with limbs. A stage is a part that one group of equal limbs, or the core
+    (everything outside limbs), computes.
 
-    group   number of the group whose limbs compute it; None: the core does
-    cost    its operations, a limb's once
-    shared  values of the core that limbs read
-    sums    over the limbs
+    group   number of the group whose limbs compute the stage; None: the core
+    cost    operations, those of a limb counted once
+    shared  number of values of the core that limbs read
+    sums    number of sums over the limbs
     """
 
     group: int | None
@@ -36,14 +38,16 @@ class StageCost:
 
 
 def whole_cost(limbs: LimbProgram) -> Cost:
-    """Of all stages and of the products behind them, a limb's operations once."""
+    """Return the cost of all stages of a function with limbs, and of the matrix products after them. Operations of
+    equal limbs are counted once."""
     costs = [cost(stage.program) for stage in limbs.stages]
     costs += [limbs.products.cost] if limbs.products else []
     return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))
 
 
 def stage_costs(limbs: LimbProgram) -> Iterator[StageCost]:
-    """Of a function that is cut into stages."""
+    """Return the cost of each stage of a function with limbs, in their order. A stage is a part that one group of
+    limbs, or the core, computes."""
     groups = {group.number: group for group in limbs.groups}
     for stage in limbs.stages:
         own_cost = cost(stage.program)
@@ -63,11 +67,14 @@ def traced_stage_costs(
     partial_of: Mapping[int, int],
     groups: Sequence[LimbGroup],
 ) -> list[StageCost]:
-    """Of a trace's steps that its outputs need.
+    """Return the cost of each stage of a recorded function with limbs, in their order. Only operations that the outputs
+    need are counted.
 
-    stored      outputs of core and limbs, partial sums left out
-    partial_of  index of a loaded sum to that of the value which it sums
-    InternalError where limbs of two groups meet in one value, or a limb's value is stored as the core's.
+    stored      output slots of the core and of limbs, with the index of the value; without sums over limbs
+    partial_of  index of the input that is a sum over limbs -> index of the value that is summed
+
+    Raises InternalError if an operation combines values of limbs of two groups, or if a limb's value is an output of
+    the core.
     """
     needed, partials = _needed(steps, stored, partial_of)
     return _Count(steps, partial_of, groups).of(needed, stored, partials)

@@ -1,8 +1,9 @@
-"""A function for one state whose limbs of equal structure run in the lanes of a vector.
+"""A function for one state, in which equal limbs (such as legs) run in the SIMD lanes of a vector.
 
-What limbs compute is written once: PROGRAMs of scalars, each scalar being one limb's. They read the limb's inputs and
-constants, and what the core (everything that is not in a limb) computes, which is the same for all limbs; the core reads
-sums over the limbs. Stages follow one another, each of one kind: core or a group of limbs.
+The core is everything that is not in a limb. The operations of equal limbs are written once, as PROGRAMs (lists of
+scalar operations) of one limb. They read the limb's inputs and constants, and values of the core, which are equal for
+all limbs. The core reads sums over the limbs. Stages follow one another; each is computed by the core or by one group
+of limbs.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ CORE = "core"
 
 @dataclass(frozen=True, slots=True)
 class LimbGroup:
-    """Limbs of equal structure.
+    """A group of limbs with equal structure, such as the legs of a quadruped.
 
-    number     of the group, which its vectors are named by
-    count      limbs
-    inputs     slots that its stages read, and those of the function's inputs, limb by limb
-    constants  rows of `count` numbers, one for each entry of its vector of constants
-    outputs    slots that its stages store, and those of the function's outputs, limb by limb; several may stand for one slot
-               of a limb, one after the other
+    number     number of the group, which is in the names of its vectors
+    count      number of limbs
+    inputs     input entries of one limb, each with the function's input entries that belong to it, limb by limb
+    constants  for each constant of one limb, `count` numbers, limb by limb
+    outputs    output entries of one limb, each with the function's output entries that belong to it, limb by limb. An
+               output entry of one limb may occur several times
     """
 
     number: int
@@ -42,7 +43,7 @@ class LimbGroup:
 
     @property
     def name(self) -> str:
-        """What its vectors' names begin with. Names of what belongs to a number of limbs begin otherwise."""
+        """Return the first part of the names of the group's vectors. It contains the number of the group."""
         return group_name(self.number)
 
     @property
@@ -52,7 +53,7 @@ class LimbGroup:
 
     @property
     def partial(self) -> str:
-        """Vector of what is summed over the limbs."""
+        """Return the name of the vector of values that are summed over the limbs."""
         return f"{self.name}_partial"
 
     @property
@@ -62,7 +63,7 @@ class LimbGroup:
 
     @property
     def kept(self) -> str:
-        """Vector of what later stages of the group read."""
+        """Return the name of the vector in which the group keeps values for its later stages."""
         return f"{self.name}_kept"
 
     @property
@@ -71,13 +72,14 @@ class LimbGroup:
         return f"{self.name}_output"
 
     def input_of(self, vector: str) -> str:
-        """The group's name for an input of the function."""
+        """Return the name of the vector with a limb's entries of the function's input `vector`."""
         return f"{self.name}_{vector}"
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A PROGRAM and the number of the group whose limbs compute it; None: the core does."""
+    """A part of a function with limbs: a PROGRAM (list of operations), and the number of the group whose limbs compute
+    it. None: the core, everything outside limbs, computes it."""
 
     group: int | None
     program: Program
@@ -85,10 +87,10 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class LimbProgram:
-    """Stages in their order.
+    """A function as stages, in their order. A group of equal limbs, or the core outside the limbs, computes each stage.
 
-    least     lanes of the narrowest vector with which this is cheaper than the function's straight line
-    products  done behind them; None: none are
+    least     the smallest number of lanes with which this is cheaper than the function's straight-line code
+    products  matrix products after the stages; None if there are none
     """
 
     groups: tuple[LimbGroup, ...]
@@ -101,7 +103,8 @@ class LimbProgram:
 
 
 def unpacked(limbs: LimbProgram) -> Program:
-    """The same function as one PROGRAM of the function's own inputs and outputs, each limb written out."""
+    """Return the function without lanes, as one PROGRAM (list of operations) with the inputs and outputs of the
+    function. The operations of each limb are written out."""
     tracer = Tracer()
     core: dict[Slot, Value] = {}
     own: dict[tuple[int, int], dict[Slot, Value]] = {

@@ -1,5 +1,9 @@
-"""Cut a PROGRAM of core and limbs into stages: what the core computes before the limbs, what these compute, what the core
-makes of their sums, and so on."""
+"""Division of a PROGRAM (list of operations) with equal limbs into stages. Each stage is computed by one group of
+limbs, or by the core (everything outside limbs).
+
+First come the core's values that do not depend on limbs, then the values of the limbs, then the core's values that
+depend on sums over limbs, and so on.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +21,14 @@ THE_CORE = -1
 
 
 def staged(program: Program, groups: Sequence[LimbGroup]) -> tuple[Stage, ...]:
-    """The stages of a PROGRAM that reads groups' inputs, constants and sums beside the function's inputs, and stores their
-    partial sums and outputs beside the function's outputs.
+    """Return the stages of a PROGRAM (list of operations) with equal limbs. One group of limbs, or the core outside the
+    limbs, computes each stage.
 
-    Keeps: output values, bit for bit; instructions, but for constants and loads that several stages need.
-    InternalError where limbs of two groups meet in one value, or a limb's value is stored as the core's.
+    In addition to the function's inputs, the PROGRAM reads inputs, constants and sums of the groups. In addition to the
+    function's outputs, it stores outputs of the groups, and values that are to be summed.
+
+    Keeps: output values, bit for bit; instructions, except that several stages may repeat constants and loads. Raises
+    InternalError if an operation combines values of limbs of two groups, or if a limb's value is an output of the core.
     """
     return _Split(program, groups).stages()
 

@@ -1,6 +1,8 @@
-"""Sums over limbs in a trace that records one limb of each group for all of them, and which values differ between limbs.
+"""Sums over equal limbs in a trace (recorded operations) that contains one limb of each group; and which values differ
+between limbs.
 
-A sum is an input of the trace, as `limb_stages` wants it: nothing but this says what it is the sum of.
+A sum is recorded as an input of the trace, as `limb_stages` needs it. Only the object LimbSums knows which value is
+summed.
 """
 
 from __future__ import annotations
@@ -19,10 +21,10 @@ CORE = -1
 
 
 class LimbSums:
-    """The sums of one trace. Its tracer knows them from now on.
+    """The sums over limbs in one trace (recorded operations). Creating the object registers it with the trace's tracer.
 
-    partials  of each group, the index of a value to the number of its sum
-    summed    the index of a sum to that of its value
+    partials  for each group, index of a value in the trace -> number of the sum over the limbs
+    summed    index of a sum in the trace -> index of the value that is summed
     """
 
     def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
@@ -37,11 +39,16 @@ class LimbSums:
         tracer.limb_sums = self
 
     def add_input(self, vector: str, group: int) -> None:
-        """Count the entries of a vector among what differs between a group's limbs."""
+        """Declare that the entries of an input vector of the trace (recorded operations) differ between the limbs of a
+        group."""
         self._owners[vector] = group
 
     def group_of(self, index: int) -> int:
-        """The number of the group whose limbs a value differs between; CORE: of none."""
+        """Return the number of the group between whose limbs a value differs. Return CORE if the value is equal for all
+        limbs.
+
+        index  index of the value in the trace (recorded operations)
+        """
         groups, steps = self._groups, self.tracer.steps
         for k in range(len(groups), index + 1):
             op, a, b = steps[k]
@@ -54,7 +61,7 @@ class LimbSums:
         return groups[index]
 
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
-        """The sum over a group's limbs of a scalar that is one for each of them."""
+        """Return the sum of a value over the limbs of a group. The given scalar has one value per limb."""
         if isinstance(value, Lanes):
             return math.fsum(value.values)
         if not isinstance(value, Symbol) or self.group_of(value.index) != group:
@@ -66,7 +73,8 @@ class LimbSums:
         return -found if value.negative else found
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Inputs that differ between limbs where values do."""
+        """Return new inputs of the trace (recorded operations) that take the place of the given values. A new input
+        differs between limbs if the value does."""
         return [self._stand_in(vector, k, value) for k, value in enumerate(values)]
 
     def _stand_in(self, vector: str, number: int, value: Symbol | Constant) -> Symbol:

@@ -1,7 +1,7 @@
-"""The operations of a PROGRAM: one entry for each, from which everything that treats operations alike derives.
+"""The operations of a PROGRAM (list of scalar operations), as a table with one entry for each.
 
-Tracing, interpreting, folding, differentiating, counting, checking, printing and reading PROGRAMs read this table. A back
-end has a table of its own from `Op` to its language, and a test says that none is missing there.
+The code that traces, interprets, folds, differentiates, counts, checks, prints and reads PROGRAMs uses this table. Each
+back end (printer for one language) has a table from `Op` to its language, and a test checks that it is complete.
 
 | comparison        | with NaN                              | zeros                                                   |
 |-------------------|---------------------------------------|---------------------------------------------------------|
@@ -9,7 +9,8 @@ end has a table of its own from `Op` to its language, and a test says that none 
 | min a b, max a b  | NaN, whichever of the two is NaN      | of two zeros the second; passes may swap arguments      |
 | select a b x y    | y: no comparison with NaN is true     | y: -0.0 is not less than 0.0                            |
 
-Their derivatives are those of the argument that they take: at a tie the second's (of min and max), 1 (of abs).
+The derivative of a comparison is that of the argument that the comparison returns. If a and b are equal, min and max
+have the derivative of the second argument. At zero, abs has the derivative 1.
 """
 
 from __future__ import annotations
@@ -31,9 +32,10 @@ Scalar = Any
 
 
 class Unit(StrEnum):
-    """What a target's latencies and weights are given for; the words are names of their fields (psdmc/target/costs.py).
+    """The kinds of operations for which a target processor has latencies and costs. The texts are names of fields in
+    psdmc/target/costs.py.
 
-    CHOICE  a comparison and what it chooses, without a branch
+    CHOICE  a comparison that selects one of two values, without a branch
     CALL    an elementary function of the C library, one real at a time
     """
 
@@ -50,17 +52,19 @@ class Unit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """What is known of an operation.
+    """The properties of one operation of PROGRAMs (lists of scalar operations).
 
     arity        number of arguments
-    unit         of which it costs one
-    numbers      its meaning on floats and arrays; on symbols, too, where `written` says so
-    partials     derivative by each argument, from its value and its arguments
-    dimension    dimension of its value, from those of its arguments; raises Unlike where they do not go together
-    ulp          largest error of a double, in units in the last place, of `numbers` and of the emitted C; 0.5: rounded once
-    written      whether symbols have it as an operator, and simplify as they record it
+    unit         the kind as which its cost is counted
+    numbers      function that computes its value for floats and arrays; also for symbols, if `written` is set
+    partials     function that returns the derivative by each argument, from the value and the arguments
+    dimension    function that returns the physical dimension of the value from those of the arguments; raises Unlike if
+                 the operation does not admit them
+    ulp          largest error of a double in `numbers` and in generated C, in units in the last place; 0.5: rounded
+                 once
+    written      whether symbols have it as a Python operator such as +, and simplify it as they record it
     commutative  whether its arguments may be swapped
-    parity       what becomes of the sign of the first argument: 'odd' hands it on, 'even' drops it
+    parity       effect of the first argument's sign: 'odd' changes the result's sign, 'even' does not change the result
     """
 
     arity: int
@@ -108,9 +112,10 @@ def _power_partials(value: Scalar, base: Scalar, exponent: Scalar) -> tuple[Scal
 
 
 class Op(StrEnum):
-    """Operations of a PROGRAM's instructions; their words are those of its text form.
+    """The operations in PROGRAMs (lists of scalar operations). Their values are the words for them in PROGRAMs that are
+    written as text.
 
-    Called with arguments, an operation gives its value: `Op.TANH(x)`, of floats, arrays or symbols.
+    Called with arguments, an operation computes its value: `Op.TANH(x)`, of floats, arrays or symbols.
     """
 
     LOAD = "load", Operation(0, Unit.LOAD, _none, _none)
@@ -213,7 +218,8 @@ class Op(StrEnum):
         return self.numbers(*arguments)
 
     def of_numbers(self, values: Sequence[float]) -> float | None:
-        """The value of numbers; None where it is not finite, and no constant."""
+        """Return the operation's value for numbers as arguments. Return None if the value is not finite, because such a
+        value cannot be a constant of a PROGRAM."""
         with np.errstate(all="ignore"):
             value = float(self.numbers(*map(np.float64, values)))
         return value if math.isfinite(value) else None

@@ -1,6 +1,7 @@
-"""Cut a long PROGRAM into parts that are compiled one by one: compilers take more than linear time for long straight lines.
+"""Division of a long PROGRAM (list of operations) into parts that are compiled one by one. Compile time grows faster
+than the length of straight-line code.
 
-A part is a PROGRAM of its own. What later parts read of it, it stores into vectors that lie between them.
+Each part is a PROGRAM. Values that later parts need are stored in vectors, which these parts read.
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ LEEWAY = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Parts in their order, and the vectors that lie between them with their lengths."""
+    """The parts of a divided PROGRAM (list of operations) in their order, and the vectors that pass values from part to
+    part.
+
+    kept  length of each of these vectors, by name
+    """
 
     programs: tuple[Program, ...]
     kept: Mapping[str, int]
@@ -32,13 +37,14 @@ class Parts:
 def in_parts(
     program: Program, kept_in: Sequence[str], groups: Sequence[Collection[Slot]], late: bool, longest: int
 ) -> Parts:
-    """The PROGRAM in parts of about `longest` operations and stores.
+    """Divide the PROGRAM into parts of about `longest` operations and stores each.
 
-    kept_in  of each value the vector that takes it where a later part reads it
-    groups   outputs that one part must store; an output that is in none is a group of its own
-    late     the last part stores all outputs; otherwise each part stores what it completes
-    Keeps: output values, bit for bit; all inputs are read before or in the first part that stores an output, and in it
-    before they are stored.
+    kept_in  for each value, the name of the vector that takes it if a later part reads it
+    groups   groups of output entries that one part must store together; every other entry is stored separately
+    late     True: the last part stores all outputs; False: each part stores the outputs whose values it completes
+
+    Keeps: output values, bit for bit. All inputs are read before the first output is stored, in an earlier part or in
+    the part that stores it.
     """
     return _Cut(program, kept_in, groups, late, longest).parts()
 

@@ -1,4 +1,5 @@
-"""The passes in their order, with the checker between them."""
+"""Runs the passes that improve a PROGRAM (list of operations to generate). After each pass, a checker tests whether the
+PROGRAM still follows the rules."""
 
 from __future__ import annotations
 
@@ -42,8 +43,8 @@ registers do."""
 
 
 def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
-    """Passes for one state, which is delayed by its longest chain of dependent operations: they shorten it, by the
-    target's latencies."""
+    """Return the last passes of the code generator for code that computes one state. The time of such code depends on
+    its longest chain of dependent operations. The passes shorten this chain, by the target's latencies."""
 
     @wraps(fuse_sums)
     def fuse(program: Program) -> Program:
@@ -61,17 +62,22 @@ one saves less than a thousandth of a humanoid's Coriolis matrix."""
 
 
 def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> Program:
-    """A PROGRAM with the same outputs in fewer operations, up to rounding, in the order that suits the target; with
-    `lanes`, for one state per SIMD lane.
+    """Return a PROGRAM (list of operations to generate) that computes equal outputs, up to rounding, with fewer
+    operations. The order of operations suits the target: one state per call or, with `lanes`, one state per SIMD lane.
 
-    InternalError, naming the pass, where one breaks a PROGRAM's rules.
+    Raises InternalError, naming the pass, if a pass breaks a rule for PROGRAMs.
     """
     return ordered(shortened(program), costs)[1 if lanes else 0]
 
 
 def shortened(program: Program, of_large: bool = False) -> Program:
-    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order. The first round that
-    saves LITTLE is the last one of a long PROGRAM; `of_large`, of a robot of many joints, LONG_OF_LARGE is long."""
+    """Return a PROGRAM (list of operations to generate) that computes equal outputs with fewer operations. The order of
+    instructions is chosen later, by `ordered`.
+
+    The passes are applied in rounds, until a round saves nothing. For a long PROGRAM, they end after a round that saves
+    at most the share LITTLE of the operations. A PROGRAM is long from LONG operations on. With `of_large` (a robot of
+    many joints), it is long from LONG_OF_LARGE operations on.
+    """
     operations, long = _operations(program), LONG_OF_LARGE if of_large else LONG
     done: dict[Pass, Program] = {}
     for _ in range(LONGEST):
@@ -86,9 +92,12 @@ def shortened(program: Program, of_large: bool = False) -> Program:
 
 
 def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
-    """A shortened PROGRAM in two orders: for one state a call, and for one state per SIMD lane. They are the same where
-    the target has no lanes or one order serves both; where spilled values also delay the code for one state, it
-    takes the order that spills less."""
+    """Return a PROGRAM (list of operations to generate) in two orders. The first suits one state per call, the second
+    one state per lane of a SIMD vector.
+
+    Both orders are equal if the target has no lanes, or if one order serves both. Spilled values are values that do not
+    fit in registers. If they delay the code for one state, this code takes the order with fewer spilled values.
+    """
     last = _applied(LAST, short, {})
     for_lanes = _applied(LAST_FOR_LANES, last, {})
     for_one = _applied(last_for_one_state(costs), last, {})

@@ -1,4 +1,5 @@
-"""Products of square matrices behind a PROGRAM: left out of its straight line, multiplied in loops or line by line."""
+"""Products of square matrices at the end of a function. They are not in the function's PROGRAM (list of operations to
+generate). C code computes them in loops, or they are written out entry by entry."""
 
 from __future__ import annotations
 
@@ -18,11 +19,12 @@ hand of four fingers has few lines."""
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """output = - left right, n x n each.
+    """A matrix product at the end of a function: output = -(left @ right), with n x n matrices.
 
-    output  an output of the function that its trace does not give
-    left    an output of the function that it gives, row by row
-    right   what the trace gives in the output's place, column by column: a column of derivatives is by one joint
+    output  name of the function's output that is the product
+    left    name of the left factor, an output that the traced arithmetic computes, row by row
+    right   name of the right factor, which the traced arithmetic computes column by column; column j of derivatives is
+            by joint j
     """
 
     output: str
@@ -31,8 +33,9 @@ class Product:
 
 
 def written_out(program: Program, products: tuple[Product, ...]) -> Program:
-    """The PROGRAM with the products' outputs in the place of their right factors, entry by entry; itself where there are
-    none."""
+    """Return the PROGRAM (list of operations to generate) with every entry of each matrix product computed by
+    instructions. The product is stored in place of the product's right factor. Without products, the PROGRAM is
+    returned unchanged."""
     if not products:
         return program
     tracer = Tracer()
@@ -61,7 +64,8 @@ def _multiplied(product: Product, values: dict[Slot, Value]) -> list[tuple[Slot,
 
 
 def lines(program: Program, product: Product) -> int:
-    """Multiplications of the product where it is written out: none by entries that are zero at every state."""
+    """Return the number of multiplications that a matrix product takes if it is written out entry by entry. Entries
+    that are zero at every state need none."""
     stored = {slot: program.body[i].value != 0.0 for slot, i in program.outputs}
     n = isqrt(sum(slot.vector == product.right for slot in stored))
     left = [sum(stored[Slot(product.left, i * n + k)] for i in range(n)) for k in range(n)]
@@ -70,7 +74,7 @@ def lines(program: Program, product: Product) -> int:
 
 
 def zero_columns(program: Program, product: Product) -> int:
-    """How many of the right factor's first columns are zero at every state."""
+    """Return the number of leading columns of a product's right factor that are zero at every state."""
     stored = {
         slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == product.right
     }

@@ -1,4 +1,5 @@
-"""PROGRAM: straight-line, single-assignment arithmetic on scalars: all that lowering hands to emission."""
+"""PROGRAM: a list of scalar operations without branches or loops, in which each value is assigned once. C code is
+printed from PROGRAMs."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ _COMMUTATIVE = frozenset(op for op in Op if op.operation.commutative)
 
 
 class Slot(NamedTuple):
-    """One entry of a named vector: an input to load or an output to store."""
+    """The place of one number in a named array of a function: the array's name, and the index of the entry. An input is
+    loaded from a slot, an output is stored into a slot."""
 
     vector: str
     index: int  # type: ignore[assignment]  # a tuple's method, which nothing here calls
@@ -29,12 +31,16 @@ class Slot(NamedTuple):
 
 @lru_cache(maxsize=128)
 def slots_of(vector: str, count: int) -> tuple[Slot, ...]:
-    """The entries of a vector, which each trace of a search names again."""
+    """Return the names of all entries of a vector. They are cached, as each trace of a search needs them again."""
     return tuple(Slot(vector, index) for index in range(count))
 
 
 class Instr(NamedTuple):
-    """One instruction; `args` point at earlier instructions, `slot` belongs to loads, `value` to constants."""
+    """One instruction of a PROGRAM (list of operations to generate): the operation and what it works on.
+
+    `args` are the indices of the earlier instructions whose results it takes. `slot` is the input that a load reads,
+    `value` the number of a constant.
+    """
 
     op: Op
     args: tuple[int, ...] = ()
@@ -42,7 +48,8 @@ class Instr(NamedTuple):
     value: float | None = None
 
     def renumbered(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
-        """The same operation on the values that its arguments have become; itself where none has moved."""
+        """Return the instruction with the indices of its arguments replaced by those in `new_index`. If no index
+        changes, return the unchanged instruction."""
         op, args, _, _ = self
         if len(args) == 2:
             moved: tuple[int, ...] = (new_index[args[0]], new_index[args[1]])
@@ -53,8 +60,8 @@ class Instr(NamedTuple):
         return self if moved == args else tuple.__new__(Instr, (op, moved, None, None))
 
     def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
-        """The same on the values that its arguments have become, commutative ones in ascending order; itself where it is
-        that already."""
+        """Return the instruction with the indices of its arguments replaced by those in `new_index`. The two indices of
+        a commutative operation, such as a sum, are put in ascending order."""
         op, args, _, _ = self
         if len(args) != 2:
             return self.renumbered(new_index)
@@ -66,15 +73,17 @@ class Instr(NamedTuple):
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:
-    """Instr(op, args), made in a third of the time: passes make some hundred thousand."""
+    """Return an instruction with this operation and these arguments, three times as fast as Instr(op, args). Speed
+    matters because passes make some hundred thousand instructions."""
     return tuple.__new__(Instr, (op, args, None, None))
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Instructions in an order in which every argument precedes its use, and what they put out.
+    """PROGRAM: a list of instructions, in which every argument precedes its use, and the places where results are
+    stored.
 
-    body     instruction i defines value i
+    body     the instructions; the result of instruction i is called value i
     outputs  (slot, index of the value stored there), in order of storing
     """
 
@@ -86,7 +95,8 @@ class Program:
     _uses: list[list[int]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """(k,) the arguments of all instructions in their order, and (k,) the instruction of each; found once."""
+        """Return two arrays (k,) for the k arguments of all instructions. The first has the index of each argument's
+        value, the second that of the instruction that takes it. They are computed at the first call."""
         if not self._arguments:
             given = list(map(itemgetter(1), self.body))
             counts = np.fromiter(map(len, given), np.intp, len(given))
@@ -95,11 +105,13 @@ class Program:
         return self._arguments[0]
 
     def inputs(self) -> tuple[Slot, ...]:
-        """Slots read, each once, in order of vector name and index."""
+        """Return the inputs that the PROGRAM (list of operations to generate) reads, once each, sorted by vector name
+        and index."""
         return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
 
     def uses(self) -> Sequence[int]:
-        """How often each value is an argument or an output; counted once."""
+        """Return for each instruction how often its result is an argument of another instruction or an output. The numbers
+        are counted at the first call."""
         if not self._uses:
             count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
             for _, index in self.outputs:

@@ -1,11 +1,12 @@
-"""A function as a list of regions: straight lines, loops over slices of arrays, and calls of other functions.
+"""A function as a list of regions. A region is straight-line code (without loops), a loop over slices of arrays, or a
+call of another function.
 
-A straight line grows with the square or the cube of the joints if a function multiplies matrices or calls another function
-several times; regions stay short. `run` executes them on arrays of states, to interpret a function, or on symbols, to write
-it out as one straight line.
+Regions serve functions that multiply matrices or call another function several times. The length of straight-line code
+for them grows with the square or the cube of the number of joints. Regions stay short. `run` executes them on numbers,
+or on symbols that record straight-line code.
 
-Regions read and write arrays of reals by name: the function's inputs and outputs, and arrays of its own. An entry must be
-written before it is read.
+Regions read and write arrays of numbers by name: the function's inputs and outputs, and internal arrays. An entry must
+be written before it is read.
 """
 
 from __future__ import annotations
@@ -26,19 +27,20 @@ Scalar = Any
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """A PROGRAM whose vectors are arrays in sight. It reads all entries before it writes one."""
+    """Code without loops: a PROGRAM (list of operations to generate) that reads and writes arrays of the function. It
+    reads all entries before it writes one."""
 
     program: Program
 
 
 @dataclass(frozen=True, slots=True)
 class Slice:
-    """A part of an array that moves on with each round of a loop.
+    """A part of an array on which a loop works. In each iteration, the part starts `stride` entries later.
 
-    name    that the loop's regions call it by
-    array   outside the loop
-    first   its entry in the first round
-    stride  entries to the next round's
+    name    name of the slice in the loop's code
+    array   name of the array outside the loop
+    first   index of the slice's start in the first iteration
+    stride  number of entries by which the start moves per iteration
     """
 
     name: str
@@ -49,7 +51,8 @@ class Slice:
 
 @dataclass(frozen=True, slots=True)
 class For:
-    """Regions that are repeated a fixed number of times. Inside, slices stand beside the arrays in sight."""
+    """A loop: regions that are repeated a fixed number of times. They can use the loop's slices and all arrays outside
+    the loop."""
 
     count: int
     slices: tuple[Slice, ...]
@@ -58,12 +61,13 @@ class For:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call of another function of the package, with theta_b if the caller takes it.
+    """A call of another generated function. If the calling function takes base parameters (theta_b), they are passed
+    on.
 
-    given   an array and its first entry for each input, in their order
-    found   the same for each output
-    pivots  entries that must be positive there: where one is not, the caller fails. They number on from those of earlier
-            calls
+    given   for each input of the called function, the array that is passed and the first entry passed
+    found   for each output of the called function, the array that receives it and the first entry written
+    pivots  number of pivots (divisors of a matrix factorisation) in the called function; if one is not positive, the
+            calling function fails, too
     """
 
     function: str
@@ -77,10 +81,10 @@ Region = Straight | For | Call
 
 @dataclass(frozen=True, slots=True)
 class Regions:
-    """A function's body.
+    """The body of a generated function as loops, calls and straight-line code.
 
-    arrays     its own arrays, with their lengths
-    constants  arrays of numbers
+    arrays     the function's internal arrays: name -> length
+    constants  arrays of fixed numbers: name -> numbers
     """
 
     arrays: Mapping[str, int]
@@ -89,8 +93,8 @@ class Regions:
 
 
 def drop_unread(body: Regions) -> Regions:
-    """The regions without what they store into arrays of their own and never read, and without slices and arrays that this
-    leaves unused.
+    """Return the function body without stores into internal arrays that are never read. Slices and arrays that are then
+    unused are left out, too.
 
     Keeps: outputs, bit for bit.
     """
@@ -175,7 +179,8 @@ def _named(regions: Sequence[Region]) -> set[str]:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """Values and the distance of their places in an array, which is 1 in a vector and the width in a matrix's column."""
+    """Values to store in an array, each `stride` entries after the one before. The stride is 1 for a vector. For a
+    column of a matrix, it is the number of columns."""
 
     values: Sequence[Scalar]
     stride: int = 1
@@ -183,7 +188,8 @@ class Column:
 
 
 def straight(record: Callable[[Reader], Mapping[str, Column]]) -> Straight:
-    """The straight line that stores what `record` computes, array by array, of what it reads."""
+    """Return straight-line code that stores, array by array, the values that the function `record` computes. `record`
+    gets a Reader, by which it reads entries of arrays."""
     tracer = Tracer()
     outputs = [
         (Slot(name, column.first + k * column.stride), value)
@@ -210,9 +216,10 @@ Caller = Callable[[str, list[list[Scalar]]], tuple[list[list[Scalar]], list[Scal
 def run(
     body: Regions, inputs: Mapping[str, Sequence[Scalar]], outputs: Mapping[str, int], call: Caller
 ) -> tuple[dict[str, list[Scalar]], list[Scalar]]:
-    """The outputs, whose lengths are given, and what must be positive in the order in which it is found.
+    """Execute a function body. Return its outputs, and the pivots (divisors of matrix factorisations) that must be
+    positive, in order of computation. `outputs` gives the length of each output.
 
-    InternalError where an entry is read before it is written.
+    Raises InternalError if an entry is read before it is written.
     """
     arrays: dict[str, list[Scalar]] = {name: list(values) for name, values in inputs.items()}
     arrays |= {name: list(values) for name, values in body.constants.items()}

@@ -1,4 +1,5 @@
-"""A PROGRAM recorded again on symbols, to compute with its values or to give it other inputs."""
+"""Executes a PROGRAM (list of operations) on symbols, which records the operations in another trace. There, the values
+can be used further, or the inputs replaced."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ Value = Symbol | Constant
 
 
 def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> list[Value]:
-    """The PROGRAM's outputs, in its order, with these values for its inputs. Inputs that are not given stay inputs."""
+    """Return the values of all outputs of a PROGRAM (list of operations), recorded in another trace, in the PROGRAM's
+    order. `given` are the values of inputs. Inputs without a value stay inputs."""
 
     def load(slot: Slot) -> Value:
         found = given.get(slot)
@@ -23,8 +25,8 @@ def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> l
 
 
 def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:
-    """Recorded values, with other values in place of some of the inputs that they are computed from. Of sums over limbs, the
-    values that it sums are replaced."""
+    """Return recorded values computed anew, with `given` in place of the inputs `inputs`. In a sum over limbs (equal
+    branches such as legs), the summed value is computed anew, too."""
     tracer = inputs[0].tracer
     if any(symbol.slot is None for symbol in inputs):
         raise InternalError("only inputs can be replaced")

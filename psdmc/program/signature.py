@@ -1,5 +1,5 @@
-"""What a generated function reads and puts out: named quantities with sizes in words. Lowering computes what a
-signature names, emission prints it."""
+"""The inputs and outputs of a generated function. Each has a name, a unit and a shape given in words, such as nv for
+the number of joint rates."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ and the rows of all contacts; and, of a function that packs a matrix, entries th
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """What the words of a signature mean for one robot.
+    """The sizes of one robot: numbers of joints, of coordinates, of rates, of base parameters, of frames and so on.
+    Shapes use their names as words, such as nv for the number of joint rates.
 
     rows_of_contacts  3 or 6 for each contact; left out: every named frame is a point, of 3 rows
     """
@@ -45,12 +46,13 @@ class Sizes:
 
     @property
     def nx(self) -> int:
-        """Length of a small motion of the state (q, qd), along the tangent of q."""
+        """Return 2 nv, the number of entries of a small change of the state: nv for the change of q, nv for that of qd.
+        A quaternion counts as three rotations."""
         return 2 * self.nv
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:
-        """The sizes of a robot whose joints have one coordinate each."""
+        """Return the sizes of a robot with n joints of one coordinate each, l base parameters and some named frames."""
         return Sizes(n, n, n, l, frames)
 
     def shape(self, axes: Sequence[str]) -> tuple[int, ...]:
@@ -71,18 +73,21 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A named scalar (no axes), vector or matrix (row-major).
+    """A named input or output of functions: a scalar (no axes), vector or matrix (row-major).
 
-    axes     each a word of WORDS, a number, or sums of products of these: nv+frames*6
-    largest  SI; tests draw an input from plus or minus this, or from
-    least    up to it
-    means    what Python's documentation says of it, with the unit
-    unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
-    powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
-             joint coordinates (rad or m), nx those of nv and then the same per second, l those of base parameters. The
-             first three of 6, and of each contact's rows, are m, the others 1
-    default  of an input that Python's callers may leave out: the value of all its entries
-    whole    whether tests draw whole numbers alone
+    axes     length of each axis: a word of WORDS (sizes of the robot), a number, or a sum of products such as
+             nv+frames*6
+    largest  largest test value, SI; tests draw an input between minus and plus this value, or from
+    least    up to `largest`
+    means    its description in Python's documentation, with the unit
+    unit     SI unit that all entries have in common, such as 'kg m^2/s'; the code generator checks units
+             (lower/units.py)
+    powers   for each axis, the power to which the unit of the row or column multiplies `unit`; left out: zero. This
+             unit is rad or m along nq and nv, by the joint. Along nx it is that of nv, then that of nv per second.
+             Along l it is that of the base parameter. Along 6, and the rows of a contact, it is m for the first three,
+             then 1
+    default  the value of all entries if Python's callers leave the input out
+    whole    whether tests draw whole numbers only
     """
 
     name: str
@@ -109,7 +114,8 @@ class Quantity:
         return dimension_of(self.unit)
 
     def dimensions(self, axes: Mapping[str, Sequence[Dimension]]) -> list[Dimension]:
-        """The dimension of each entry, row by row; `axes` gives the own ones along each axis that is not a number."""
+        """Return the physical dimension of each entry of this quantity, row by row. `axes` gives the dimensions along
+        each axis that the robot determines, such as nv."""
         found = [self.dimension]
         for axis, power in zip(self.axes, self.powers or (0,) * len(self.axes), strict=True):
             own = axes[axis] if axis in axes else [NUMBER] * int(axis)
@@ -117,7 +123,7 @@ class Quantity:
         return found
 
     def drawn(self, shares: Any) -> Any:
-        """Values for tests, from shares between -1 and 1."""
+        """Return test values of this quantity, from random numbers `shares` between -1 and 1."""
         if self.least is None:
             return self.largest * shares
         drawn = self.least + (self.largest - self.least) * (0.5 + 0.5 * shares)
@@ -125,7 +131,8 @@ class Quantity:
 
     @property
     def is_matrix(self) -> bool:
-        """Whether it is a matrix, packed or not: many entries, which are stored as they are computed."""
+        """Return whether this quantity is a matrix, also one stored as the vector of its nonzero entries. A matrix has
+        many entries, so each is stored as soon as it is computed."""
         return len(self.axes) > 1 or "nonzeros" in self.axes
 
 
@@ -141,22 +148,23 @@ class Joined(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """One generated function.
+    """The name, inputs and outputs of one generated function, and how its code computes them.
 
-    name      of the function, in C behind the robot's name
+    name      of the function; in C, the robot's name precedes it
     order     its place in headers, documents and lists: ascending
-    meaning   what a user reads in the header
+    meaning   its description in the header
     inputs    read, in this order
     outputs   written, in this order
-    theta     whether a variant exists that takes theta_b (length l) at run time
-    factorises  symmetric matrices, in the order of their pivots' numbers. The pivots are computed beside the outputs: if one
-              is not positive the function fails, its outputs are NaN and it returns which; none: it cannot fail
-    products  how outputs that a trace does not give follow from what it gives
-    thin      outputs (nv, nv) that a trace with limbs gives as factors, besides THIN, and no product (thin_products.py)
-    normalizes  whether quaternions that it reads may have any length but zero
+    theta     whether a variant exists that takes the base parameters (theta_b, length l) at run time
+    factorises  symmetric matrices that the function factorises, in order. The divisors (pivots) must be positive. If
+                one is not, the outputs are NaN and the function returns its number; none: the function cannot fail
+    products  matrix products that compute outputs after the traced arithmetic, in C loops
+    thin      outputs (nv, nv) that are computed as factors if a robot has equal limbs, such as legs, and multiplied
+              last (thin_products.py)
+    normalizes  whether quaternions in q may have any length but zero
     summary   a sentence on what it computes, for Python and the table of docs/functions.md
-    calls     name of a function of states that its C calls stage by stage, instead of a body of its own
-    spoilt    what its outputs are called where they become NaN
+    calls     name of the function that the C code calls for each stage of an integration step; None: no call
+    spoilt    name of its outputs in sentences about failure, such as "accelerations"
     """
 
     name: str
@@ -182,12 +190,14 @@ class Signature:
 
     @property
     def stored(self) -> tuple[Quantity, ...]:
-        """All quantities that its PROGRAMs put out: outputs, then pivots."""
+        """Return all quantities that the function's PROGRAMs (lists of operations to generate) store: outputs, then
+        pivots."""
         return (*self.outputs, *((self.pivots,) if self.pivots else ()))
 
     @property
     def pivots(self) -> Quantity | None:
-        """The pivots of all matrices that it factorises, which must be positive; None: it cannot fail."""
+        """Return the description of the pivots, the divisors in matrix factorisations, which must be positive. Return
+        None if the function factorises no matrix."""
         parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in self.factorises]
         if len(parts) < 2:
             return parts[0] if parts else None
@@ -196,18 +206,21 @@ class Signature:
 
     @property
     def raises(self) -> bool:
-        """Whether Python raises an error if one of its matrices is not positive definite."""
+        """Return whether a Python call raises an error if a matrix that the function factorises is not positive
+        definite."""
         return any(matrix.error for matrix in self.factorises)
 
     @property
     def pivot_numbers(self) -> tuple[str, ...]:
-        """Which number a pivot has that is not positive, from 0: words for each matrix."""
+        """Return for each factorised matrix a phrase that says which pivot (divisor of the factorisation) is not
+        positive. Pivots are numbered from 0 over all matrices."""
         lengths = [f"{' '.join(matrix.axes)} + " for matrix in self.factorises]
         return tuple("".join(lengths[:k]) + matrix.number for k, matrix in enumerate(self.factorises))
 
     @property
     def traced(self) -> frozenset[str]:
-        """Names of everything that its traces give: right factors in the place of products."""
+        """Return the names of all quantities that the function's recorded arithmetic computes. If an output is a matrix
+        product, its right factor is listed in its place."""
         right = {product.output: product.right for product in self.products}
         return frozenset(right.get(quantity.name, quantity.name) for quantity in self.stored)
 
@@ -220,17 +233,20 @@ class Signature:
         return replace(self, products=(), outputs=(*self.outputs, factors))
 
     def label(self, output: Quantity, theta: bool = False) -> str:
-        """The name for one output's values: the function's, followed by the output's where there are several."""
+        """Return the name of one output's values in files and messages: the function's name. If the function has
+        several outputs, the output's name follows."""
         kernel = self.name + ("_theta" if theta else "")
         return kernel if len(self.outputs) == 1 else f"{kernel}_{output.name}"
 
     def sizes(self, sizes: Sizes) -> dict[str, int]:
-        """Reals per state of all quantities that its PROGRAMs put out."""
+        """Return the number of scalars in each quantity that the function's PROGRAMs (lists of operations to generate)
+        store, by the quantity's name. The numbers are for one state."""
         return {quantity.name: sizes.size(quantity) for quantity in self.stored}
 
 
 def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
-    """By `order`; InternalError where two have the same."""
+    """Return the signatures of functions in the order of their numbers `order`. Raises InternalError if two functions
+    have the same number."""
     found = tuple(sorted(signatures, key=lambda signature: signature.order))
     for one, other in pairwise(found):
         if one.order == other.order:
@@ -261,7 +277,8 @@ TAU = Quantity(
 
 
 def jacobian_of(output: str, by: str) -> Quantity:
-    """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
+    """Return the description (Quantity) of a matrix (nv, nv) of derivatives. `output`, such as joint torques, is
+    differentiated by `by`, such as joint rates; nv is the number of joint rates."""
     of_q = "q[j] (with a ball joint or floating base: for v[j] of a small displacement integrate(q, v))"
     entry = of_q if by == "q" else f"{by}[j]"
     known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}

@@ -1,9 +1,11 @@
-"""Derivatives of recorded values, recorded beside them: along tangents (forward mode) and as gradients (reverse mode).
+"""Derivatives of recorded values, along a direction (forward mode) or as gradients (reverse mode). Their operations are
+recorded, too.
 
-Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are taken by inputs (`Tracer.symbols`) and by
-inputs times a constant, not by other computed values: constants along a product are merged into one, so that a recorded
-product may no longer contain the value that it was written with. To differentiate at computed values, trace with inputs and
-put the values in their place afterwards (replay.py).
+Source: Griewank, Walther 2008, chapters 3 (modes) and 4 (costs). Derivatives can be by inputs (`Tracer.symbols`) and by
+inputs times a constant, but not by other computed values. The tracer merges constants along a product, so a recorded
+product may no longer contain the value with which it was written.
+
+To differentiate by computed values, trace with inputs in their place, and substitute the values afterwards (replay.py).
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ Value = Symbol | Constant
 
 
 def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) -> list[Value]:
-    """The derivative of each value along a tangent: sum over j of (d of[i] / d by[j]) along[j]."""
+    """Return the derivative of each value in `of` along a direction: sum over j of (d of[i] / d by[j]) along[j]. `by`
+    are inputs, and `along` is the change of each input."""
     inputs, factors = _inputs(by)
     sources = _Sources.of(of, inputs)
     if sources is None:
@@ -38,7 +41,8 @@ def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) ->
 def gradients(
     of: Sequence[Value], weights: Sequence[Value], by: Sequence[Sequence[Symbol]]
 ) -> list[list[Value]]:
-    """The derivative of sum(weights[i] of[i]) by every value, vector by vector."""
+    """Return the gradient of the weighted sum of values, sum over i of weights[i] of[i]. `by` lists vectors of inputs;
+    the result has a vector of derivatives for each of them."""
     known = [_inputs(vector) for vector in by]
     sources = _Sources.of(of, [symbol for inputs, _ in known for symbol in inputs])
     if sources is None:
@@ -94,7 +98,8 @@ class _Bars:
         self.from_limbs: dict[int, dict[int, Value]] = {}
 
     def add(self, index: int, value: Value, group: int) -> None:
-        """What a value of this group's gives to that at `index`."""
+        """Add a term to the derivative by the value with this index. The term comes from a value of the limb group
+        `group` (equal branches, such as legs)."""
         if group == CORE or group == self.sources.group_of(index):
             self.own[index] = self.own[index] + value
         else:
@@ -102,7 +107,8 @@ class _Bars:
             given[group] = given.get(group, 0.0) + value
 
     def of(self, index: int) -> Value:
-        """The derivative by one value, when all that are computed from it have been passed; 0 if nothing is."""
+        """Return the derivative of the weighted sum by the value with this index. All terms must have been added. The
+        derivative is 0 if there are none."""
         if index >= len(self.own):
             return 0.0
         if index in self.from_limbs:
@@ -132,17 +138,20 @@ class _Sources:
         return _Sources(symbols[0].tracer, [symbol.index for symbol in symbols], held)
 
     def group_of(self, index: int) -> int:
-        """The group of limbs that a value belongs to; CORE: none."""
+        """Return the number of the limb group (equal branches, such as legs) to which the value with this index
+        belongs. Return CORE if the value belongs to the trunk."""
         sums = self.tracer.limb_sums
         return CORE if sums is None else sums.group_of(index)
 
     def total(self, group: int, value: Value) -> Value:
-        """The sum over a group's limbs of what one of them gives."""
+        """Return the sum of a value over all limbs of a group. A group is a set of equal branches, such as legs, whose
+        arithmetic is recorded once for all."""
         sums = self.tracer.limb_sums
         return value if sums is None else sums.total(group, value)
 
     def slope(self, index: int, moved: Mapping[int, Value]) -> Value:
-        """The derivative of a value along a tangent, from those of its arguments."""
+        """Return the derivative of the value with this index along the direction. `moved` are the derivatives of
+        earlier values."""
         total: Value = 0.0
         for argument, partial in self.partials(index):
             tangent = moved.get(argument, 0.0)
@@ -156,7 +165,8 @@ class _Sources:
         return self.tracer.limb_sums is not None and index in self.tracer.limb_sums.summed
 
     def partials(self, index: int) -> Iterable[tuple[int, Value]]:
-        """(argument, derivative of value `index` by it) for each argument; the same argument may come twice."""
+        """Return for each argument of the value with this index the argument's index, and the partial derivative by this
+        argument. An argument can occur twice."""
         turned = self._pairs.of(index)
         if turned is not None:
             return (turned.angle, turned.slope), *turned.parts

@@ -1,4 +1,4 @@
-"""PROGRAM as text and back, for tests and documents."""
+"""Converts a PROGRAM (list of operations to generate) to text and back, for tests and documents."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ _SLOT = re.compile(r"([A-Za-z_]\w*)\[(\d+)\]")
 
 
 def show(program: Program) -> str:
-    """One instruction a line: 't2 = mul t0 t1', then 'out tau[0] = t2'."""
+    """Return a PROGRAM (list of operations to generate) as text, with one instruction per line: 't2 = mul t0 t1', then
+    'out tau[0] = t2'."""
     lines = [f"t{i} = {_right_side(instr)}" for i, instr in enumerate(program.body)]
     lines += [f"out {slot} = t{index}" for slot, index in program.outputs]
     return "\n".join(lines)
@@ -26,7 +27,8 @@ def _right_side(instr: Instr) -> str:
 
 
 def parse(text: str) -> Program:
-    """The PROGRAM that `show` would print; names are free. ValueError names the line that is wrong."""
+    """Return the PROGRAM (list of operations to generate) that a text in the form of `show` describes. Names of values
+    can be chosen freely. Raises ValueError that names a wrong line."""
     names: dict[str, int] = {}
     body: list[Instr] = []
     outputs: list[tuple[Slot, int]] = []

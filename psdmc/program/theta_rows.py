@@ -1,7 +1,8 @@
-"""Functions of as many robots as states: a variant of each function with theta_b that reads one theta_b per state.
+"""Makes variants of functions that read other base parameters theta_b for each state, for batches of robots with
+different parameters.
 
-Its arithmetic is that of the variant with one theta_b for all states. As `thetas` is an input like q, it lies in rows and
-lanes as q does, and nothing that is computed from it is shared between states.
+The arithmetic of a variant is that of the function with one theta_b for all states. The variant reads theta_b from the
+input `thetas`, which is laid out like q. The code repeats all arithmetic on theta_b for each state.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ def by_rows(function: Signature) -> Signature:
 
 
 def kernel_by_rows(kernel: Kernel) -> Kernel:
-    """The variant of a kernel with theta_b.
+    """Return the variant of a kernel (one generated function with its lists of operations) that reads one theta_b per
+    state.
 
-    Keeps: output values, bit for bit; the PROGRAMs' order.
+    Keeps: output values, bit for bit; the order of operations.
     """
     single = _renamed(kernel.single)
     return replace(

@@ -1,7 +1,11 @@
-"""Products with the inverse of a matrix of limbs on a core (dynamics/arrow.py), done behind a function's limb stages.
+"""Computes the last matrix products of functions with the inverse of a mass matrix, for robots with limbs. Limbs are
+equal branches, such as legs, on a core (the other joints).
 
-Entries of an output in the rows of one limb and the columns of another belong to both. Stages cannot compute them, and need
-not: they are the limb's shares T times rows of the core, which are in memory by then. There, all columns are neighbours.
+The code for limbs runs in stages, one limb after the other. An entry of the output in the row of one limb and the
+column of another depends on both, so no stage can compute it.
+
+The entry is a product of the limb's factor T with rows of the core (dynamics/arrow.py). After the stages, these rows
+are in memory.
 """
 
 from __future__ import annotations
@@ -22,10 +26,11 @@ INVERSE = "core_inverse"
 
 @dataclass(frozen=True, slots=True)
 class Thin:
-    """A function's output that a trace with limbs gives as factors.
+    """An output matrix that the code for a robot with limbs (equal branches, such as legs) computes as a product of
+    factors.
 
-    name   of the output
-    known  its first columns, which the trace gives themselves where a free joint carries the whole robot
+    name   name of the output
+    known  number of its first columns that are computed without the factors, if a floating base carries the whole robot
     """
 
     name: str
@@ -34,11 +39,12 @@ class Thin:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """Limbs of a group.
+    """The place of the factor T of one group of limbs (equal branches, such as legs). T relates the limbs' rows to rows
+    of the core (the other joints); ThinProducts explains the product.
 
-    vector    of T: for each row of each limb an entry per carrier
-    rows      of the outputs, limb by limb
-    carriers  numbers of the core's rows that T's columns belong to
+    vector    name of the vector of T: one row after the other, with an entry for each carrier
+    rows      rows of the output matrix that belong to the group, limb by limb
+    carriers  for each column of T, the row of the core that belongs to it, counted within the core from 0
     """
 
     vector: str
@@ -53,14 +59,17 @@ class Shares:
 
 @dataclass(frozen=True, slots=True)
 class ThinProducts:
-    """Outputs n x n with x = - V E in the rows of the core, and Y - T x in those of a limb. Stages store V, T and E, and
-    store Y in the outputs.
+    """Outputs (n, n) that are products of factors, for a robot with limbs (equal branches, such as legs) on a core.
 
-    outputs  their names, and
-    known    how many of their first columns stages store themselves
-    n        rows, and columns
+    The rows x of the core (the other joints) are x = -V E. The rows of a limb are Y - T x. Here V is the core's block
+    of the inverse mass matrix, E the right side, T the factor of the limb. The code for limbs computes V, T and E, and
+    stores Y in the outputs first.
+
+    outputs  names of the outputs
+    known    for each output, the number of first columns that are stored without the products
+    n        number of rows and of columns, which is the number of joint rates
     core     rows of the core
-    groups   of limbs
+    groups   the factor T of each group of limbs
     """
 
     outputs: tuple[str, ...]
@@ -71,24 +80,25 @@ class ThinProducts:
 
     @staticmethod
     def right(output: str) -> str:
-        """Vector of E: the core's rows, one after the other."""
+        """Return the name of the vector of the factor E of an output: the rows of the core, one after the other."""
         return f"{output}_core"
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Vectors of V, T and E with their lengths."""
+        """Return the vectors of the factors V, T and E: name -> length."""
         wide = len(self.core)
         found = {INVERSE: wide**2} | {group.vector: group.size for group in self.groups}
         return found | {self.right(output): wide * self.n for output in self.outputs}
 
     @property
     def narrowest(self) -> int:
-        """The least number of columns of an output that are computed here."""
+        """Return the smallest number of columns that the products compute in any of the outputs."""
         return self.n - max(self.known)
 
     @property
     def written(self) -> set[Slot]:
-        """The outputs' rows of the core, and entries of E that are not read."""
+        """Return the entries that the code for limbs does not store. These are the outputs' rows of the core, which the
+        products compute, and entries of E that the products do not read."""
         wide, n = len(self.core), self.n
         found: set[Slot] = set()
         for output, known in zip(self.outputs, self.known, strict=True):
@@ -98,14 +108,16 @@ class ThinProducts:
 
     @property
     def cost(self) -> Cost:
-        """Operations on AT_ONCE columns: a multiply-add for each entry of V and T but the first of each row of V."""
+        """Return the cost of the products. C code computes AT_ONCE columns together, and one operation on them counts
+        once. Each entry of V and T costs a multiply-add, the first of each row of V a multiplication."""
         blocks = sum(-(-(self.n - known) // AT_ONCE) for known in self.known)
         mul = blocks * (len(self.core) ** 2 + sum(group.size for group in self.groups))
         add = mul - blocks * len(self.core)
         return Cost(mul, add, div=0, neg=0, sincos=0, fused=add)
 
     def place(self, slot: Slot, factors: str) -> Slot:
-        """Where an entry of a trace's outputs is stored; `factors`: the name of V and T there."""
+        """Return the place (slot) in memory of an entry that the recorded arithmetic computes. `factors` is the name of
+        the quantity that contains V and T."""
         row, column = divmod(slot.index, self.n)
         known = dict(zip(self.outputs, self.known, strict=True)).get(slot.vector, self.n)
         if row in self.core and column >= known:
@@ -119,7 +131,8 @@ class ThinProducts:
         return Slot(group.vector, group.rows.index(row) * len(group.carriers) + group.carriers.index(number))
 
     def multiplied(self, stored: Mapping[Slot, Any]) -> Iterator[tuple[Slot, Any]]:
-        """The outputs, entry by entry, from all that stages have stored; what they have not stored is zero."""
+        """Yield each entry of the outputs that the products compute, as (slot, value). `stored` are the factors V, T, E
+        and Y; entries that are missing count as zero."""
         n, wide = self.n, len(self.core)
         for output, known in zip(self.outputs, self.known, strict=True):
             for column in range(known, n):

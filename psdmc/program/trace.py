@@ -1,11 +1,12 @@
-"""Symbols that record the arithmetic done to them as a PROGRAM, and simplify it as they go.
+"""Symbols stand for numbers and record every operation on them in a PROGRAM (list of operations to generate).
+Operations are simplified at the same time.
 
-Equal expressions are recorded once: values are hash-consed, commutative arguments sorted, and a sign is kept beside a
-value instead of being computed, so that a - b and b - a, or x * y and x * -y, are one instruction. Exact zeros and ones
-disappear; constants fold and merge along products (which reorders floating point).
+Equal operations are recorded once; the order of commutative arguments does not matter. A sign is stored with the symbol
+and costs no operation. So a - b and b - a, or x * y and x * -y, are one instruction. Exact zeros and ones disappear.
+Constants along a product are multiplied into one, which reorders floating point.
 
-A search traces some hundred programs. The arithmetic of symbols is therefore written out in place, on plain tuples,
-which become instructions only in `finish`.
+A search for the best arrangement records some hundred PROGRAMs. For speed, the arithmetic of symbols works on plain
+tuples without function calls. `finish` turns the tuples into instructions.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _LOAD, _CONST = Op.LOAD, Op.CONST
 
 
 def arguments_of(step: Step) -> tuple[int, ...]:
-    """The indices of the values that a step is computed from."""
+    """Return the indices of the values that a recorded operation takes as arguments."""
     op, a, b = step
     if b is not None:
         return (a, b)
@@ -45,32 +46,39 @@ Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
 
 
 def group_name(group: int) -> str:
-    """What the names of a group's vectors begin with."""
+    """Return the prefix, such as 'group0', of the names of all vectors of a limb group (equal branches, such as
+    legs)."""
     return f"group{group}"
 
 
 def constants_of(group: int) -> str:
-    """Name of the vector of a group's constants."""
+    """Return the name of the vector that holds the constants that differ between the limbs of a group. Limbs are equal
+    branches, such as legs."""
     return f"{group_name(group)}_constants"
 
 
 class SumsOverLimbs(Protocol):
-    """What a tracer knows of its sums over limbs (limb_sums.py)."""
+    """The interface by which a Tracer (recorder of operations) sums values over limbs, which are equal branches such as
+    legs. The class that implements it is in limb_sums.py."""
 
     summed: dict[int, int]
 
     def group_of(self, index: int) -> int:
-        """The number of the group whose limbs a value differs between; -1: of none."""
+        """Return the number of the limb group (equal branches, such as legs) on whose limb a value depends. Return -1
+        if the value does not depend on a limb."""
 
     def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
-        """The sum over a group's limbs of a scalar that is one for each of them."""
+        """Return the sum of a value over all limbs of a group. The arithmetic of a limb is recorded once, so one symbol
+        stands for the value of every limb."""
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Inputs that differ between limbs where values do."""
+        """Return new input symbols that stand for these values. An input differs between limbs (equal branches) if its
+        value does."""
 
 
 class Tracer:
-    """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
+    """Records operations on symbols. `symbols` makes inputs, and `finish` makes the PROGRAM (list of operations to
+    generate)."""
 
     __slots__ = ("__weakref__", "_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
@@ -87,7 +95,8 @@ class Tracer:
         return [self.symbol(slot) for slot in slots_of(vector, count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Inputs that stand for values until these are put in their place (replay.py)."""
+        """Return new input symbols that stand for these values. Later, `substituted` (replay.py) puts the values in
+        their place."""
         if self.limb_sums is None:
             return self.symbols(vector, len(values))
         return self.limb_sums.stand_ins(vector, values)
@@ -97,7 +106,8 @@ class Tracer:
         return Symbol(self, self.record((_LOAD, slot, None)))
 
     def record(self, step: Step) -> int:
-        """The index of a step's value, recorded now or before."""
+        """Return the index of the value that an operation computes. The operation is recorded if no equal operation has
+        been."""
         index = self.known.get(step)
         if index is None:
             index = self.known[step] = len(self.steps)
@@ -105,7 +115,7 @@ class Tracer:
         return index
 
     def constant(self, value: Constant) -> Symbol:
-        """A constant; its sign is kept beside it."""
+        """Return a symbol for a constant. The recorded constant is positive; the symbol stores the sign."""
         if isinstance(value, Lanes):
             return self._lanes(value)
         # A Python number even where it is NumPy's: signs are compared by identity, which fails for its booleans.
@@ -135,14 +145,15 @@ class Tracer:
         return index
 
     def arguments(self, index: int) -> tuple[int, ...]:
-        """The indices of the values that a value is computed from; of a sum over limbs the one that is summed."""
+        """Return the indices of the arguments of the value with this index. A sum over limbs (equal branches) has one
+        argument: the value that is summed."""
         if self.limb_sums is not None and index in self.limb_sums.summed:
             return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
 
     def needed(self, roots: Collection[int], known: Collection[int]) -> list[bool]:
-        """For each value up to the last root, whether a root is computed from it. What known values are computed from does
-        not count."""
+        """Return for each value up to the last root whether a root is computed from it. The search does not go on behind
+        known values."""
         needed = [False] * (max(roots, default=-1) + 1)
         for root in roots:
             needed[root] = True
@@ -157,8 +168,8 @@ class Tracer:
         return needed
 
     def finish(self, outputs: Outputs) -> Program:
-        """The PROGRAM that stores the given values; a negative one costs a negation. Steps that no output needs are left
-        out."""
+        """Return the PROGRAM (list of operations to generate) that stores these values as outputs. Operations that no
+        output needs are left out. If the symbol of an output has a minus sign, a negation is added."""
         stored = self.stored(outputs)
         steps = self.steps
         needed = [False] * len(steps)
@@ -180,8 +191,8 @@ class Tracer:
         return Program(tuple(body), tuple((slot, places[i]) for slot, i in stored))
 
     def cost(self, outputs: Outputs) -> Cost:
-        """The cost of the PROGRAM that `finish` would give, values that no output needs left out. For searches, which
-        only compare."""
+        """Return the number of operations of each kind in the PROGRAM that `finish` would return. It is faster than
+        `finish`, for searches that only compare costs."""
         stored = self.stored(outputs)
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
@@ -216,7 +227,8 @@ class Tracer:
         return counted(others, mul, len(sums), len(angles), fused)
 
     def stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
-        """The outputs with the indices of their values, recorded where they are constants or negative."""
+        """Return for each output its place (slot) and the index of its value. Outputs that are constants or have a
+        minus sign are recorded as operations first."""
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
             if isinstance(value, Lanes):
@@ -228,7 +240,8 @@ class Tracer:
         return stored
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """An operation that symbols have no operator for; of numbers a constant, where it is finite."""
+        """Record an operation, such as a square root, for which Python has no operator, and return a symbol for its
+        result. If all arguments are numbers and the result is finite, the result is a constant."""
         given = [each if isinstance(each, Symbol) else self.constant(each) for each in arguments]
         known = [value for each in given if isinstance(value := each.constant_value(), float)]
         if len(known) == len(given):
@@ -328,16 +341,17 @@ class Symbol:
         return Symbol(self.tracer, sine, self.negative), Symbol(self.tracer, cosine)
 
     def root(self) -> Symbol:
-        """The square root; of a constant a constant."""
+        """Return the square root of this symbol. If the symbol is a constant, the root is a constant, too."""
         return self.tracer.operated(Op.SQRT, (self,))
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """The value of an operation on symbols and constants, of which this is one."""
+        """Return the result of an operation, such as a minimum, on symbols and numbers. This symbol is one of the
+        arguments."""
         return self.tracer.operated(op, arguments)
 
     @property
     def slot(self) -> Slot | None:
-        """The input that this is; None where it is computed."""
+        """Return the place (slot) that this symbol is loaded from if it is an input; None if it is computed."""
         op, slot, _ = self.tracer.steps[self.index]
         return slot if op is _LOAD and not self.negative else None
 

@@ -1,9 +1,8 @@
-"""Turned pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Each is the derivative of the other by the
-angle, up to sign.
+"""Finds rotated pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Here c and s are the cosine and the
+sine of an angle. The derivative of y0 by the angle is y1, and that of y1 is -y0.
 
-The derivative by the angle of a sum of two products with its sine and cosine is another such sum. Where that sum is
-recorded already, as it is wherever a vector is turned, a derivative takes it instead of differentiating sine and
-cosine: one product instead of two, and one sum.
+If a vector is rotated, both values of such a pair are recorded. The derivative by the angle then uses the other value
+and needs no derivatives of sine and cosine. This takes one product instead of two products and one sum.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ _SUMS = (Op.ADD, Op.SUB)
 
 
 class Part(NamedTuple):
-    """A value that a turned one is linear in: its index, and the sine or cosine, with sign, that multiplies it."""
+    """One term of a rotated value y = c x0 + s x1: the index of x0 or x1, and its factor, a signed sine or cosine."""
 
     value: int
     factor: Symbol
 
 
 class Turned(NamedTuple):
-    """One value of a turned pair, by the angle and by what is turned.
+    """One value y = c x0 + s x1 of a rotated pair, with the cosine c and the sine s of an angle.
 
     angle  index of the angle
-    slope  the recorded derivative by it
-    parts  what is turned
+    slope  symbol of the derivative of y by the angle, which is the other value of the pair
+    parts  the terms c x0 and s x1
     """
 
     angle: int
@@ -50,9 +49,9 @@ class _Product(NamedTuple):
 
 
 class TurnedPairs:
-    """Finds turned pairs among a tracer's values.
+    """Finds pairs y0 = c x0 + s x1 and y1 = c x1 - s x0 among the values that a tracer has recorded.
 
-    needed  for each value whether it is used anyway; other values are not worth computing
+    needed  for each recorded value, whether the code computes it anyway; a pair is used only if both values are
     """
 
     def __init__(self, tracer: Tracer, needed: Sequence[bool]) -> None:
@@ -60,7 +59,8 @@ class TurnedPairs:
         self._uses, self._is_product = _uses(tracer, needed)
 
     def of(self, index: int) -> Turned | None:
-        """Value `index` as one of a turned pair; None where it is none, or its slope is not recorded."""
+        """Return the rotated value (see Turned) with this index. Return None if the value is not of the form c x0 + s
+        x1, or if its derivative by the angle is not recorded."""
         op, a, b = self._tracer.steps[index]
         if op is Op.MUL:
             if not self._is_product[index]:

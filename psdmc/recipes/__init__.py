@@ -1,1 +1,2 @@
-"""The parts that a generated function is made of; the functions themselves are in psdmc/functions."""
+"""The parts of which recipes for generated functions consist. A recipe says how one function is computed and tested;
+the recipes are in psdmc/functions."""

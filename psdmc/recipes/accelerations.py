@@ -1,4 +1,4 @@
-"""Forward dynamics on a trace's ingredients, which several functions need."""
+"""Records forward dynamics (accelerations from torques) as code, for all generated functions that need it."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ MASS_MATRIX = SymmetricMatrix(
 
 
 def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Arrow]:
-    """n accelerations M^-1 (tau - h), and the factors of M.
+    """Return the n joint accelerations M^-1 (tau - h), where M is the mass matrix and h the torque at zero
+    acceleration. Return the factors of M, too.
 
-    The mass matrix is factorized before the bias is found: its divisions depend on each other, and the processor
-    computes the recursion meanwhile.
+    M is factorized before h is computed. The divisions of the factorization must wait for each other, and the processor
+    computes h meanwhile.
     """
     factors = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
@@ -38,7 +39,11 @@ def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], 
 def accelerations_and_pivots(
     g: Ingredients, tau: Sequence[Scalar]
 ) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
-    """nv accelerations M^-1 (tau - h) and the nv pivots of M, by the way that the choices say."""
+    """Return the nv joint accelerations M^-1 (tau - h), and the nv pivots (divisors in the factorization) of the mass
+    matrix M. Here h is the torque at zero acceleration.
+
+    `choices` selects the algorithm: factorization of M, or articulated bodies.
+    """
     if not g.choices.articulated:
         found, factors = accelerations(g, tau)
         return found, factors.pivots

@@ -1,4 +1,4 @@
-"""Contacts on a trace's ingredients, on arrays and in Pinocchio, which several functions need."""
+"""Contact forces, for several generated functions: recorded as code, computed in NumPy, and computed with Pinocchio."""
 
 from __future__ import annotations
 
@@ -61,12 +61,13 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 class Held(NamedTuple):
-    """Which rows of the contacts the world holds, and how.
+    """The contacts that act on a robot. The world prescribes the accelerations of the active contacts, along 3 or 6
+    axes (rows) for each.
 
-    named   the named frames
-    active  an entry for each contact
-    mu      regularisation
-    si      gives a constant from its value and its unit
+    named   the named frames, some of which are contacts
+    active  1 for each contact that touches the world, else 0
+    mu      regularisation: what is added to the diagonal of J M^-1 J^T
+    si      returns a constant from its value and its unit
     """
 
     named: Sequence[NamedFrame]
@@ -77,7 +78,8 @@ class Held(NamedTuple):
     def solved(
         self, factors: Factors, jacobian: Rows, load: Sequence[Scalar], wanted: Sequence[Scalar]
     ) -> tuple[Constrained, list[Scalar]]:
-        """The solution of `constrained`, and a sign for each contact: -1 where there is none."""
+        """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact,
+        too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
         si, rows = self.si, [each.rows for each in self.named if each.rows]
         shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
         unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
@@ -105,7 +107,12 @@ class Held(NamedTuple):
 def held_on_arrays(
     robot: RobotOnArrays, given: Mapping[str, Array], wanted: Callable[[Array], Array]
 ) -> tuple[Array, Array, Array]:
-    """(k, nv) x, (k, rows) f and the pivots of `constrained` without a load; `wanted` (k, rows) from J (k, rows, nv)."""
+    """Solve for the motion with active contacts, in NumPy, for k states without applied torques.
+
+    Return the motion x (k, nv), such as accelerations, the contact forces f (k, rows), and numbers that must be
+    positive. These are the pivots of the mass matrix and a sign for each contact. `wanted` computes the prescribed
+    motion of the contacts (k, rows) from the contact Jacobian J (k, rows, nv).
+    """
     q, count = list(given["q"].T), len(given["q"])
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])
@@ -124,7 +131,11 @@ def held_on_arrays(
 def dense_solution(
     robot: Reference, given: Mapping[str, Array], jacobian: Array, load: Array, wanted: Array
 ) -> tuple[Array, Array]:
-    """(k, nv) x and (k, rows) f of the dense systems [[M, -J^T], [J, mu]] of the active rows, by Pinocchio's M."""
+    """Return the motion x (k, nv) and the contact forces f (k, rows) for k states. They are the reference for tests.
+
+    They solve the full linear system M x - J^T f = load, J x + mu f = wanted. M is Pinocchio's mass matrix, J the
+    Jacobian of the active contacts and mu the regularisation.
+    """
     counts = [rows for _, rows in robot.contacts]
     masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
     found = np.concatenate([load, np.zeros_like(wanted)], axis=1)

@@ -1,4 +1,5 @@
-"""How coordinates and rates of joints go over into each other, as matrices on arrays of states."""
+"""Matrices that convert changes of joint coordinates (such as quaternions) to joint rates (such as angular velocities)
+and back, for k states."""
 
 from __future__ import annotations
 
@@ -15,31 +16,38 @@ from psdmc.robot.mechanism import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateMaps:
-    """Of the joints in a row; q (k, nq), qd (k, nv)."""
+    """Conversions between changes of coordinates and joint rates, for a sequence of joints. For k states, q is (k, nq)
+    and qd is (k, nv); nq and nv are the numbers of coordinates and of rates."""
 
     joints: Sequence[JointType]
 
     def rates(self, q: Array) -> Array:
-        """(k, nq, nv) rates of the coordinates by rates."""
+        """Return the matrices (k, nq, nv) that multiply joint rates qd to give the time derivatives of the coordinates
+        q. A matrix depends on q."""
         parts = self._parts(q, None)
         return _diagonal(
             [_columns(partial(kind.coordinate_rates, own), kind.nv, len(q)) for kind, own, _ in parts]
         )
 
     def bent(self, q: Array, qd: Array) -> Array:
-        """(k, nq, nv) the same rates of the coordinates, at fixed rates, by small motions along the tangent."""
+        """Return the derivatives (k, nq, nv) of the time derivative of q by small motions of the joints. The joint
+        rates qd are fixed.
+
+        The nv motions are along the directions of the joint rates; a quaternion moves by small rotations.
+        """
         parts = self._parts(q, qd)
         return _diagonal(
             [_columns(partial(kind.rates_bent, own, way), kind.nv, len(q)) for kind, own, way in parts]
         )
 
     def tangents(self, q: Array) -> Array:
-        """(k, nv, nq) motions along the tangent of the restored q by those of its coordinates."""
+        """Return the matrices (k, nv, nq) that multiply changes of q to give the joint motions. Quaternions in q may
+        have any length; the motion is that of the quaternion normalized to length one."""
         parts = self._parts(q, None)
         return _diagonal([_columns(partial(kind.tangent, own), kind.nq, len(q)) for kind, own, _ in parts])
 
     def restored(self, q: Array) -> Array:
-        """(k, nq) with quaternions of length one and so on."""
+        """Return q (k, nq) with the nearest valid coordinates. For example, quaternions get length one."""
         return columns([x for joint, own, _ in self._parts(q, None) for x in joint.restored(own)], len(q))
 
     def _parts(self, q: Array, qd: Array | None) -> Iterator[tuple[JointType, list[Array], list[Array]]]:

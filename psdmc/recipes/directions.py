@@ -1,4 +1,4 @@
-"""Derivatives along a direction: tangents of inputs, cotangents of outputs, and torques differentiated by both."""
+"""Derivatives along a given change of the inputs, and gradients of weighted sums of the outputs, for joint torques."""
 
 from __future__ import annotations
 
@@ -68,7 +68,11 @@ _FREE = "free_qdd"
 def torque_gradients(
     g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
-    """Gradients of the weighted torques by q (nv, along the tangent) and by qd, at fixed computed accelerations."""
+    """Return the gradients of the weighted sum of torques, sum of weights[i] tau[i], by q and by qd, nv entries each.
+    The accelerations `qdd` count as constants.
+
+    The entries for q are for small motions along the joint rates; a quaternion moves by small rotations.
+    """
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
     found = substituted([*by_q, *by_qd], free, qdd)
@@ -76,7 +80,8 @@ def torque_gradients(
 
 
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
-    """l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, Y their regressor."""
+    """Return the l derivatives of the weighted sum of torques, sum of weights[i] tau[i], by the base parameters
+    theta_b. They are Y^T weights, where Y is the regressor. The accelerations `qdd` count as constants."""
     theta_b, bodies, drives = g.by_theta()
     loose, free = replace(g, bodies=bodies, drives=drives), _free(g, qdd)
     (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base_acceleration), weights, (theta_b,))
@@ -84,7 +89,8 @@ def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[
 
 
 def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
-    """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
+    """Return the derivatives of the joint torques along the changes dq of q and dqd of qd. The accelerations `qdd`
+    count as constants."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     along = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name]]
     return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
@@ -120,7 +126,8 @@ def with_parameter_gradient(
     reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
     pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
 ) -> Recipe:
-    """The recipe of `state`'s function with the gradient by theta_b as one more output, called NAME_parameters."""
+    """Return the recipe of a function NAME_parameters. It has the outputs of the function NAME (recipe `state`), and
+    the gradient by theta_b as an additional output."""
     known = state.signature
     return Recipe(
         Signature(

@@ -1,4 +1,5 @@
-"""A robot's dynamics on arrays of states by psdmc.dynamics, for the NumPy references of functions."""
+"""Computes a robot's dynamics in NumPy for many states at once. Tests compare generated functions with these
+results."""
 
 from __future__ import annotations
 
@@ -25,9 +26,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RobotOnArrays:
-    """A chain with standard parameters x, (11 n,) about the link frames, which have the torques of theta_b.
+    """A robot whose links have standard parameters x that give the torques of the base parameters theta_b. Dynamics are
+    computed in NumPy for many states at once.
 
-    lift   (11 n, l) theta_b to such parameters
+    x      (11 n,) standard parameters about the link frames, 11 for each of n links
+    lift   (11 n, l) matrix that gives x from the l base parameters
     """
 
     chain: Mechanism
@@ -36,7 +39,7 @@ class RobotOnArrays:
 
     @staticmethod
     def of(model: DynamicsModel, theta_b: Array) -> RobotOnArrays:
-        """The robot of a model, with these base parameters."""
+        """Return the robot of a model, with the base parameters `theta_b`."""
         return RobotOnArrays(model.mechanism, times(model.representative, theta_b), model.representative)
 
     @property
@@ -65,7 +68,7 @@ class RobotOnArrays:
 
     @cached_property
     def solids(self) -> tuple[Body, ...]:
-        """The links' own bodies, from the chain's standard parameters."""
+        """Return the links' bodies with the robot's known standard parameters, not with those made from theta_b."""
         return bodies_of(self.chain, self.chain.parameters)
 
     def torques(
@@ -77,8 +80,12 @@ class RobotOnArrays:
         qd_r: Array | None = None,
         external: Mapping[int, Wrench] = NO_WRENCHES,
     ) -> Array:
-        """(k, n) joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, with the base's acceleration and external
-        wrenches."""
+        """Return the joint torques (k, n) M qdd + C(q, qd) qd_r for k states. C(q, qd) is the Coriolis matrix; without
+        qd_r, it multiplies qd.
+
+        `base_acceleration` is the acceleration of the base, which includes gravity. `external` are the wrenches on the
+        links.
+        """
         rates = None if qd_r is None else list(qd_r.T)
         given = (list(q.T), list(qd.T), list(qdd.T))
         torques = inverse_dynamics(
@@ -87,7 +94,8 @@ class RobotOnArrays:
         return columns(torques, len(q))
 
     def torque_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """(k, n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
+        """Return the derivatives of the joint torques by q, by qd and by qdd, an array (k, n, n) each, for k states.
+        Row i has the derivatives of tau[i]."""
         given = (list(q.T), list(qd.T), list(qdd.T))
         found = inverse_dynamics_derivatives(
             self.frames, self.bodies, self.drives, *given, self.base_acceleration
@@ -114,12 +122,14 @@ def columns(values: Sequence[Scalar], count: int) -> Array:
 
 
 def matrix(rows: Sequence[Sequence[Scalar]], count: int) -> Array:
-    """(count, rows, columns) from numbers or (count,) arrays."""
+    """Return an array (count, rows, columns), with one matrix for each of `count` states. The entries of `rows` are
+    numbers, or arrays (count,) with a value per state."""
     return np.stack([columns(row, count) for row in rows], axis=1)
 
 
 def entries(values: Any, count: int) -> Array:
-    """(count, ...) from a number, a (count,) array, or nested sequences of them."""
+    """Return an array (count, ...) with one entry for each of `count` states. `values` are a number, an array (count,),
+    or nested sequences of them."""
     if isinstance(values, list | tuple):
         return np.stack([entries(value, count) for value in values], axis=1)
     return np.broadcast_to(np.asarray(values, dtype=np.float64), (count,))

@@ -1,4 +1,4 @@
-"""Functions that put out the entries of a matrix that can differ from zero, one after the other, and no others."""
+"""Functions that return only those entries of a matrix that can differ from zero, as a vector."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ VALUES = Quantity(
 
 
 def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packing) -> Recipe:
-    """The recipe of a function that packs `dense`, a function of one matrix."""
+    """Return the recipe of a function that returns the nonzero entries of a matrix as a vector. The function `dense`
+    computes the whole matrix."""
     function, (matrix,) = dense.signature, dense.signature.outputs
 
     def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -51,7 +52,8 @@ def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packi
 
 
 def unpacked(packing: Packing, dense: Recipe, robot: RobotOnArrays, values: Array) -> Arrays:
-    """The outputs of `dense` from the values of the function that packs it, (k, nonzeros)."""
+    """Return the whole matrices that `dense` would return, from the vectors (k, nonzeros) of their nonzero entries, for
+    k states."""
     (matrix,) = dense.signature.outputs
     lengths = {"nv": robot.nv, "l": robot.lift.shape[1]}
     found = np.zeros((len(values), *(lengths[axis] for axis in matrix.axes)))

@@ -1,4 +1,5 @@
-"""Pivots of matrices that are singular at some states."""
+"""Tests whether matrices in generated code are singular at a state, from pivots (divisors of a factorization) and from
+their inverses."""
 
 from __future__ import annotations
 
@@ -14,11 +15,12 @@ so many roundings: 7.1e-15 in float64, 3.8e-6 in float32. That of arms with too 
 
 
 def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], Scalar]:
-    """The inverse of a symmetric matrix, and 1 if the matrix is positive definite, -1 if it is not, or is singular but for
-    rounding.
+    """Return the inverse of a symmetric matrix, and a sign: 1 if the matrix is positive definite, else -1. A matrix
+    that is singular within rounding has the sign -1, too.
 
-    Rounding gives a singular matrix pivots of any sign, but its inverse is large, in whatever order it is eliminated. In
-    x < x + 1 the 1 is lost if x is too large for the precision of the code's reals. Nothing is less than NaN.
+    By rounding, the pivots (divisors of the factorization) of a singular matrix can have any sign. So the test also
+    uses the size of the inverse. The comparison x < x + 1 is false if x is so large that the 1 is lost in rounding. All
+    comparisons with NaN are false.
     """
     factors = factorize(rows)
     found, sign = inverse(factors), 1.0
@@ -28,7 +30,10 @@ def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar
 
 
 def regular(sign: Scalar, pivot: Scalar, entry: Scalar, inverse_entry: Scalar) -> Scalar:
-    """The sign, -1 if a pivot is not positive, or the matrix is singular but for rounding, by this entry of its diagonal and
-    that of its inverse."""
+    """Return `sign` unchanged if a matrix passes the test of one row, else -1. The test fails if the pivot (divisor of
+    the factorization) is not positive, or if the matrix is singular within rounding.
+
+    `entry` is the diagonal entry of the matrix, `inverse_entry` that of the inverse.
+    """
     x = LOST * (entry * inverse_entry)
     return Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)

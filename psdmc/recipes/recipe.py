@@ -1,4 +1,5 @@
-"""The form in which a file of psdmc/functions says how one generated function is made and compared with others."""
+"""The class Recipe, which says how a generated function is computed and with what it is compared. Each file of
+psdmc/functions contains one recipe."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ Arrays = dict[str, Array]
 
 
 class ByTheta(NamedTuple):
-    """l base parameters as symbols, and the bodies and drives that stand for them."""
+    """The base parameters theta_b as l symbols, and the bodies and the drive inertias computed from these symbols."""
 
     theta_b: list[Any]
     bodies: tuple[Body, ...]
@@ -38,30 +39,34 @@ class ByTheta(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ingredients:
-    """What a trace runs on: symbols, and one robot's constants.
+    """Everything from which the code of a function is recorded: symbols for the function's inputs, and the constants of
+    one robot.
 
-    They are quantities: each has a dimension and a value in units that lowering chooses (lower/units.py). A sum of unlike
-    ones is an error.
+    Each symbol and constant is a quantity with a dimension and a value in units that lowering chooses (lower/units.py).
+    A sum of unlike quantities is an error.
 
     frames             n joint frames
-    base_acceleration  minus gravity, along the axes that the first frame turns from
-    bodies             n bodies about the joint frames, and
-    drives             n drive inertias, from theta_b: they have the torques of the real ones and nothing else of them.
-                       Empty for functions without theta_b
-    choices            how the recursions are arranged
-    base_axes          axes that the first frame turns from as columns in the base frame, and
-    base_origin        their origin there
-    link_frames        n, the file's link frames in the joint frames
+    base_acceleration  minus gravity, along the base's axes (see base_axes)
+    bodies             n bodies about the joint frames, computed from theta_b. They give the torques of the real bodies,
+                       but have other masses. Empty for functions that do not use theta_b
+    drives             n inertias of the joints' drives, computed from theta_b. Empty for functions that do not use
+                       theta_b
+    choices            which of several equal ways each recursion along the robot is computed in
+    base_axes          axes in which the placement of the first joint is given: columns, in the base frame
+    base_origin        origin from which the placement of the first joint is given, in the base frame
+    link_frames        placements of the n link frames of the robot file in the joint frames
     named              the named frames, placed in the joint frames
-    tip                the tip frame, in the joint frame of
-    tip_body           the body that it is fixed to
-    lift               (11 n, l) theta_b to standard parameters about the link frames
-    link_bodies        gives the links' own n bodies about the joint frames, of NaN where unknown
-    si                 gives a constant, from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'); a number without unit is
-                       itself
+    tip                the tip frame, in the joint frame of tip_body
+    tip_body           the body to which the tip frame is fixed
+    lift               (11 n, l) matrix that gives standard parameters about the link frames from theta_b
+    link_bodies        returns the n bodies with the robot file's standard parameters, about the joint frames; NaN if
+                       unknown
+    si                 returns a constant from its value and its unit: si(0.3, 'm'), si(1.5, 'N/m'). A number without
+                       unit needs no si
     inputs             the function's inputs by name
-    by_theta           theta_b as symbols, also where it is compiled in, for derivatives by it: the derivatives of
-                       quantities that are linear in theta_b, such as torques, do not depend on its values
+    by_theta           returns theta_b as symbols, for derivatives by theta_b. The function can be called even if the
+                       code contains fixed values of theta_b: torques are linear in theta_b, so derivatives do not
+                       depend on the values
     """
 
     frames: tuple[Frame, ...]
@@ -83,7 +88,8 @@ class Ingredients:
 
     @property
     def root(self) -> tuple[Matrix, Vector]:
-        """Axes that the first frame turns from and their origin, in the base frame."""
+        """Return the axes and the origin, in the base frame, relative to which the placement of the first joint is
+        given."""
         return self.base_axes, self.base_origin
 
     @property
@@ -93,7 +99,8 @@ class Ingredients:
 
 
 class Polynomials(StrEnum):
-    """Which part of the torques expanded in E, P and theta_b a function is; the expanded lowering needs it."""
+    """The terms of the joint torques that a function computes in the expanded form of code. There the torques are sums
+    of products of theta_b, constants, and functions of q, qd and qdd."""
 
     TORQUE = "all terms"
     MASS = "terms of qdd"
@@ -104,7 +111,7 @@ class Polynomials(StrEnum):
 
 
 class Needs(StrEnum):
-    """What a model must have beyond theta_b."""
+    """A property of a model, besides known base parameters, that a generated function needs."""
 
     POSITIVE_MASS = "a positive definite mass matrix"
     STANDARD = "standard parameters of its links"
@@ -112,11 +119,12 @@ class Needs(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """Entries of a matrix.
+    """The entries of a matrix that a function with packed output (a vector of nonzero entries) stores.
 
-    function     name of the function that puts out the whole matrix and nothing else
-    places       their (row, column), from the robot and the lift of its base parameters
-    is_triangle  whether they are a symmetric matrix's lower triangle
+    function     name of the function whose only output is the whole matrix
+    places       returns the entries' rows and columns, from the robot and the matrix that gives standard parameters
+                 from base parameters
+    is_triangle  whether the entries are the lower triangle of a symmetric matrix
     """
 
     function: str
@@ -126,33 +134,37 @@ class Packing:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """One generated function.
+    """Everything about one generated function: name, arguments, computation, and comparison with Pinocchio.
 
-    signature    what it reads and puts out
-    title        its name in prose
-    trace        its arithmetic over psdmc.dynamics on symbols
-    reference    the same in NumPy on the MODEL's own frames and bodies, no lowering involved: (robot, given) to the values
-                 of all outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
-    against      name of Pinocchio's function that it is compared with
-    pinocchio    the values of Pinocchio's function: (model on arrays, given)
-    starts       name of the function whose search decides where frames sit and the unit of length
-    shares       name of the function whose whole arrangement is used; only the choices within it are made again
-    matters      fields of Choices that make a difference to it
-    polynomials  what the expanded lowering needs; None: there is none for this function
-    times_theta  whether its outputs times theta_b are torques and are compared as such: `pinocchio` gives these torques
-    gradient     name of its output that is the gradient by theta_b of a number linear in theta_b. It is compared as that
-                 number, times theta_b, which `pinocchio` gives
-    beside       name of the function whose values this one's are differences of: errors are measured relative to those
-    needs        what the model must have; left out: a positive definite mass matrix where the signature factorises one
-    in_limbs     whether its algorithms say what they sum over limbs (Frame.limbs), so that these can run in lanes
-    accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
-    default      whether it is generated where no functions are named, and
-    default_where_wide  whether it is then where some joint has several coordinates
-    benched      whether `make bench` measures it
-    packs        the matrix some of whose entries it puts out: its own function is lowered, and the other entries are left
-                 out. Its `trace`, and the values of `pinocchio`, are that function's
-    regions      its body as regions, which the C is made of; its `trace` is those regions written out. None: the C is the
-                 straight line
+    signature    the function's name, inputs and outputs
+    title        the function's name in documents
+    trace        records the function's arithmetic on symbols, with the algorithms of psdmc.dynamics
+    reference    computes all outputs in NumPy from the model's frames and bodies, without generated code: takes (robot,
+                 given). `given` holds q, qd, qdd, tau and other inputs for many states; tau are the torques of q, qd
+                 and qdd
+    against      name of Pinocchio's function with which the results are compared
+    pinocchio    computes the results with Pinocchio: takes (robot, given)
+    starts       name of the function whose search chooses the positions of frames and the unit of length
+    shares       name of a function whose search results are used, too; only the choices among recursions are made again
+    matters      fields of Choices that change the function's code
+    polynomials  which terms of the torques' polynomials the function computes; None: the function has no expanded form
+                 of code
+    times_theta  whether the outputs times theta_b are torques, and `pinocchio` returns these torques for comparison
+    gradient     name of the output that is the gradient, by theta_b, of a scalar linear in theta_b. The gradient times
+                 theta_b is compared with this scalar, which `pinocchio` returns
+    beside       name of another function if the outputs are differences of its values: errors are relative to the
+                 values of this other function
+    needs        what the model must have; left out: a positive definite mass matrix if the signature factorises one
+    in_limbs     whether the algorithms mark sums over limbs (equal branches, such as legs), so that limbs can run in
+                 SIMD lanes
+    accelerates  whether the function computes accelerations, by the cheaper of two algorithms (Choices.articulated)
+    default      whether the function is generated if the user names no functions
+    default_where_wide  `default` for robots that have joints of several coordinates, such as a floating base
+    benched      whether `make bench` measures the function
+    packs        the entries of another function's matrix that the function stores. The code of the other function is
+                 generated, and all other entries are left out. `trace` and `pinocchio` compute the whole matrix
+    regions      the function's body as loops and calls, from which C is printed; `trace` executes this body. None: C is
+                 printed from code without loops
     """
 
     signature: Signature

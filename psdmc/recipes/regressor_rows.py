@@ -1,4 +1,5 @@
-"""The torques' coefficients of theta_b, over symbols and on arrays, for both regressors."""
+"""Computes the rows of the regressor, the matrix whose product with theta_b is the joint torques. Code is recorded on
+symbols, and references are computed in NumPy."""
 
 from __future__ import annotations
 
@@ -17,7 +18,12 @@ from psdmc.robot.mechanism import Array
 def traced_rows(
     g: Ingredients, qdd: Sequence[Scalar], qd_r: Sequence[Scalar] | None = None
 ) -> list[list[Scalar]]:
-    """n rows of l entries: torques M qdd + C(q, qd) qd_r + g by theta_b, qd_r = qd if not given."""
+    """Return the regressor, n rows of l entries: the derivatives of joint torques by the base parameters theta_b. It is
+    recorded as code.
+
+    The torques are M qdd + C(q, qd) qd_r + g, with the Coriolis matrix C and the torque g of gravity. Without qd_r, C
+    multiplies qd.
+    """
     needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
     q, qd = g.inputs["q"], g.inputs["qd"]
     found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base_acceleration, qd_r)
@@ -34,7 +40,7 @@ def _entry(weights: Sequence[tuple[int, float]], row: dict[int, Scalar]) -> Scal
 
 
 def rows_on_arrays(robot: RobotOnArrays, q: Array, qd: Array, qdd: Array, qd_r: Array | None = None) -> Array:
-    """(k, n, l): `traced_rows` on arrays of states."""
+    """Return the regressor (k, n, l) for k states, computed in NumPy. It has the entries of `traced_rows`."""
     wanted = np.flatnonzero(robot.lift.any(axis=1)).tolist()
     places = [joint.link_frame for joint in robot.chain.joints]
     states = (list(q.T), list(qd.T), list(qdd.T))

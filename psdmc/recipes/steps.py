@@ -1,4 +1,5 @@
-"""One step of an integrator: its quantities, and its Jacobians from the derivatives of accelerations."""
+"""One time step of an integrator: the descriptions of inputs and outputs, and the Jacobians of the new state by the old
+state."""
 
 from __future__ import annotations
 
@@ -54,7 +55,8 @@ def stepped(values: Sequence[Scalar], rates: Sequence[Scalar], dt: Scalar) -> li
 
 
 def turned(frames: Sequence[Frame], q: Array, way: Array) -> Array:
-    """(k, nq) positions where constant rates lead from q (k, nq); `way` (k, nv) are these times seconds."""
+    """Return the joint positions (k, nq) after a motion from q (k, nq) at constant joint rates. `way` (k, nv) are the
+    rates multiplied by the duration."""
     return columns(integrated(frames, list(q.T), list(way.T)), len(q))
 
 
@@ -66,10 +68,15 @@ def step_on_arrays(given: Mapping[str, Array]) -> Array:
 def semi_implicit(
     by_q: Rows, by_qd: Rows, by_tau: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]
 ) -> tuple[list[Any], list[Any]]:
-    """A and B of semi-implicit Euler from the derivatives of accelerations, nv x nv each, along the tangents at both ends.
+    """Return the Jacobians A and B of a semi-implicit Euler step. A has the derivatives of the new state by the old
+    state, B those by the torques.
 
-    d qd_next = d qd + dt d qdd and, where q is a vector, d q_next = d q + dt d qd_next; `slopes` have what takes the place
-    of the ones of joints of several rates.
+    by_q, by_qd, by_tau   derivatives (nv, nv) of the accelerations
+    slopes                for each joint of several rates, such as a ball joint, the derivatives of the new position by
+                          the old one and by the motion; None for a joint of one rate
+
+    Changes of the state are small motions along the joint rates. They are d qd_next = d qd + dt d qdd and, for joints
+    of one rate, d q_next = d q + dt d qd_next.
     """
     rates = [
         [dt * x for x in row] + _plus_one(i, [dt * x for x in own])
@@ -112,8 +119,11 @@ def _plus_one(i: int, row: list[Scalar]) -> list[Scalar]:
 def semi_implicit_on_arrays(
     by_q: Array, by_qd: Array, by_tau: Array, dt: Array, slopes: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """(k, 2 nv, 2 nv) and (k, 2 nv, nv): `semi_implicit` on arrays, as matrices of the two half steps; `slopes` (k, nv, nv)
-    are how `integrate` moves with either of its arguments."""
+    """Return the Jacobians A (k, 2 nv, 2 nv) and B (k, 2 nv, nv) of a semi-implicit Euler step for k states, in NumPy.
+    They are products of the Jacobians of two parts: the change of rates, then the change of positions.
+
+    `slopes` are two arrays (k, nv, nv): the derivatives of the new position by the old one and by the motion.
+    """
     by_start, by_way = slopes
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
@@ -124,7 +134,8 @@ def semi_implicit_on_arrays(
 
 
 def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:
-    """(k, nv, nv) each: how where `integrate` comes to moves with its start, and with the way (k, nv)."""
+    """Return the derivatives of the new position of a motion at constant rates, two arrays (k, nv, nv) for k states.
+    The first is by the old position, the second by the motion `way` (k, nv), which is rates times duration."""
     count, nv = way.shape
     by_start, by_way = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
     first = first_rates(frames)

@@ -1,4 +1,4 @@
-"""Newton-Euler on a trace's ingredients, which several functions need."""
+"""Records the Newton-Euler algorithm (joint torques) as code, for all generated functions that need it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,12 @@ def torques(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """n joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, for this acceleration of the base, less the
-    torques of external wrenches on the links."""
+    """Return the n joint torques M qdd + C(q, qd) qd_r, recorded as code. C(q, qd) is the Coriolis matrix; without
+    qd_r, it multiplies qd.
+
+    `base_acceleration` is the acceleration of the base, which includes gravity. The torques that `external` wrenches on
+    the links exert are subtracted.
+    """
     q = g.inputs["q"]
     return inverse_dynamics(
         g.frames, g.bodies, g.drives, q, qd, qdd, base_acceleration, g.choices, qd_r, external
@@ -29,7 +33,8 @@ def torques(
 
 
 def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
-    """The bodies that one rate moves, with those that carry them, as a robot, and the whole robot's numbers of its rates."""
+    """Return a part of the robot: the bodies that one joint rate moves, and all bodies between them and the base.
+    Return the numbers of the part's rates in the whole robot, too."""
     frames, owners = g.frames, joints_of_rates(g.frames)
     moved: set[int] = set()
     for i, frame in enumerate(frames):

@@ -1,4 +1,5 @@
-"""python -m psdmc.report.bench_markdown RESULT.json: the tables of docs/benchmarks.md, with their command."""
+"""python -m psdmc.report.bench_markdown RESULT.json: print the tables of docs/benchmarks.md from a benchmark's
+result."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ GRADIENTS = tuple(
 
 
 def markdown(result: BenchResult, command: str = "make bench") -> str:
-    """ns per state and, in brackets, how many times faster than Pinocchio and than CasADi's C for one state."""
+    """Return tables of psdmc's time in ns per state. The numbers in brackets say how many times faster psdmc is than
+    Pinocchio, and than C code of CasADi."""
     return "\n".join(_lines(result, command)) + "\n"
 
 
@@ -68,7 +70,7 @@ def _cell(case: CaseResult, function: str, layout: str) -> str:
 
 
 def main() -> int:
-    """Print the table of the result that the command line names."""
+    """Print the tables of the benchmark result that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_markdown", description=__doc__)
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("--command", default="make bench", help="what is said to have made it")

@@ -1,4 +1,4 @@
-"""python -m psdmc.report.bench_page RESULT.json PAGE.html: the benchmark's report as one self-contained file."""
+"""python -m psdmc.report.bench_page RESULT.json PAGE.html: write a benchmark's report as one HTML page."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def write_page(result: BenchResult, path: Path, command: str = COMMAND) -> None:
 
 
 def page(result: BenchResult, command: str = COMMAND) -> str:
-    """The page's text; `command` is the command that made it."""
+    """Return the HTML text of the page. `command` is the command that made the result."""
     view = {
         "result": result,
         "command": command,
@@ -105,7 +105,7 @@ def _environment() -> Environment:
 
 
 def read_result(path: Path) -> BenchResult:
-    """A result that was written as JSON; InputError where the file is missing or something else."""
+    """Read a benchmark result from JSON. Raise InputError if the file is missing or is no benchmark result."""
     try:
         text = read_file(path, LARGEST_RESULT, "make it with: psdmc bench --json").decode()
     except (OSError, UnicodeDecodeError) as error:
@@ -114,7 +114,7 @@ def read_result(path: Path) -> BenchResult:
 
 
 def main() -> int:
-    """Write the page of the result that the command line names."""
+    """Write the page of the benchmark result that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_page", description=__doc__)
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("page", type=Path, help="HTML to write")

@@ -1,5 +1,5 @@
-"""The benchmark's plots as inline SVG: nothing is loaded from the network, text stays text, colours follow the page's
-theme."""
+"""Plots of the benchmark as SVG elements in the page. They load nothing from the network, keep text as text, and use
+the page's colours."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COLOURS = {"psdmc": "#2a9d8f", "Pinocchio": "#e07a3f", "CasADi": "#5b7db1", "MuJ
 
 
 def bars(case: CaseResult, function: str) -> str:
-    """Everyone's time for one function of one robot, one state a call."""
+    """Draw the time per state of each library for one function and robot, for calls with one state."""
     shown = sorted(case.of(function), key=lambda m: m.ns)
 
     def draw(figure: Figure) -> None:
@@ -37,7 +37,8 @@ def bars(case: CaseResult, function: str) -> str:
 
 
 def scaling(result: BenchResult, function: str) -> str:
-    """Time against the number of joints: factored, expanded, Pinocchio."""
+    """Draw times against the number of joints, for Pinocchio and for psdmc's two forms of code (factored and
+    expanded)."""
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
@@ -61,5 +62,5 @@ def _colour(measurement: Measurement) -> str:
 
 
 def case_plots(case: CaseResult, functions: Sequence[str] = SCALED) -> tuple[str, ...]:
-    """Bars for the functions that were measured on a robot."""
+    """Draw a bar plot for each of the functions that was measured on a robot."""
     return tuple(bars(case, function) for function in functions if any(case.of(function)))

@@ -1,4 +1,4 @@
-"""The content of the benchmark's page, prepared for its templates."""
+"""The numbers of the benchmark's HTML page, formatted as text for its templates."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ LAYOUT_TITLES = {"state": "one state per call", "rows": "batch, rows", "lanes": 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a robot's table, as text; `ours` marks psdmc's own."""
+    """One row of a robot's table in the benchmark page, as text: the result of one library. `ours` is true for
+    psdmc."""
 
     who: str
     how: str
@@ -48,7 +49,8 @@ class FunctionTable:
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """One robot's line of the first table: how many times faster than Pinocchio, and than CasADi's C."""
+    """A robot's row in the first table of the benchmark page: how many times faster psdmc is than Pinocchio, and than C
+    code of CasADi."""
 
     robot: str
     inverse_ns: str
@@ -64,7 +66,8 @@ class Headline:
 
 
 def headlines(result: BenchResult) -> tuple[Headline, ...]:
-    """Every robot's ratios to Pinocchio linked as its users get it, its better convention."""
+    """Return for every robot how many times faster psdmc is than the installed Pinocchio library. Pinocchio's faster
+    algorithm counts."""
     return tuple(_headline(case) for case in result.cases)
 
 
@@ -86,7 +89,7 @@ def _headline(case: CaseResult) -> Headline:
 
 
 def function_tables(case: CaseResult) -> tuple[FunctionTable, ...]:
-    """One table per function that was measured on a robot."""
+    """Return a table of times for each function that was measured on a robot."""
     functions = dict.fromkeys(m.function for m in case.measurements)
     return tuple(FunctionTable(FUNCTION_TITLES[f], tuple(_rows(case, f))) for f in functions)
 
@@ -118,7 +121,8 @@ def _row(m: Measurement, reference: float | None) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class Quoted:
-    """A line of the paper's table 5 or of ours beside it; times in microseconds, ratios to the first line of its half."""
+    """A row of table 5 of the paper Denso-2022, as printed or measured on this machine. It has the times of one library
+    in microseconds, and their ratios to the first row."""
 
     method: str
     inverse: str
@@ -136,7 +140,8 @@ def quoted_table() -> tuple[Quoted, ...]:
 
 
 def own_table(result: BenchResult) -> tuple[Quoted, ...]:
-    """The same question answered on this machine, for the Denso; empty where it was not measured."""
+    """Return table 5 of the paper Denso-2022 with times measured on this machine. The table is empty if the Denso robot
+    was not measured."""
     case = next((case for case in result.cases if case.name == "Denso"), None)
     if case is None:
         return ()
@@ -160,7 +165,8 @@ def _quoted(method: str, inverse: float, forward: float, inverse_one: float, for
 
 @dataclass(frozen=True, slots=True)
 class PublishedRow:
-    """The authors' times beside those of their form and ours here."""
+    """A robot's row in the table of times that the method's authors published. Beside them are psdmc's times for the
+    authors' form of code (expanded) and for psdmc's default form (factored)."""
 
     robot: str
     source: str
@@ -171,7 +177,8 @@ class PublishedRow:
 
 
 def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
-    """Inverse / forward, ns, for the robots that the authors published."""
+    """Return rows with the times of inverse and forward dynamics in ns, for the robots whose times the method's authors
+    published."""
     rows = []
     for case in result.cases:
         theirs = PUBLISHED.get(case.name)
@@ -210,7 +217,7 @@ class ScalingRow:
 
 
 def scaling_rows(result: BenchResult) -> tuple[ScalingRow, ...]:
-    """Inverse / forward, ns, against the number of joints."""
+    """Return rows with the times of inverse and forward dynamics in ns, by number of joints."""
     return tuple(
         ScalingRow(
             str(case.n),
@@ -232,7 +239,7 @@ def _operations(case: CaseResult, rival: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ThreadRow:
-    """A batch function on one and more threads."""
+    """A row of the table of threads: the times of a batch function on one and more threads."""
 
     robot: str
     function: str
@@ -242,7 +249,8 @@ class ThreadRow:
 
 
 def thread_rows(result: BenchResult) -> tuple[ThreadRow, ...]:
-    """ns per state by number of threads, and how many times faster the most are than one."""
+    """Return rows with the times in ns per state by number of threads. A row says how many times faster the most
+    threads are than one thread."""
     rows = []
     for case in result.cases:
         for function, layout in dict.fromkeys((t.function, t.layout) for t in case.threads):

@@ -1,4 +1,4 @@
-"""`psdmc excite | simulate | calibrate`: the functions that the command line calls, from files to files."""
+"""What the commands `psdmc excite`, `simulate` and `calibrate` do: read files, compute, and write files."""
 
 from __future__ import annotations
 
@@ -44,9 +44,11 @@ def excite_command(
     progress: Progress = silent,
     force: bool = False,
 ) -> Plan:
-    """Plan a whole campaign for a model file: trajectories, campaign.toml, excitation.json, .csv and .svg in `folder`.
+    """Plan a calibration campaign for a model. Write trajectories, campaign.toml, excitation.json, .csv and .svg into
+    `folder`.
 
-    force   replace the plan of an existing campaign; without it, InputError before the search
+    force   replace the plan of an existing campaign; without `force`, a campaign in the folder gives an InputError
+            before the search
     """
     began = cpu_seconds()
     options = options or CampaignOptions()
@@ -58,7 +60,7 @@ def excite_command(
     one_period = plan.found.motion.sampled(known.joint_names, options.sweep.period)
     picture = excitation_figure(plan.found, known.joint_names, [joint.limits for joint in plan.chain.joints])
     with being_written(folder):
-        campaign = write_campaign(folder, plan.runs, plan.found, options.table, force=force)
+        campaign = write_campaign(folder, plan.runs, plan.found, options.table, options.formats, force=force)
         write_trajectory(one_period, campaign.parent / "excitation.csv")
         write_whole(campaign.parent / "excitation.svg", picture)
     return plan
@@ -70,7 +72,8 @@ def simulate_command(
     options: SimulateOptions | None = None,
     progress: Progress = silent,
 ) -> int:
-    """Write a campaign's logs from a virtual robot; returns how many were simulated, the others being up to date."""
+    """Write the logs of a calibration campaign as a virtual (simulated) robot would record them. Return how many logs
+    were simulated; the others were up to date."""
     return simulate_campaign(plant, campaign, options or SimulateOptions(), progress)
 
 
@@ -89,14 +92,16 @@ def calibrate_command(
     loaded: Sequence[str | Path] = (),
     load_on: str | None = None,
 ) -> Calibration:
-    """Calibrate a model, or its file, from a campaign or from logs.
+    """Calibrate a model or model file with a campaign or logs, and write the calibrated model and a report.
 
-    output     the calibrated model file, which emit-c takes
-    report     an HTML page, with the numbers as JSON beside it, which replaces no file but another report's
-    actuators  a folder for C: friction and motors
-    loaded     further logs, recorded with the known load `load_on`: 'MASS,X,Y,Z' or a load's file
-    keep       whether model and C are written even where the verdict is `not usable`
-    validation  plain logs that are held out as a whole
+    output     path of the calibrated model file
+    report     path of an HTML page; its numbers go into a JSON file next to it. A JSON file of another kind is not
+               replaced
+    actuators  folder into which C code of friction and motors is written
+    loaded     further logs, recorded while the robot carried the known load `load_on`: 'MASS,X,Y,Z' or the file of a
+               load
+    keep       whether to write the model and the C code even if the verdict is `not usable`
+    validation  plain logs that are not fitted but test the fit
     naming     topic and joint names of plain logs
     """
     if report is not None:
@@ -127,7 +132,8 @@ def calibrate_command(
 
 
 def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
-    """C for a calibrated model's friction and motors; InputError where it was not calibrated."""
+    """Write C code for the friction and motors of a calibrated model into a folder. Raise InputError if the model is
+    not calibrated."""
     found = model.calibrated
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")
@@ -139,14 +145,15 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
 
 
 def require_actuators_folder(model: DynamicsModel, folder: str | Path) -> None:
-    """InputError where a folder holds files, but no package of psdmc's and no such C of this robot."""
+    """Raise InputError if a folder has files that the C code would not replace. A package of psdmc may be there, and
+    earlier C code of friction and motors of this robot."""
     header = Path(folder) / "include" / f"{identifier(model.mechanism.name)}_actuators.h"
     if not content_of(folder) and not header.is_file():
         refuse_foreign_folder(folder, "choose a new or empty folder, or that of the robot's package")
 
 
 class CompiledWhenAsked:
-    """A model's regressor, compiled when it is first used, so that an unusable log is refused before."""
+    """A model's regressor that is compiled at its first use, so that errors in logs are found before the compilation."""
 
     def __init__(self, model: DynamicsModel, progress: Progress) -> None:
         self._model, self._progress = model, progress

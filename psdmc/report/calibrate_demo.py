@@ -1,4 +1,5 @@
-"""`make calibrate-demo`: the virtual Denso from excitation to report, and the result compared with the truth."""
+"""`make calibrate-demo`: plan, simulate and calibrate the virtual Denso, and compare the result with its true
+parameters."""
 
 from __future__ import annotations
 
@@ -43,7 +44,8 @@ def run_demo(
     workers: int = 2,
     say: Callable[[str], None] = print,
 ) -> dict[str, Comparison]:
-    """Plan, simulate, calibrate and report each variant; returns each result's comparison with the truth."""
+    """Plan, simulate, calibrate and report each variant of the demonstration. Return how each result compares with the
+    true parameters."""
     begin = time.monotonic()
 
     def step(text: str) -> None:

@@ -1,4 +1,5 @@
-"""Pictures of a calibration, like Denso-2022's figures 2 to 5, as SVG text."""
+"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper on the calibration of a Denso robot
+(published_denso.py)."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ FILE = (11, 6)
 
 
 def step_panels(step: StepQuality) -> tuple[str, ...]:
-    """A picture a joint: observed and predicted torque, the residual, held-out stretches shaded."""
+    """Draw the measured torque, the predicted torque and their difference for each joint, over time. Parts of the log
+    that were kept out of the fit are shaded."""
     return tuple(
         svg(partial(alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
         for sample in step.samples
@@ -66,7 +68,7 @@ def _sample(axis: Axes, sample: Sample) -> None:
 
 
 def thinned(count: int) -> Array:
-    """Indices of evenly spread points, all of them where they are few. (A contiguous stretch would hide the rest.)"""
+    """Return the indices of evenly spread points, or of all points if they are few."""
     return np.unique(np.linspace(0, count - 1, min(count, POINTS)).astype(int))
 
 
@@ -82,8 +84,8 @@ def _shade(axis: Axes, x: Array, held_out: Array) -> None:
 def excitation_panels(
     found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()
 ) -> tuple[str, ...]:
-    """The exciting motion's positions, speeds and accelerations, with the joints' limits where they are given, and its
-    condition beside those of random motions: a picture each."""
+    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Draw the
+    condition number of the motion, too, next to those of random motions."""
     return tuple(
         svg(partial(alone, draw), PANEL, f"exciting motion: {says}")
         for says, draw in _excitation(found, joint_names, limits)
@@ -102,7 +104,7 @@ def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Seq
 
 
 def limit_lines(limits: Sequence[Limits]) -> tuple[list[tuple[float, float]], ...]:
-    """(lowest, highest) of each joint's position, speed and acceleration."""
+    """Return the limits of each joint for drawing: (lowest, highest) position, speed and acceleration."""
     positions = [(each.lower, each.upper) for each in limits]
     speeds = [(-each.speed, each.speed) for each in limits]
     return positions, speeds, [(-each.acceleration, each.acceleration) for each in limits]

@@ -1,4 +1,4 @@
-"""A calibration's report: one self-contained HTML page, and the same numbers as JSON."""
+"""The report of a calibration: an HTML page without external files, and the same numbers as JSON."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ NUMBERS_MARK = '"base_parameters": [\n  {\n   "name": "theta_b[0]"'
 
 @dataclass(frozen=True, slots=True)
 class FigureView:
-    """Pictures side by side, one a joint or quantity, with their caption."""
+    """Pictures that the page shows next to each other, one per joint or quantity, and their caption."""
 
     title: str
     panels: tuple[str, ...]
@@ -47,7 +47,7 @@ class FigureView:
 
 @dataclass(frozen=True, slots=True)
 class VerdictView:
-    """The verdict's word, its grounds as (kind, text), and its figures joint by joint."""
+    """The verdict of a calibration: its word, the reasons as (kind, text), and the numbers for each joint."""
 
     word: str
     usable: bool
@@ -57,11 +57,11 @@ class VerdictView:
 
 @dataclass(frozen=True, slots=True)
 class ReportView:
-    """The data of the page's template. Tables are finished markup, empty where there is nothing to show; all other text is
-    escaped there.
+    """The data of the report's template. Tables are HTML text, empty if there is nothing to show. The template of the
+    page escapes all other text.
 
-    truth     what only a virtual robot has; None: a real one's logs
-    versions  of the programs that computed it: name and number
+    truth     true parameters, which only a virtual robot has; None for logs of a real robot
+    versions  names and versions of the programs that computed the result
     """
 
     robot: str
@@ -84,7 +84,7 @@ class ReportView:
 def write_report(
     record: Calibrated, path: str | Path, found: Excitation | None = None, truth: TruthView | None = None
 ) -> tuple[Path, Path]:
-    """Write the page and, beside it, its numbers as JSON; returns both paths."""
+    """Write the HTML page and a JSON file with its numbers next to it. Return both paths."""
     page = Path(path)
     numbers = page.with_suffix(".json")
     text = json.dumps(document(record), indent=1) + "\n"
@@ -93,7 +93,7 @@ def write_report(
 
 
 def require_free_numbers(page: str | Path) -> None:
-    """InputError if the JSON beside a page would replace a file that is no report's."""
+    """Raise InputError if the JSON file of a report would replace a file that is not the JSON file of a report."""
     numbers = Path(page).with_suffix(".json")
     remedy = f"give --report another name, or move {numbers}: the report's numbers go there"
     refuse_foreign_file(numbers, NUMBERS_MARK, remedy)

@@ -1,4 +1,4 @@
-"""The tables of a calibration's page, as finished markup with every cell escaped."""
+"""Makes the tables of a calibration's report as HTML text, with every cell escaped."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ USES = {"validate": "held out whole", "with_load": "with the known load"}
 
 
 def verdict_table(verdict: Verdict) -> str:
-    """The figures by which each joint was judged. A gain in brackets does not count, as the file's torque is too small
-    there."""
+    """Return the table of numbers by which psdmc judged each joint. A gain compares the errors of the robot file with
+    those of the calibration. It is in brackets and does not count if the file predicts too small a torque."""
     head = [
         "Joint",
         "R² held out",
@@ -44,7 +44,8 @@ def verdict_table(verdict: Verdict) -> str:
 
 
 def accuracy_table(record: Calibrated) -> str:
-    """Table 3: RMSE and R^2 per joint and step, of held-out data and in brackets of fitted data."""
+    """Return the table of RMSE and R^2 for each joint and calibration step (table 3 of Denso-2022). Numbers are for
+    data that were not fitted and, in brackets, for fitted data."""
     head = [
         "Joint",
         *(
@@ -71,7 +72,8 @@ def _both(held_out: Quality, fit: Quality) -> list[str]:
 
 
 def parameter_table(record: Calibrated) -> str:
-    """Table 4: base parameter, the file's value, the one found, its standard deviation, unit, equation."""
+    """Return the table of base parameters: the robot file's value, the value found, standard deviation, unit and
+    equation (table 4 of Denso-2022)."""
     head = ["Parameter", "In the file", "Found", "±", "Relative", "Unit", "Equation", "In the data", "Group"]
     rows = []
     for row in record.parameters:
@@ -84,7 +86,7 @@ def parameter_table(record: Calibrated) -> str:
 
 
 def joint_table(record: Calibrated) -> str:
-    """Table 2: torque constants and friction, joint by joint."""
+    """Return the table of torque constants and friction of each joint (table 2 of Denso-2022)."""
     own = (*record.motors, *record.friction)
     units = joined_units((row.name, row.unit) for row in own)
     by_key = {(row.joint, row.name): row for row in own}
@@ -96,7 +98,7 @@ def joint_table(record: Calibrated) -> str:
 
 
 def spring_table(record: Calibrated) -> str:
-    """Values of springs; empty where the fit has none."""
+    """Return the table of fitted spring values; empty if the calibration has no springs."""
     if not record.springs:
         return ""
     rows = [[row.joint, row.name, joint_number(row), row.unit] for row in record.springs]
@@ -104,7 +106,8 @@ def spring_table(record: Calibrated) -> str:
 
 
 def joint_number(row: NumberRow | None) -> str:
-    """A joint's number with its standard deviation; in brackets what the data do not show by itself."""
+    """Return a value of a joint with its standard deviation as text. A value that the data alone do not determine is in
+    brackets, with the reason."""
     if row is None:
         return NOTHING
     if not row.seen:
@@ -114,7 +117,7 @@ def joint_number(row: NumberRow | None) -> str:
 
 
 def log_table(record: Calibrated) -> str:
-    """Names, lengths and dates of the logs; empty text where they are unknown."""
+    """Return the names, durations and dates of the logs; empty text if they are unknown."""
     steps = {} if record.prediction is None else record.prediction.steps
     is_split = not steps or any(step.held_out for step in steps.values())
     uses = USES | {"fit": "fitted and held out" if is_split else "fitted"}
@@ -126,7 +129,8 @@ def log_table(record: Calibrated) -> str:
 
 
 def step_table(record: Calibrated) -> str:
-    """Cut-off and split of each step; empty text where they are unknown."""
+    """Return the table of calibration steps: the cut-off frequency of the filter, and how the data were split. The text
+    is empty if they are unknown."""
     if record.prediction is None:
         return ""
     rows = []
@@ -161,17 +165,17 @@ def with_std(value: float, std: float) -> str:
 
 
 def number(value: float) -> str:
-    """Three digits; a dash for what is not finite."""
+    """Return a number as text with three digits; a dash if it is not finite."""
     return f"{value:.3g}" if math.isfinite(value) else NOTHING
 
 
 def r_squared(value: float) -> str:
-    """Four decimals; a dash where there is none."""
+    """Return R^2 as text with four decimals; a dash if there is none."""
     return NOTHING if math.isnan(value) else f"{value:.4f}"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> str:
-    """An HTML table, every cell escaped; text columns break their lines."""
+    """Return an HTML table with every cell escaped. Columns of text are wrapped; columns of numbers are not."""
     names = "".join(_cell("th", cell, k in text_columns, ' scope="col"') for k, cell in enumerate(head))
     lines = ['<table class="plain">', f"<thead><tr>{names}</tr></thead>", "<tbody>"]
     for row in rows:

@@ -1,5 +1,6 @@
-"""Pictures as inline SVG by Matplotlib, which is loaded when the first is drawn: it takes half a second and writes to
-the home folder. Nothing is loaded from the network, text stays text, colours follow the page's theme."""
+"""Draws pictures as SVG elements with Matplotlib. Matplotlib is loaded for the first picture only, because loading
+takes half a second and writes to the home folder. Pictures load nothing from the network, keep text as text, and use
+the page's colours."""
 
 from __future__ import annotations
 
@@ -41,8 +42,11 @@ STYLE: dict[Any, Any] = {
 
 
 def svg(draw: Callable[[Figure], None], size: tuple[float, float], says: str) -> str:
-    """The drawing by `draw` on a figure of `size` (inches), as an <svg> element that scales with the page; `says` is the
-    description that screen readers read out. The same numbers give the same bytes."""
+    """Return a picture as an <svg> element that scales with the page. The function `draw` draws it on a figure of
+    `size` (inches).
+
+    `says` is the description for screen readers. Equal numbers give equal bytes.
+    """
     with _style(STYLE):
         figure = _new_figure(figsize=size)
         draw(figure)
@@ -58,7 +62,7 @@ PRINTED |= {"svg.fonttype": "path", "pdf.fonttype": 42}
 
 
 def document(name: str, draw: Callable[[Figure], None], size: tuple[float, float]) -> dict[str, bytes]:
-    """The drawing as NAME.pdf and NAME.svg. The same numbers give the same bytes."""
+    """Write a picture, which a function draws, as NAME.pdf and NAME.svg. Equal numbers give equal bytes."""
     found = {}
     with _style(PRINTED):
         figure = _new_figure(figsize=size)
@@ -74,7 +78,7 @@ def document(name: str, draw: Callable[[Figure], None], size: tuple[float, float
 
 
 def legend_below(axis: Axes, columns: int, size: int = 8) -> None:
-    """The legend under the picture, where it hides no curve."""
+    """Put the legend below the picture, so that it hides no curve."""
     axis.figure.legend(loc="outside lower center", ncols=columns, fontsize=size, frameon=False)
 
 

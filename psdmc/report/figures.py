@@ -1,5 +1,5 @@
-"""Figures (PDF, SVG) and tables (LaTeX) of a calibration, to be put into a report or a paper. The same file gives the same
-bytes: no dates, fixed identifiers."""
+"""Figures (PDF, SVG) and tables (LaTeX) of a calibration, for a report or a paper. The same model file gives the same
+bytes, because dates are left out and identifiers are fixed."""
 
 from __future__ import annotations
 
@@ -47,11 +47,12 @@ ABREAST = 3
 def write_figures(
     model: DynamicsModel, folder: str | Path, log: str | Path | None = None, progress: Progress = silent
 ) -> list[Path]:
-    """Write figures and tables of a calibrated model into a folder; returns their paths.
+    """Write figures and tables of a calibrated model into a folder, and return their paths.
 
-    log   measured and predicted torque are drawn too: a log, log description or campaign, as the model was calibrated from
+    log   a log, log description or campaign, from which measured and predicted torque are drawn too
 
-    InputError where the model is not calibrated, the log does not suit it, or the folder holds files that are not psdmc's.
+    Raise InputError if the model is not calibrated, the log does not suit it, or the folder has files that are not
+    psdmc's.
     """
     known = model.calibrated
     if known is None:
@@ -78,7 +79,7 @@ def write_figures(
 
 
 def require_own_folder(folder: str | Path) -> None:
-    """InputError where a folder holds files, but none of `psdmc figures`."""
+    """Raise InputError if a folder has files, but none that the command `psdmc figures` wrote."""
     table = Path(folder) / TABLE
     try:
         with table.open("rb") as file:
@@ -107,7 +108,8 @@ def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQua
 
 
 def draw_parameters(figure: Figure, known: Calibrated) -> None:
-    """Base parameters with intervals, those of one unit on one axis; the file's values as open circles."""
+    """Draw the calibrated base parameters with confidence intervals, with one axis for each unit. Open circles are the
+    values of the robot file."""
     units = list(dict.fromkeys(row.unit for row in known.parameters))
     groups = [[row for row in known.parameters if row.unit == unit] for unit in units]
     axes = figure.subplots(len(units), 1, squeeze=False, height_ratios=[len(rows) + 2 for rows in groups])
@@ -130,7 +132,8 @@ def draw_parameters(figure: Figure, known: Calibrated) -> None:
 
 
 def friction_curves(known: Calibrated) -> dict[str, tuple[Array, Array]]:
-    """By joint: speeds, and friction torque in steady motion, without what depends on position or load."""
+    """Return for each joint an array of speeds and the friction torques at these constant speeds. Friction that depends
+    on position or load is left out."""
     law = known.prediction
     if law is None:
         return {}
@@ -155,7 +158,8 @@ def _reads(row: Row) -> frozenset[str]:
 
 
 def steady(rows: Sequence[Row], v: Array, sign_speed: float) -> Array:
-    """Friction at constant speeds, none of them zero. A law's state is where it rests, as its rate is linear in it."""
+    """Return the friction torque or force at constant speeds that are not zero. A friction model with an internal
+    state, such as LuGre's, has the value that the state approaches at this speed."""
     sign = np.tanh(v / sign_speed) if sign_speed > 0.0 else np.sign(v)
     state, z = rows[0][0].law.state, np.zeros_like(v)
     if state is not None:
@@ -167,7 +171,7 @@ def steady(rows: Sequence[Row], v: Array, sign_speed: float) -> Array:
 def draw_friction(
     figure: Figure, curves: Mapping[str, tuple[Array, Array]], efforts: Mapping[str, str]
 ) -> None:
-    """Friction of each joint against its speed; `efforts` are the joints' units of torque or force."""
+    """Draw the friction of each joint against its speed. `efforts` are the units of torque or force of the joints."""
     axes = list(figure.subplots(math.ceil(len(curves) / ABREAST), ABREAST, squeeze=False).flat)
     for axis in axes[len(curves) :]:
         axis.set_visible(False)
@@ -183,7 +187,7 @@ def draw_friction(
 
 
 def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -> None:
-    """Measured and predicted torque of each joint, and beside it what is left."""
+    """Draw the measured torque, the predicted torque and their difference for each joint."""
     rows = figure.subplots(len(step.samples), 2, squeeze=False, sharex="row", width_ratios=[2, 1])
     for (both, left), sample in zip(rows, step.samples, strict=True):
         kept = thinned(len(sample.x))
@@ -207,7 +211,8 @@ def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -
 
 
 def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
-    """Tables as LaTeX by file name. They need the packages booktabs, longtable and siunitx."""
+    """Return the tables of a calibration as LaTeX text, by file name. They need the packages booktabs, longtable and
+    siunitx."""
     equations = [parameter.terms for parameter in model.base_parameters]
     parameters = [
         [
@@ -251,7 +256,8 @@ def _seen(row: NumberRow) -> str:
 
 
 def tabular(columns: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "tabular") -> str:
-    """A table; cells are LaTeX. A longtable continues on the next page, and repeats its head."""
+    """Return a LaTeX table from cells in LaTeX. A longtable continues on the next page and repeats the head of the
+    table."""
     packages = "booktabs,siunitx" if kind == "tabular" else f"booktabs,{kind},siunitx"
     lines = [
         f"{MARK}; needs \\usepackage{{{packages}}}",
@@ -285,8 +291,8 @@ def preview(names: Sequence[str], pictures: Sequence[str]) -> str:
 
 
 def number(value: float, std: float = math.inf) -> str:
-    """A number with its standard deviation, rounded to two digits of that, for siunitx; a dash for none. siunitx rounds to
-    an uncertainty itself, but drops those of a number that is much smaller."""
+    """Return a number for siunitx, rounded to two digits of its standard deviation; a dash for none. psdmc rounds the
+    number itself, because siunitx drops the standard deviation of a number that is much smaller."""
     if not math.isfinite(value):
         return "--"
     if not 0.0 < std < math.inf:
@@ -299,7 +305,7 @@ UNIT = re.compile(r"[A-Za-z0-9.^/ ]+")
 
 
 def unit(text: str) -> str:
-    """A unit as psdmc writes it, for siunitx."""
+    """Return a unit in the notation of the LaTeX package siunitx, from psdmc's notation."""
     if not text or text == "-":
         return ""
     if not UNIT.fullmatch(text):
@@ -320,7 +326,7 @@ SPECIAL = {
 
 
 def escaped(text: str) -> str:
-    """Text of a file as LaTeX shows it; what is neither ASCII nor Latin-1 by its number."""
+    """Return LaTeX code that prints a text. Characters outside ASCII and Latin-1 are printed as their number."""
     return "".join(
         SPECIAL.get(c, c) if " " <= c <= "~" or "\xc0" <= c <= "\xff" else f"U+{ord(c):04X}" for c in text
     )

@@ -1,7 +1,8 @@
-"""Tables 2 to 4 of Denso-2022 as printed, to be set beside what the virtual Denso's calibration finds.
+"""Tables 2 to 4 as printed in Denso-2022, which the report shows with the results of the virtual Denso's calibration.
 
-Application of Pseudo-Symbolic Dynamic Modeling (PSDM) in the Modeling & Calibration of a 6-DOF Articulated Robot, 2022. Of
-table 4 the lines are here whose equations are legible in print and hold for the robot; the others lost signs or indices.
+Denso-2022: Application of Pseudo-Symbolic Dynamic Modeling (PSDM) in the Modeling & Calibration of a 6-DOF Articulated
+Robot. Of table 4, this module has only the rows whose printed equations can be read and are true for the robot. The
+other rows lost signs or indices in print.
 """
 
 from __future__ import annotations
@@ -46,12 +47,13 @@ NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz", "Im")
 
 @dataclass(frozen=True, slots=True)
 class PublishedParameter:
-    """A line of table 4.
+    """A row of table 4 of Denso-2022: a base parameter.
 
-    value     SI
+    value     in SI units
     equation  in standard parameters about the links' frames (mx = m rx; Ixx and so on about the origin)
-    terms     the same: coefficients by name and link
-    fitted    whether the virtual robot was made to have it, as nearly as physical links can
+    terms     the equation as coefficients by parameter and link
+    fitted    whether the masses and inertias of the virtual robot were chosen to give this value, as nearly as real
+              bodies can
     """
 
     name: str

@@ -1,5 +1,5 @@
-"""What the page of a virtual robot adds: that it is virtual, the truth beside what was found, and Denso-2022's tables beside
-its own."""
+"""The part of a report that only a virtual robot has: its true parameters and the tables of Denso-2022, with the values
+found."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ WHY = (
 
 @dataclass(frozen=True, slots=True)
 class TruthView:
-    """The sections that only a virtual robot's page has; tables are finished markup.
+    """The sections that only the report of a virtual robot has. Tables are HTML text.
 
-    banner      that the robot is virtual, and its sensors
-    parameters  every base parameter with its truth
-    joints, accuracy, published  Denso-2022's tables 2, 3 and 4 beside this calibration's
-    why         the reason of the differences
+    banner      states that the robot is virtual, and its sensors
+    parameters  every base parameter with its true value
+    joints, accuracy, published  tables 2, 3 and 4 of Denso-2022 with the values of this calibration
+    why         text that explains the differences
     """
 
     banner: str
@@ -43,7 +43,8 @@ class TruthView:
 
 
 def truth_view(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> TruthView:
-    """The sections for a calibration of the virtual Denso; `true_model` holds its theta_b in the record's order."""
+    """Return the sections on true parameters for the report of the virtual Denso robot. `true_model` has the true base
+    parameters theta_b, in the order of the calibration record."""
     sensors, harness = robot.sensors, robot.harness
     noisy = sensors.current_noise or sensors.position_step
     with_sensors = (

@@ -1,4 +1,4 @@
-"""What `psdmc validate` and `psdmc compare` print, and the same as a page with its numbers as JSON."""
+"""What `psdmc validate` and `psdmc compare` print, and the same results as an HTML page and as JSON."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ MARK = '"schema": 1,\n "kind": "'
 
 @dataclass(frozen=True, slots=True)
 class TableView:
-    """A table of the page. `short` are the rows that the console prints; prose: whether the last column is text."""
+    """A table of the HTML page on a validation. `short` are the rows that the terminal shows. `prose` tells whether the
+    last column is text."""
 
     title: str
     head: Sequence[str]
@@ -43,10 +44,10 @@ class TableView:
 
 @dataclass(frozen=True, slots=True)
 class PageView:
-    """The data of the page's template. Tables and figures are finished markup; all other text is escaped there.
+    """The data of the page's template. Tables and figures are HTML text; the template escapes all other text.
 
-    kind    of the verdict's box: "", "doubted" or "refused";  document: what the JSON describes
-    lines   (kind, sentence), the first part of the page;  more: lines for the console
+    kind    style of the verdict's box: "", "doubted" or "refused";  document: kind of the JSON file
+    lines   (kind, sentence) for the first part of the page;  more: further lines that the terminal prints
     """
 
     document: str
@@ -60,21 +61,21 @@ class PageView:
 
     @property
     def text(self) -> list[str]:
-        """The first part as lines, doubts before all else."""
+        """Return the verdict and its reasons as lines of text, with lines of doubt first."""
         said = [(kind == "doubt", f"  {kind}: {text}") for kind, text in self.lines]
         doubts = [text.strip() for is_doubt, text in said if is_doubt]
         return [*doubts, self.head, *(text for is_doubt, text in said if not is_doubt), *self.more]
 
 
 def require_free(report: Path) -> None:
-    """InputError if the JSON beside a page would replace a file that is no such JSON."""
+    """Raise InputError if the JSON file of a page would replace a JSON file of another kind."""
     numbers = report.with_suffix(".json")
     remedy = f"give --report another name, or move {numbers}: the report's numbers go there"
     refuse_foreign_file(numbers, MARK, remedy)
 
 
 def write_page(page: PageView, found: Validation | Comparison, report: Path) -> None:
-    """Write the page and its numbers, both or none."""
+    """Write the HTML page and its JSON file, or neither if one fails."""
     template = environment().overlay(autoescape=True).get_template("report/validation.html.jinja")
     numbers = {"schema": 1, "kind": page.document, **found.as_json()}
     files = {report.name: template.render(view=page)}

@@ -1,4 +1,5 @@
-"""A robot in space on one page: links, axes, frames, bodies of its file and of a calibration, and the motion of logs."""
+"""Draws a robot on an HTML page in 3D: links, axes, frames, bodies of the file and of a calibration, and the motion of
+logs."""
 
 from __future__ import annotations
 
@@ -67,13 +68,13 @@ AXIS_COLOURS = ("#d62728", "#2ca02c", "#1f5fd0")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A body as it is drawn.
+    """A body in the 3D picture: the position of its centre of mass, and the ellipsoid that shows its inertia.
 
-    joint      number of the joint frame that it moves with
-    mass       kg; com (3,) m in the joint frame; place (3,) m, the same in the link's own
-    half_axes  (3,) m, semi-axes of the solid ellipsoid of this mass and inertia, ascending; zero where there is none
-    root       (3, 3) m, symmetric: unit sphere -> ellipsoid about `com`, in the joint frame
-    fault      why no real body is like this; "" for all others
+    joint      number of the joint frame with which the body moves
+    mass       kg; com (3,) m in the joint frame; place (3,) m, the centre of mass in the frame of the link
+    half_axes  (3,) m, semi-axes of the solid ellipsoid of this mass and inertia, ascending; zero if there is none
+    root       (3, 3) m, symmetric: maps the unit sphere to the ellipsoid about `com`, in the joint frame
+    fault      why no real body has this mass and inertia; "" for all others
     """
 
     link: str
@@ -87,16 +88,17 @@ class Body:
 
     @property
     def density(self) -> float:
-        """kg/m^3 of the ellipsoid; NaN where it is flat."""
+        """Return the density of the ellipsoid in kg/m^3; NaN if the ellipsoid is flat."""
         if not self.half_axes[0] > FLAT * self.half_axes[2]:
             return math.nan
         return self.mass / (4.0 / 3.0 * math.pi * float(np.prod(self.half_axes)))
 
 
 def body(link: str, joint: int, frame: Placement, x: Array, judged: bool = True) -> Body:
-    """The body of standard parameters (10,) about a link frame, which sits at `frame` in the joint frame.
+    """Return the drawn body from standard parameters x (10,) about a link frame: mass, first moments, inertia. `frame`
+    is the placement of the link frame in the joint frame.
 
-    judged   whether it is asked if a real body could be like this; of assumed zeros it is not
+    judged   whether to test if a real body can have these parameters; not for zeros that psdmc assumed
     """
     mass, com, six = about_com(x)
     six = np.where(np.abs(six) > ROUNDING * mass * float(com @ com), six, 0.0)
@@ -114,13 +116,13 @@ def body(link: str, joint: int, frame: Placement, x: Array, judged: bool = True)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Viewed:
-    """What a page shows. F poses of n joint frames.
+    """The content of the 3D page: bodies, remarks, and the motion as F poses of the n joint frames.
 
-    layers   bodies by FILE and CALIBRATED
-    faults   of links and of what is missing, in words, the gravest first
+    layers   the bodies of the robot file, and those of a calibration: FILE or CALIBRATED -> bodies
+    faults   texts on bodies that cannot be real and on missing inertias, the worst first
     notes    further remarks
     poses    (F, n, 12) rotation (rows) and origin (m) of each joint frame in the base frame
-    times    F, s;  logs   F, names; both empty without a log
+    times    F times in s;  logs   F names of logs; both empty without a log
     """
 
     chain: Mechanism
@@ -135,9 +137,9 @@ class Viewed:
 def viewed(
     robot: DynamicsModel | LoadedRobot, log: str | Path | None = None, progress: Progress = silent
 ) -> Viewed:
-    """Collect what a page shows of a model or a robot file, at rest or in the motion of logs.
+    """Collect the content of a page for a model or a robot file, at rest or in the motion of logs.
 
-    InputError where a log cannot be used, as in calibration.
+    Raise InputError if a log cannot be used, as in a calibration.
     """
     chain = robot.mechanism
     own = _own_links(robot)
@@ -242,14 +244,15 @@ def _poses(chain: Mechanism, q: Array) -> Array:
 
 
 def write_view(view: Viewed, path: str | Path) -> None:
-    """Write the page; InputError where plotly is not installed, or where a file is at the path that is no such page."""
+    """Write the 3D page of a robot. Raise InputError if plotly is not installed, or if the path has a file that is no
+    page of `psdmc view`."""
     script = _plotly()
     require_own_page(path)
     write_whole(path, page(view, script))
 
 
 def require_own_page(path: str | Path) -> None:
-    """InputError where a file is at the path that `psdmc view` did not write."""
+    """Raise InputError if the path has a file that `psdmc view` did not write."""
     refuse_foreign_file(path, MARK, "give another name with -o FILE.html, or move the file")
 
 
@@ -278,13 +281,14 @@ def page(view: Viewed, script: str) -> str:
 
 
 def embedded(value: Any) -> str:
-    """JSON that may stand in an HTML <script>: no text in it can end the element."""
+    """Return a value as JSON text for an HTML <script> element. Characters are escaped so that no text in the value can
+    end the element."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def body_table(view: Viewed) -> str:
-    """An HTML table of all bodies, link by link."""
+    """Return an HTML table of all bodies, link by link."""
     head = ["Link", "From", "Mass [kg]", "Centre of mass in the link [m]", "Semi-axes [m]", "Density [kg/m³]"]
     bodies = [(name, each) for name, found in view.layers.items() for each in found]
     rows = [
@@ -311,8 +315,8 @@ def _rounded(values: Array, digits: int) -> list[Any]:
 
 
 def scene(view: Viewed) -> dict[str, Any]:
-    """What the page's script draws. Points are [joint, x, y, z] in a joint frame, or in the base frame where joint is -1;
-    names are escaped, as Plotly reads markup in them."""
+    """Return the data that the page's script draws. Points are [joint, x, y, z] in a joint frame, or in the base frame
+    if joint is -1. Names are escaped, because Plotly reads markup in them."""
     chain = view.chain
     origins = view.poses[0, :, 9:]
     size = float(np.ptp(np.vstack([np.zeros(3), origins, *_ends(view)]), axis=0).max()) or 1.0

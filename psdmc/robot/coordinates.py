@@ -1,5 +1,5 @@
-"""Coordinates of joints: each joint's q is a coordinate of its own, follows another's (q_joint = ratio q_leader +
-offset), or is constant."""
+"""Describes how the position q of each joint is determined: it is an entry of the robot's q, follows another joint, or
+is constant. A mimic joint follows by q_joint = ratio q_leader + offset."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from psdmc.robot.joints import JointType
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """One joint's q as ratio * q[leader] + offset.
+    """Describes the position q of one joint as ratio * q[leader] + offset.
 
-    leader   number of the joint that has the coordinate; None: the joint is held at `offset`
-    ratio    of the two rates, in the joint's unit per the leader's
+    leader   index of the joint that is followed; for a joint that is no mimic joint, the joint itself. None: the joint
+             is locked at `offset`
+    ratio    rate of the joint divided by that of the leader, in the joint's unit per the leader's unit
     offset   rad or m
     """
 
@@ -33,18 +34,19 @@ class Coordinate:
 
 
 def own_coordinates(n: int) -> tuple[Coordinate, ...]:
-    """The coordinates of n joints that follow no other."""
+    """Return the coordinates of n joints if no joint is a mimic joint: each joint is its own leader."""
     return tuple(Coordinate(i) for i in range(n))
 
 
 def leaders(coordinates: Sequence[Coordinate]) -> tuple[int, ...]:
-    """The joints that have a coordinate of their own, in order: q has one entry for each."""
+    """Return the indices of the joints that are not mimic joints, in order. The entries of q are the positions of these
+    joints."""
     return tuple(i for i, coordinate in enumerate(coordinates) if coordinate == Coordinate(i))
 
 
 def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coordinate, ...]:
-    """The coordinates, each joint's own where none are given; ValueError where a joint follows one that follows
-    another."""
+    """Return the coordinates of n joints after a check. Without coordinates, no joint is a mimic joint. Raises
+    ValueError if a mimic joint follows another mimic joint."""
     if not coordinates:
         return own_coordinates(n)
     if len(coordinates) != n:
@@ -60,11 +62,12 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Following:
-    """How all joints move with the coordinates: q_joints = shares q + offsets, rates_joints = ratios rates.
+    """Matrices that give the positions and rates of all joints, mimic joints included, from q and qd. They are q_joints
+    = shares q + offsets and rates_joints = ratios qd.
 
-    shares   (all joints' coordinates, nq)
-    offsets  (all joints' coordinates,)
-    ratios   (all joints' rates, nv)
+    shares   (coordinates of all joints, nq)
+    offsets  (coordinates of all joints,)
+    ratios   (rates of all joints, nv)
     """
 
     shares: NDArray[np.float64]
@@ -82,15 +85,20 @@ class Following:
         )
 
     def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All joints' (..., n) from (..., nq)."""
+        """Return the positions (..., n) of all n joints, mimic joints included, from the robot's q (..., nq)."""
         return np.asarray(times(q, self.shares.T) + self.offsets)
 
     def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All joints' (..., n) from (..., nv)."""
+        """Return the rates (..., n) of all n joints, mimic joints included, from the robot's qd (..., nv)."""
         return np.asarray(times(qd, self.ratios.T))
 
     def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
-        """Torques of the joints, or whatever has an axis of them, summed onto the coordinates."""
+        """Return torques with one entry per rate of the robot, from torques of all joints. The torque of a mimic joint,
+        times its ratio, is added to that of the joint that it follows.
+
+        values  array of torques, with one axis for the rates of all joints, mimic joints included
+        axis    number of this axis, which gets the length nv
+        """
         return np.moveaxis(times(np.moveaxis(values, axis, -1), self.ratios), -1, axis)
 
 

@@ -1,4 +1,4 @@
-"""Mechanisms that psdmc derives and lowers: trees whose joints have coordinates or follow another joint."""
+"""Checks whether psdmc can derive a model of a robot, and whether each joint has one coordinate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ AXES = "hold this joint: derive the model with --lock JOINT=0"
 
 
 def require_derivable(chain: Mechanism) -> None:
-    """InputError with a remedy where a joint is held: readers merge what does not move."""
+    """Raise InputError with a remedy if a joint of the mechanism is locked at a constant position. Readers of robot
+    files merge the links of such joints."""
     for joint, coordinate in zip(chain.joints, chain.coordinates, strict=True):
         if coordinate.leader is None:
             raise InputError(
@@ -20,7 +21,10 @@ def require_derivable(chain: Mechanism) -> None:
 
 
 def require_axes(chain: Mechanism, what: str) -> None:
-    """InputError where a joint has several coordinates: `what`, such as "calibration", is of joints with one each."""
+    """Raise InputError if a joint of the robot has several coordinates, such as a ball joint.
+
+    what  name of the operation that needs joints with one coordinate, such as "calibration"
+    """
     wide = next((joint for joint in chain.joints if not joint.type.about_z), None)
     if wide is not None:
         raise InputError(

@@ -1,4 +1,4 @@
-"""A DH robot's TOML file as plain data, every entry checked."""
+"""Reads the TOML file of a DH table (Denavit-Hartenberg parameters) into plain data, and checks every entry."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ UNKNOWN = math.nan
 
 @dataclass(frozen=True, slots=True)
 class DhLink:
-    """mass kg; com m in the link's frame; inertia_com kg m^2 about it (INERTIA_NAMES); NaN where unknown."""
+    """The inertia of one link of a DH table: mass in kg, com in m in the link's frame, and inertia_com in kg m^2 about
+    the centre of mass (INERTIA_NAMES). Unknown numbers are NaN."""
 
     mass: float = UNKNOWN
     com: Triple = (UNKNOWN, UNKNOWN, UNKNOWN)
@@ -42,9 +43,9 @@ class DhLink:
 
 @dataclass(frozen=True, slots=True)
 class DhJoint:
-    """One row of the table: a, d in m, alpha, theta in rad; drive_inertia in kg m^2 (kg), NaN if unknown.
+    """One row of a DH table: a and d in m, alpha and theta in rad, drive_inertia in kg m^2 (kg), NaN if unknown.
 
-    parent   the row that this one's joint hangs on, counted from 0, or BASE
+    parent   index, from 0, of the row whose link carries the joint of this row; BASE if the base carries the joint
     """
 
     name: str
@@ -61,7 +62,7 @@ class DhJoint:
 
 @dataclass(frozen=True, slots=True)
 class DhRobot:
-    """gravity in m/s^2 in the base frame."""
+    """The content of a DH file: name, convention, rows, and gravity in m/s^2 along the axes of the base frame."""
 
     name: str
     convention: Convention
@@ -70,7 +71,7 @@ class DhRobot:
 
 
 def read_dh(text: str, source: str) -> DhRobot:
-    """The file's content; InputError names everything that is wrong with it at once."""
+    """Return the content of a DH file. Raises one InputError that names all faults of the file."""
     problems: list[str] = []
     hint = "give a URDF or a DH .toml file"
     try:
@@ -194,7 +195,8 @@ Triple = tuple[float, float, float]
 
 
 def angle(value: object, accepted: Range = limits.ANGLE) -> float:
-    """An angle in rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
+    """Return an angle in rad, read from a number (rad) or a text such as "90 deg" or "1.5 rad". Raises ValueError for
+    anything else."""
     if not isinstance(value, str):
         return within(accepted)(value)
     plain = value.strip(WHITE_SPACE)
@@ -205,7 +207,7 @@ def angle(value: object, accepted: Range = limits.ANGLE) -> float:
 
 
 def finite(value: object) -> float:
-    """A finite number within the range of 64 bits; ValueError on anything else."""
+    """Return a number read from a file if it is finite as a 64-bit float. Raises ValueError for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"found {shown(value)}, expected a finite number")
     if not abs(value) <= sys.float_info.max:
@@ -214,7 +216,8 @@ def finite(value: object) -> float:
 
 
 def within(accepted: Range) -> Callable[[object], float]:
-    """A reader of finite numbers whose magnitude is in the range; its ValueError names the range."""
+    """Return a reading function for finite numbers whose magnitude must lie in a range. The ValueError of this function
+    names the range."""
 
     def convert(value: object) -> float:
         number = finite(value)
@@ -227,7 +230,7 @@ def within(accepted: Range) -> Callable[[object], float]:
 
 
 class CheckedTable:
-    """One TOML table, read key by key; faults go to `problems`, under the table's name."""
+    """Reads one TOML table key by key. All faults are collected in `problems`, each with the name of the table."""
 
     def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
         self.where, self.problems = where, problems
@@ -239,7 +242,8 @@ class CheckedTable:
                 problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
 
     def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
-        """The converted value, or `default` where it is missing or wrong."""
+        """Return the value of a key of the table, converted by a reading function. If the value is missing or wrong,
+        return `default`."""
         if key not in self.table:
             return default
         try:
@@ -254,26 +258,26 @@ LENGTH = within(limits.LENGTH)
 
 
 def as_it_is(value: object) -> object:
-    """The value itself, whatever it is: its parts are read one by one."""
+    """Return a value of a file unchanged. This reading function is for values whose parts are read one by one."""
     return value
 
 
 def plain_text(value: object) -> str:
-    """A text that is not empty."""
+    """Return a value of a file if it is a text that is not empty. Raises ValueError for anything else."""
     if not isinstance(value, str) or not value:
         raise ValueError(f"found {shown(value)}, expected a text")
     return value
 
 
 def any_list(value: object) -> list[object]:
-    """A list of anything."""
+    """Return a value of a file if it is a list, with entries of any type. Raises ValueError for anything else."""
     if not isinstance(value, list):
         raise ValueError(f"found {shown(value)}, expected a list")
     return value
 
 
 def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
-    """A reader of three values that `convert` reads."""
+    """Return a reading function for lists of three values. `convert` reads each of the values."""
 
     def read(value: object) -> Triple:
         values = any_list(value)
@@ -286,7 +290,7 @@ def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
 
 
 def not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
-    """A reader of zero and what is above it."""
+    """Return a reading function for numbers that must not be negative. `convert` reads the number."""
 
     def read(value: object) -> float:
         number = convert(value)
@@ -298,7 +302,7 @@ def not_negative(convert: Callable[[object], float]) -> Callable[[object], float
 
 
 def one_of(*words: str) -> Callable[[object], str]:
-    """A reader of one of these words."""
+    """Return a reading function that accepts only one of the given words."""
 
     def read(value: object) -> str:
         if not isinstance(value, str) or value not in words:
@@ -313,12 +317,12 @@ BASE_NAME = "base"
 
 
 def parents_of(names: Sequence[str], given: Sequence[object]) -> tuple[tuple[int, ...], list[str]]:
-    """Each row's parent, counted from 0, or BASE; and faults, one sentence each.
+    """Return the parent row of each row, as an index from 0 or BASE, and the faults, one sentence each.
 
-    names   of the rows' joints
-    given   each row's `parent` as the file has it: the name of a joint, or "base"; None: the row before
+    names   names of the rows' joints
+    given   `parent` of each row in the file: the name of a joint, or "base"; None: the row before
 
-    The rows of a branch stand together: a row's parent is the row before it, or one that carries that row.
+    The rows of a branch must be consecutive: the parent of a row is the row before, or an ancestor of the row before.
     """
     parents: list[int] = []
     faults: list[str] = []

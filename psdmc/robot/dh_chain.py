@@ -1,9 +1,11 @@
-"""Reader that makes a robot from a DH table.
+"""Makes a robot from a DH table.
 
-Standard: each row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next, which is the
-link's frame; the joint frame sits after Rz(theta + q), and the rest is the link frame's constant placement in
-it. Modified (Craig): Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and joint frame and link frame are one. A prismatic
-joint adds q to d instead, which commutes with Rz(theta).
+Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the distal frame is
+the link frame. The joint frame lies after Rz(theta + q), and the link frame has a constant placement in the joint
+frame.
+
+Modified convention (Craig): a row is Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and the joint frame is the link frame. For a
+prismatic joint q adds to d and not to theta.
 """
 
 from __future__ import annotations
@@ -25,7 +27,11 @@ from psdmc.robot.zeros import COM_NAMES, canonical
 
 
 def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames: Sequence[str] = ()) -> Draft:
-    """The robot in the file; gravity overrides the file's; rotations near exact ones snapped (rad)."""
+    """Return the robot that a DH file describes.
+
+    gravity  (3,) m/s^2, gravity that replaces that of the file; None: that of the file
+    snap     rad; angles that differ by at most this much from a right angle become exact
+    """
     robot = read_dh(text, source)
     joints, snaps = _placed_joints(robot, snap)
     parents = tuple(row.parent for row in robot.joints)
@@ -65,7 +71,7 @@ def _frame(joints: Sequence[Joint], name: str, source: str) -> NamedFrame:
 
 
 def link_name(number: int) -> str:
-    """Name of a link of a DH table, which has none of its own: link1, link2 and so on."""
+    """Return the name of a link of a DH table: link1, link2 and so on. The file gives links no names."""
     return f"link{number}"
 
 
@@ -104,7 +110,8 @@ def _parameters(row: DhJoint) -> Array:
 
 
 def settled(link: DhLink) -> tuple[float, Array, Array]:
-    """Mass, centre of mass and inertia about it, zero where the file's `zero` list says so."""
+    """Return mass, centre of mass, and inertia about the centre of mass of a link. Values that the `zero` list of the
+    file names are zero."""
     zero = canonical(link.zero)
     com_and_inertia = [
         0.0 if name in zero else value

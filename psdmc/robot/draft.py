@@ -1,4 +1,4 @@
-"""The result of reading a robot file: a robot whose assumptions are not applied yet."""
+"""The data that reading a robot file gives, before psdmc applies assumptions such as assume_zero."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 
 @dataclass(frozen=True, slots=True)
 class Snap:
-    """One rotation that was replaced by a near one with exact zeros: where, and the angle between them (rad).
+    """Records that a rotation of the robot file was replaced by a near one with exact zeros (snapped). `angle` is the
+    angle between both, rad; `where` names the rotation.
 
-    segment   the way it lies on, counted by the joint at its end: 0 from the base to the first link and so on; n from
-              the tip's link to the tip; BASE from the root to the base
+    segment   number of the joint that the rotation comes before: 0 for the first joint, and so on. n is between the
+              last link and the tip, BASE between the root and the base
     """
 
     where: str
@@ -29,15 +30,16 @@ BASE = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """A robot as its file states it. n joints.
+    """A robot with n joints as its file states it.
 
-    parameters     n arrays (11,), about the link frames; NaN where unknown; Im 0 where the file says nothing
-    zeros          n tuples of names assumed zero (psdmc.robot.zeros.ZERO_NAMES), by the file
+    parameters     n arrays (11,), about the link frames; NaN if unknown; the drive inertia Im is 0 if the file gives
+                   none
+    zeros          n tuples of names that the file states to be zero (psdmc.robot.zeros.ZERO_NAMES)
     drives         n flags: the file makes this joint's drive inertia a parameter
     gravity        (3,) m/s^2 in the base frame
     frames         named frames; empty: the tip alone
-    massless       moving links without inertia in the file, which is read as none
-    parents, tip_body, coordinates   as in Mechanism; left out: those of a serial chain
+    massless       moving links without inertia in the file, which psdmc treats as massless
+    parents, tip_body, coordinates   as in Mechanism; left out: those of a serial chain without mimic joints
     """
 
     name: str

@@ -1,4 +1,5 @@
-"""Kinds of robot files, recognised by name and first element, and the URDF or DH table that later stages read."""
+"""Recognises the format of a robot file by its name and first element, and converts it to the URDF or DH table that
+psdmc reads."""
 
 from __future__ import annotations
 
@@ -26,12 +27,13 @@ SourceFormat = Literal["urdf", "dh"]
 def as_source(
     file: Path, text: str, options: LoadOptions, packages: Mapping[str, Path]
 ) -> tuple[str, SourceFormat, LoadOptions]:
-    """The text to read, its format, and the options with what the file itself says: an MJCF's gravity and free root.
+    """Return the text of the robot to read, the format of the text, and the options. An MJCF file adds gravity and a
+    floating base to the options.
 
-    packages   folders of ROS packages that a xacro file names
+    packages   folders of ROS packages that a xacro file uses, by name
 
-    InputError where the file's format is not read, or needs a package that is not installed; and where an option is for
-    files of another format.
+    Raises InputError if psdmc does not read the file's format, or if the format needs a package that is not installed.
+    The error is also raised if an option is for files of another format.
     """
     suffix = file.suffix.lower()
     tag = "" if suffix == ".toml" else root_tag(text)

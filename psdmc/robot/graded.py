@@ -1,7 +1,8 @@
-"""Independent columns of a matrix, chosen in a given order: those of which little is left beside the others come last.
+"""Chooses independent columns of a matrix, in a given order if possible (QR with column pivoting). Columns that nearly
+depend on the others come last.
 
-The result is the same on every processor and in whatever precision the matrix has; between equal residuals the order
-decides, never rounding.
+The result is the same on every processor and in each precision of the matrix. The residual of a column is the part that
+is independent of the columns chosen before. If residuals are equal, the order of the columns decides and not rounding.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from psdmc.reproducible import combined, lengths
 
 
 def halving_shares(last: float) -> tuple[float, ...]:
-    """1/2, 1/4, ... down to `last`. The parameters are gone through once for each of these shares, in their own order,
-    and one becomes a pivot where what earlier pivots leave of its column exceeds the share. One pass with `last`
-    alone would find as many pivots, but would divide by small residuals where larger ones exist."""
+    """Return the thresholds 1/2, 1/4, ... down to `last`, with which `graded_pivots` chooses columns.
+
+    For each threshold the columns are examined in their order. A column is chosen (becomes a pivot) if its residual
+    exceeds this share of its length. The residual is the part that is independent of the columns chosen before. With
+    `last` as the only threshold, divisors could be small although larger ones exist.
+    """
     count = math.ceil(-math.log2(last))
     return (*(0.5**k for k in range(1, count)), last)
 
@@ -27,12 +31,16 @@ def halving_shares(last: float) -> tuple[float, ...]:
 def graded_pivots(
     work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float], groups: NDArray[Any] | None = None
 ) -> tuple[list[int], float, float]:
-    """Find the order in which columns of `work` (m, k) become pivots. Also returns the smallest share of a pivot, and
-    the largest share left of any other column. Changes `work` in place: its first rows become triangular in the pivots.
+    """Choose independent columns of `work` (m, k), as the module describes. Return their order, the smallest threshold
+    that was needed, and the largest residual of the other columns.
 
-    norms   (k,)  the columns' lengths beforehand
-    groups  (k,)  ascending; the columns of one group are gone through with all shares before the next group's. None: all
-                  are one group
+    A residual is the length of the part that is independent of the chosen columns, as a share of the column's length.
+    `work` is changed in place: its first rows become triangular in the chosen columns.
+
+    norms   (k,)  the columns' lengths before the call
+    shares        decreasing thresholds, as from `halving_shares`
+    groups  (k,)  ascending numbers of groups. All thresholds are applied to one group before the next group; None: one
+            group
     """
     pivots: list[int] = []
     taken = 1.0

@@ -1,4 +1,5 @@
-"""One link's inertia: standard parameters about its frame, and the conditions that a real body fulfils."""
+"""Standard inertial parameters of one link (mass, first moments, inertia) about the link's frame, and the conditions
+that they fulfil for a real body."""
 
 from __future__ import annotations
 
@@ -20,10 +21,10 @@ PHYSICAL_TOLERANCE = 1e-6
 
 
 def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
-    """(10,) m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the frame.
+    """Return the standard parameters (10,) m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the link frame.
 
     mass  kg, com (3,) m in the frame, inertia_com (6,) kg m^2 about the centre of mass (INERTIA_NAMES).
-    NaN where a number needed is NaN; zero times unknown is zero.
+    An entry is NaN if it depends on a NaN; zero times an unknown number is zero.
     """
     moment = [_times(mass, r) for r in com]
     _, y, z = com
@@ -34,7 +35,8 @@ def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
 
 
 def about_com(parameters: Array) -> tuple[float, Array, Array]:
-    """Mass, centre of mass (3,) and inertia about it (6,): undoes standard_parameters (mass not zero)."""
+    """Return mass, centre of mass (3,) and inertia about the centre of mass (6,) from standard parameters. The mass
+    must not be zero."""
     mass = float(parameters[0])
     com = parameters[1:4] / mass if mass else np.zeros(3)
     shift = standard_parameters(mass, com, np.zeros(6))[4:]
@@ -42,7 +44,7 @@ def about_com(parameters: Array) -> tuple[float, Array, Array]:
 
 
 def without_noise(parameters: Array) -> Array:
-    """Ten parameters with entries that are only rounding set to zero."""
+    """Return the ten standard parameters of a link with entries set to zero that are only rounding errors."""
     clean = np.array(parameters, dtype=float)
     for group in (slice(1, 4), slice(4, 10)):
         size = np.max(np.abs(clean[group]))
@@ -51,22 +53,23 @@ def without_noise(parameters: Array) -> Array:
 
 
 def inertia_matrix(six: Array) -> Array:
-    """(3, 3) from six components (INERTIA_NAMES)."""
+    """Return the inertia matrix (3, 3) from six components Ixx, Ixy and so on (order of INERTIA_NAMES)."""
     xx, xy, yy, xz, yz, zz = six
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def six_of(matrix: Array) -> Array:
-    """(6,) components (INERTIA_NAMES) of a symmetric matrix, from its upper triangle."""
+    """Return the six components Ixx, Ixy and so on (order of INERTIA_NAMES) of a symmetric matrix (3, 3), from the
+    upper triangle."""
     return matrix[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
 
 
 def physical_fault(mass: float, inertia_com: Array) -> str | None:
-    """The condition that a body with this mass (kg) and inertia (6,) about its centre violates, or None; unknown values
-    pass.
+    """Return a text that says why no real body has this mass (kg) and this inertia (6,) about the centre of mass; None
+    if a real body can have them. Unknown values are accepted.
 
-    A body exists where the mass is positive (or all is zero) and the principal moments obey the triangle inequality:
-    equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
+    A real body has a positive mass (or all values are zero), and the principal moments fulfil the triangle inequality.
+    This is equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
     """
     if np.isnan(mass) or np.isnan(inertia_com).any():
         return None

@@ -1,4 +1,5 @@
-"""Limbs of equal structure in a tree: branches on one body whose joints are alike, one by one."""
+"""Finds equal limbs of a robot, such as the legs of a quadruped: branches on the same body with the same joint
+structure."""
 
 from __future__ import annotations
 
@@ -11,10 +12,13 @@ Limbs = tuple[tuple[int, ...], ...]
 
 
 def limb_groups(parents: Sequence[int], labels: Sequence[Hashable]) -> tuple[Limbs, ...]:
-    """The groups of two or more limbs on one body, next to the base first; within limbs there are no further groups.
+    """Return the groups of two or more equal limbs (branches such as legs) on one body, those nearest to the base
+    first. Each limb is a tuple of joints.
 
-    parents  of each body, BASE or an earlier one
-    labels   joints with different ones do not correspond
+    parents  parent of each body: BASE or an earlier body
+    labels   a label for each joint; joints of equal limbs must have equal labels
+
+    If a limb itself carries equal branches, such as fingers of a hand, these are not returned as a further group.
     """
     tree = _Tree(parents, labels)
     groups: list[Limbs] = []
@@ -45,7 +49,8 @@ class _Tree:
             self.shapes[i] = known.setdefault(shape, len(known))
 
     def joints(self, branch: int) -> tuple[int, ...]:
-        """A branch's joints in an order that depends on shapes alone."""
+        """Return the joints of a branch. In branches of equal structure, corresponding joints have the same place in
+        this order."""
         found = [branch]
         for child in sorted(self.children[branch], key=lambda child: (self.shapes[child], child)):
             found += self.joints(child)

@@ -1,7 +1,7 @@
-"""Limits of a robot file: sizes and magnitudes. Every message that refuses one states it.
+"""Limits of the sizes and numbers in a robot file. If a file exceeds a limit, the error message states the limit.
 
-No robot has numbers beyond them. With such numbers, squares and products of lengths and masses would exceed the range
-of 64-bit numbers, and the error would show far from its cause.
+The limits are far beyond any real robot. With larger numbers, squares and products of lengths and masses would exceed
+the range of 64-bit floats. The error would then appear far from the wrong number.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ TINIEST = 1e-300
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Accepted magnitudes of one quantity: zero, or from `least` to `most`, in `unit`."""
+    """The accepted magnitudes of a quantity in a robot file: zero, or from `least` to `most`, in `unit`."""
 
     least: float
     most: float
@@ -53,7 +53,7 @@ class Range:
         return f"0, or {self.least:g} to {self.most:g} {self.unit} in magnitude".replace("  ", " ")
 
     def fault(self, value: float) -> str | None:
-        """Describe the fault of a finite number, or return None."""
+        """Return a description of what is wrong with a finite number of this quantity, or None if nothing is."""
         if value == 0.0 or self.least <= abs(value) <= self.most:
             return None
         return f"is out of range, expected {self}"
@@ -93,7 +93,7 @@ LONGEST_LENGTH = Range(1e-6, 1e4, "m")
 
 
 def shown(value: object) -> str:
-    """A file's text or value for a message: quoted as Python quotes it, shortened where it is long."""
+    """Return a text or value of a file for a message: quoted as in Python, and shortened if it is long."""
     try:
         text = repr(value)
     except ValueError:
@@ -103,25 +103,26 @@ def shown(value: object) -> str:
 
 
 def joined(faults: Sequence[str]) -> str:
-    """Faults in one line, shortened where there are many."""
+    """Return a list of faults as one line of a message, shortened if there are many."""
     more = [f"and {len(faults) - MOST_FAULTS} more"] if len(faults) > MOST_FAULTS else []
     return "; ".join([*faults[:MOST_FAULTS], *more])
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:
-    """Names in quotes for a message, shortened where there are many."""
+    """Return names in quotes for a message, shortened if there are many."""
     quoted = [f"'{name}'" for name in names]
     return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
 
 
 def gravity_fault(gravity: Sequence[float]) -> str | None:
-    """Describe the fault of a gravity vector (three finite numbers, m/s^2), or return None."""
+    """Return a description of what is wrong with a gravity vector (three finite numbers, m/s^2), or None if nothing
+    is."""
     faults = [GRAVITY.fault(component) for component in gravity]
     return next((fault for fault in faults if fault), None) or GRAVITY_LENGTH.fault(math.hypot(*gravity))
 
 
 def scale_fault(lengths: Iterable[float]) -> str | None:
-    """Describe the fault of a robot's lengths (m) as a whole, or return None."""
+    """Return a description of what is wrong with the lengths of a robot (m) as a whole, or None if nothing is."""
     longest = max((abs(length) for length in lengths), default=0.0)
     fault = LONGEST_LENGTH.fault(longest)
     return f"the longest of all its lengths, {longest:g} m, {fault}" if fault else None

@@ -1,4 +1,4 @@
-"""Read a robot file with its options: the first stage, in one call."""
+"""Reads a robot file with its options. This is the first step of the compiler."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ __all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_r
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRobot:
-    """A mechanism and its source.
+    """A robot read from a file: the mechanism, the text from which psdmc read it, and the options.
 
     source_name   the file's name in messages
-    snap_report   every rotation that was replaced by a near exact one, with the angle between them (rad)
+    snap_report   every rotation that was replaced by a near one with exact zeros, with the angle between both (rad)
     """
 
     mechanism: Mechanism
@@ -49,11 +49,12 @@ class LoadedRobot:
 
     @property
     def chain(self) -> Mechanism:
-        """The mechanism, by its name in psdmc 0.1."""
+        """The mechanism: joints, bodies and gravity of the robot. psdmc 0.1 used the name `chain` for it."""
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
-        """Return the robot with the file's rotations, to compute the effect of snapping."""
+        """Return the robot with the rotations as the file states them. psdmc uses this robot to compute the effect of
+        snapping, which replaces rotations by near ones with exact zeros."""
         keywords = self.options.as_json() | {"snap": 0.0}
         return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
 
@@ -61,10 +62,11 @@ class LoadedRobot:
 def load_robot(
     path: str | Path, *, packages: Mapping[str, str | PathLike[str]] | None = None, **options: Any
 ) -> LoadedRobot:
-    """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
-    element). Options as in LoadOptions; `packages` are folders of ROS packages, by name, that a xacro file may look for.
+    """Return the robot in a URDF, MJCF, xacro or DH TOML file.
 
-    InputError where the file or an option is wrong, naming what and where.
+    The suffixes .toml and .xacro and the root element determine the format. Options are those of LoadOptions;
+    `packages` are folders of ROS packages, by name, that a xacro file uses. Raises InputError if the file or an option
+    is wrong.
     """
     file = Path(path)
     text = robot_text(file)
@@ -76,7 +78,8 @@ def load_robot(
 def load_robot_text(
     text: str, source_format: SourceFormat, *, source_name: str = "robot", **options: Any
 ) -> LoadedRobot:
-    """The robot in a text, such as the source embedded in a saved model; see load_robot."""
+    """Return the robot in a text, such as the source that a saved model contains. Options and errors are those of
+    load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     return _loaded(text, source_format, source_name, checked_options(**options))
 
@@ -97,7 +100,8 @@ def _refuse_size(size: int, source: str) -> None:
 
 
 def robot_text(file: Path) -> str:
-    """The file's text; InputError where it cannot be read, is no text, or is larger than robot files are."""
+    """Return the text of a robot file. Raises InputError if the file cannot be read, is no text, or is too large for a
+    robot file."""
     try:
         data = read_file(file, limits.MAX_BYTES, "give a URDF or a DH .toml file")
         if data.startswith(PACKED):

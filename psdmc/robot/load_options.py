@@ -1,4 +1,4 @@
-"""The options that define a robot together with its file, every value checked."""
+"""The options that define a robot together with its file, such as base, tip and gravity, with checks of every value."""
 
 from __future__ import annotations
 
@@ -29,21 +29,25 @@ MAX_SNAP = 0.1
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """The options that define the robot together with the file; plain values, so that a saved model can be read again.
+    """The options that define the robot together with the file. All are plain values, which a model file can contain,
+    so the robot can be read again.
 
-    base, tip      link names of a URDF, ends of the chain that is cut out; None for both: the whole tree from the root
-    gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
-    assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
-    snap           rad; 0 keeps the file's rotations but for floating-point noise
-    frames         names of the links that kinematic functions are about; empty: the tip
-    tool           x y z (m), roll pitch yaw (rad) of a further frame 'tool' in the tip frame; None: no such frame
-    lock           joints of a URDF that are held: positions by name, rad or m
+    base, tip      names of the first and last link of a chain in a URDF; None for both: the whole robot
+    gravity        m/s^2 in the URDF's root frame or the DH base frame; None: the file's own, or (0, 0, -9.81)
+    drive_inertia  True: the drive inertia of each joint is a parameter of unknown value; numbers: the values, one per
+                   joint, kg m^2 (kg)
+    assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
+    snap           rad; 0 keeps the file's rotations except for floating-point noise
+    frames         names of the links whose frames become named frames, for which psdmc generates poses and Jacobians;
+                   empty: the tip
+    tool           x y z (m), roll pitch yaw (rad) of an additional frame 'tool' in the tip frame; None: no such frame
+    lock           joints of a URDF that are locked: positions by name, rad or m
     floating       whether the root link of a URDF is on a free joint
-    root           the body under an MJCF's world that the robot begins with; None: all of them
+    root           the robot's first body in an MJCF with several separate bodies; None: all bodies
     xacro_args     values of a xacro file's arguments
-    unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": those without any
-    contacts       frames that can touch the world, which are among `frames` then: "foot" is a point, "foot:6" a surface
+    unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": links without
+                   any
+    contacts       frames that can touch the world, which `frames` contains: "foot" is a point, "foot:6" a surface
     """
 
     base: str | None = None
@@ -62,14 +66,17 @@ class LoadOptions:
     contacts: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """Keyword arguments of load_robot_text as plain JSON values. Later options are included only where they are given,
-        so that models without them keep the hash of earlier versions."""
+        """Return the keyword arguments of load_robot_text as plain JSON values.
+
+        Options that newer versions added are included only if they are used. So models without them keep the hash of
+        earlier versions.
+        """
         plain = asdict(self)
         return {name: value for name, value in plain.items() if name not in LATER or value}
 
 
 def checked_options(**given: Any) -> LoadOptions:
-    """The options as LoadOptions, each checked; InputError names the first that is wrong."""
+    """Return the options as LoadOptions after a check of every value. Raises InputError for the first wrong option."""
     options = LoadOptions(
         **{name: CHECKS[name](value) if name in CHECKS else value for name, value in given.items()}
     )
@@ -124,7 +131,8 @@ def _each_once(what: str, given: Sequence[str]) -> tuple[str, ...]:
 
 
 def parsed_contact(text: str) -> tuple[str, int]:
-    """Name and rows of a contact from a text such as "lf_foot" (a point) or "lf_foot:6" (a surface)."""
+    """Return name and number of rows of a contact from a text such as "lf_foot" (a point, 3) or "lf_foot:6" (a
+    surface, 6)."""
     name, colon, rows = text.rpartition(":")
     if not colon or not rows.isdecimal():
         return text, POINT

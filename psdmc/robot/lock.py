@@ -1,4 +1,4 @@
-"""Joints of a URDF that are held at a position: later stages see them as fixed ones."""
+"""Locks joints of a URDF at a position. Later steps treat them as fixed joints."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from psdmc.robot.urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
 
 def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> dict[str, float]:
-    """Return the position, rad or m, of each held joint: those in `lock` and those that follow one of them. Joints that
-    follow with a multiplier of zero are held, too.
+    """Return the position, rad or m, of each locked joint: joints in `lock`, mimic joints that follow one of them, and
+    mimic joints with a multiplier of zero.
 
-    InputError where `lock` names no movable joint, or a position that a joint cannot have; and for a joint of a type that
-    URDF does not have.
+    Raises InputError if `lock` names no movable joint or a position that the joint cannot have, and for joints of a
+    type that URDF does not have.
     """
     known = {joint.name: joint for joint in robot.joints}
     movable = [joint.name for joint in robot.joints if joint.is_movable]
@@ -62,7 +62,7 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
 
 
 def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobot:
-    """The robot with these joints fixed at their positions, and a note for each."""
+    """Return the robot with the locked joints fixed at their positions, and a note for each of these joints."""
     held = held_positions(robot, lock, source)
     if not held:
         return robot
@@ -99,7 +99,7 @@ def _has_position(joint: UrdfJoint) -> bool:
 
 
 def parsed(texts: Sequence[str]) -> dict[str, float]:
-    """Positions by joint from texts of the command line such as "elbow=0.5" (rad or m)."""
+    """Return positions by joint name from texts of the command line such as "elbow=0.5" (rad or m)."""
     found: dict[str, float] = {}
     for text in texts:
         name, equals, value = text.rpartition("=")

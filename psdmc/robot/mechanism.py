@@ -1,4 +1,4 @@
-"""The robot as psdmc holds it: bodies in a tree, each on a joint that moves about or along its own z."""
+"""The data structure of a robot: a tree of bodies, each attached to its parent by a joint."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ FREE_RATES = 6
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """A joint's limits in SI units (rad or m and their rates, N m or N); infinite where the file gives none."""
+    """Limits of a joint: lower and upper position, speed, acceleration and effort, in SI units (rad or m and their
+    rates, N m or N). A limit that the file does not give is infinite."""
 
     lower: float = -math.inf
     upper: float = math.inf
@@ -55,12 +56,13 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """One movable joint and the link that it carries.
+    """One movable joint and the link that it moves.
 
-    The joint frame F is psdmc's own: its z is the joint's axis, it moves with the link. At q = 0 it sits at `placement`
-    in its parent's joint frame (or in the base frame), so that
-    F_parent -> F  is  placement @ type.transform(q):  Rz(q) where the joint turns, Tz(q) where it slides.
-    The link frame is the file's (URDF child link frame, DH distal frame), `link_frame` its constant placement in F.
+    psdmc defines the joint frame F: the z axis of F is the axis of the joint, and F moves with the link. At q = 0, F
+    has the placement `placement` in the joint frame of the parent (or in the base frame). The transform
+    F_parent -> F  is  placement @ type.transform(q):  Rz(q) for a rotation, Tz(q) for a translation.
+    The link frame is that of the file (URDF child link frame, DH distal frame). `link_frame` is the constant placement
+    of the link frame in F.
     """
 
     name: str
@@ -72,18 +74,18 @@ class Joint:
 
     @property
     def kind(self) -> str:
-        """The type's word."""
+        """Name of the joint's type, such as 'revolute'."""
         return self.type.word
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame:
-    """A frame that kinematic functions are about: fixed to one of the chain's links.
+    """A frame fixed to a link, for which psdmc generates poses, Jacobians and other kinematic functions.
 
-    name       a link's of the file, or a user's own: untrusted text
-    joint      number of the joint whose frame it moves with; 0 is the first
-    placement  its place in that joint frame
-    rows       what a contact there holds: 3, its point, or 6, its orientation too; 0: there is no contact
+    name       name of a link in the file, or a name from the user: untrusted text
+    joint      index of the joint frame with which the named frame moves; 0 is the first
+    placement  placement of the named frame in this joint frame
+    rows       contact rows: 3 for a point, 6 for a surface, 0 for no contact
     """
 
     name: str
@@ -93,7 +95,8 @@ class NamedFrame:
 
 
 def contact_names(contacts: Iterable[tuple[str, int]]) -> dict[str, tuple[str, ...]]:
-    """Names of contacts and of their rows, by the words of arrays' axes."""
+    """Return the names of contacts ('contacts'), and the names of the contacts' rows ('contact_rows', such as
+    'foot.x'). They label the axes of arrays."""
     own = tuple(contacts)
     rows = (f"{name}.{axis}" for name, count in own for axis in ("x", "y", "z", "rx", "ry", "rz")[:count])
     return {"contacts": tuple(name for name, _ in own), "contact_rows": tuple(rows)}
@@ -101,21 +104,21 @@ def contact_names(contacts: Iterable[tuple[str, int]]) -> dict[str, tuple[str, .
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mechanism:
-    """A robot: kinematics, gravity and what is known of its inertia. n joints, each with the body that it carries.
+    """A robot with n joints: its kinematics, gravity and what is known of its inertia. Each joint moves one body.
 
     joints           n, parents before their children; a serial chain's from base to tip
-    parameters       (n, 11)   standard parameters x about the link frames (PARAMETER_NAMES), SI; NaN where unknown
-    parameter_span   (11 n, k) columns span the parameters that the assumptions allow (assume-zero, no drive inertia,
-                               links without inertia), in reduced column echelon form: each column leads with a one, in
-                               a row where all others are zero
+    parameters       (n, 11)   standard parameters x about the link frames (PARAMETER_NAMES), SI; NaN if unknown
+    parameter_span   (11 n, k) basis, of k columns, of the parameters that assumptions allow (assume_zero, no drive
+                     inertia, links without inertia). The basis is in reduced column echelon form: each column leads
+                     with a one, in a row where all other columns are zero
     gravity          (3,)      m/s^2, acceleration of gravity in the base frame
     tip              tip frame in the joint frame of `tip_body`
-    notes            what was snapped, merged, locked, assumed or found odd, one sentence each, for `show`
-    parents          n, the body that each joint hangs on: its index, or BASE; left out: each on the one before
-    tip_body         the body that the tip frame is fixed to; left out: the only leaf
-    coordinates      n, which coordinate each joint's q follows; left out: each joint its own
+    notes            what was snapped, merged, locked or assumed, one sentence each, for the command `show`
+    parents          n, the parent body of each body: its index, or BASE; left out: the body before
+    tip_body         the body that the tip frame is fixed to; left out: the only body without children
+    coordinates      n, the coordinate that determines each joint's q; left out: no joint is a mimic joint
     frames           named frames; left out: the tip alone
-    massless         moving links without inertia in the file, which is read as none: they have no parameters
+    massless         moving links without inertia in the file, which psdmc treats as massless: they have no parameters
     """
 
     name: str
@@ -158,12 +161,13 @@ class Mechanism:
 
     @property
     def has_unknown_body(self) -> NDArray[np.bool_]:
-        """(n,) whether one of a link's ten body parameters is unknown."""
+        """Return for each of n links whether at least one of the ten inertial parameters is unknown."""
         return np.asarray(np.isnan(self.parameters[:, :DRIVE]).any(axis=1))
 
     @property
     def known_parameters(self) -> Array:
-        """(n, 11) standard parameters, zero in links with an unknown body and for unknown drive inertias."""
+        """Return the standard parameters (n, 11) with zeros for everything unknown: links with an unknown parameter,
+        and unknown drive inertias."""
         known = np.nan_to_num(self.parameters)
         known[self.has_unknown_body, :DRIVE] = 0.0
         return known
@@ -174,13 +178,13 @@ class Mechanism:
 
     @property
     def q_names(self) -> tuple[str, ...]:
-        """nq names of q's entries: a joint's own name, or 'joint.x' and so on where it has several coordinates."""
+        """Names of the nq entries of q: the joint's name, or 'joint.x' and so on if the joint has several coordinates."""
         own = (self.joints[i] for i in self.own_joints)
         return tuple(name for joint in own for name in _entry_names(joint.name, joint.type.q_names))
 
     @property
     def v_names(self) -> tuple[str, ...]:
-        """nv names of the entries of rates, accelerations and torques, likewise: 'joint.vx'."""
+        """Names of the nv entries of rates, accelerations and torques: the joint's name, or 'joint.vx' and so on."""
         own = (self.joints[i] for i in self.own_joints)
         return tuple(name for joint in own for name in _entry_names(joint.name, joint.type.v_names))
 
@@ -190,7 +194,8 @@ class Mechanism:
 
     @property
     def contacts(self) -> tuple[NamedFrame, ...]:
-        """The named frames at which there can be contacts: all, as points, where none are declared."""
+        """The named frames at which contacts are possible. If the user declared none, each named frame is a contact
+        point."""
         return tuple(frame for frame in self.frames if frame.rows)
 
     @property
@@ -203,43 +208,44 @@ class Mechanism:
 
     @property
     def nq(self) -> int:
-        """Length of q: coordinates of all joints that follow no other."""
+        """Length of q: the number of coordinates of all joints except mimic joints."""
         return sum(self.joints[i].type.nq for i in leaders(self.coordinates))
 
     @property
     def nv(self) -> int:
-        """Length of qd, qdd and tau: their rates."""
+        """Length of qd, qdd and tau: the number of rates of all joints except mimic joints."""
         return sum(self.joints[i].type.nv for i in leaders(self.coordinates))
 
     @property
     def rate_joints(self) -> tuple[int, ...]:
-        """nv, the joint that each rate belongs to."""
+        """Return the index of the joint for each of the nv rates."""
         own = leaders(self.coordinates)
         return tuple(i for i in own for _ in range(self.joints[i].type.nv))
 
     @property
     def leaves(self) -> tuple[int, ...]:
-        """Bodies that carry no other."""
+        """Bodies that have no children."""
         return tuple(i for i in range(len(self)) if i not in self.parents)
 
     @property
     def is_serial(self) -> bool:
-        """Whether each body hangs on the one before, the first on the base, and the tip is on the last."""
+        """Whether the bodies form a serial chain from the base with the tip on the last body."""
         return self.parents == serial_parents(len(self)) and self.tip_body == len(self) - 1
 
     @property
     def has_free_root(self) -> bool:
-        """Whether the first body may move in every way against the base."""
+        """Whether the first body is on a free joint, with six degrees of freedom."""
         return self.types[0].nv == FREE_RATES and self.parents[0] == BASE
 
     @property
     def base_frame(self) -> str:
-        """The frame in which gravity and placements are given, in words."""
+        """Return the name of the frame in which gravity and placements are given: base frame, or world frame if the
+        base floats."""
         return "world frame" if self.has_free_root else BASE_FRAME
 
     @property
     def own_joints(self) -> tuple[int, ...]:
-        """The joints that follow no other, in order."""
+        """Indices of the joints that are not mimic joints, in order."""
         return leaders(self.coordinates)
 
     @property
@@ -247,12 +253,12 @@ class Mechanism:
         return len(self.own_joints) < len(self)
 
     def parent_link(self, body: int) -> str:
-        """Name of the link that a body's joint hangs on."""
+        """Return the name of the link to which the joint of a body is attached."""
         parent = self.parents[body]
         return self.base_name if parent == BASE else self.joints[parent].link_name
 
     def path_to(self, body: int) -> tuple[int, ...]:
-        """Bodies from the base to this one, which is the last."""
+        """Return the bodies on the path from the base to a body. The last entry is this body itself."""
         path: list[int] = []
         while body != BASE:
             path.append(body)
@@ -268,7 +274,8 @@ def _entry_names(joint: str, several: Sequence[str]) -> tuple[str, ...]:
 
 
 def serial_parents(n: int) -> tuple[int, ...]:
-    """The parents of a serial chain of n bodies: each is the body before, the first one's is the base."""
+    """Return the parents of a serial chain of n bodies: the base for the first body, and the previous body for each
+    other one."""
     return tuple(range(BASE, n - 1))
 
 
@@ -294,5 +301,5 @@ def _checked_tip(tip_body: int, leaves: Sequence[int], n: int) -> int:
 
 
 def parameter_names(link_names: Sequence[str]) -> tuple[str, ...]:
-    """Names of x, link by link: 'link:mx' and so on."""
+    """Return the names of the standard parameters x, link by link: 'link:mx' and so on."""
     return tuple(f"{link}:{name}" for link in link_names for name in PARAMETER_NAMES)

@@ -1,4 +1,4 @@
-"""Mimic joints of a URDF as coordinates: q = ratio q_leader + offset; a leader has a coordinate of its own."""
+"""Converts the mimic joints of a URDF to coordinates: q = ratio q_leader + offset, where the leader is no mimic joint."""
 
 from __future__ import annotations
 
@@ -13,26 +13,28 @@ from psdmc.robot.urdf import UrdfJoint
 
 
 class Followed(NamedTuple):
-    """The joint that another one follows, directly or through others: q = ratio q_joint + offset."""
+    """Describes which joint a mimic joint follows, directly or through other mimic joints: q = ratio q_joint +
+    offset."""
 
     joint: UrdfJoint
     ratio: float
     offset: float
 
     def position(self, q: float) -> float:
-        """Position of the follower, for position q of the joint."""
+        """Return the position of a mimic joint from the position q of the joint that it follows."""
         return self.ratio * q + self.offset
 
 
 def mimic_coordinates(
     movable: Sequence[UrdfJoint], every: Sequence[UrdfJoint], source: str
 ) -> tuple[Coordinate, ...]:
-    """Each movable joint's coordinate; a joint that follows a follower gets the first leader's.
+    """Return the coordinate of each movable joint, which says which joint it follows. If a mimic joint follows another
+    mimic joint, the leader is the first joint of the sequence that follows none.
 
     movable  the robot's joints, in order
     every    all joints of the file
 
-    InputError names followers that form a ring, and leaders that are not joints of the robot.
+    Raises InputError if mimic joints form a ring, or if a leader is not a joint of the robot.
     """
     known = {joint.name: joint for joint in every}
     index = {joint.name: i for i, joint in enumerate(movable)}
@@ -54,9 +56,10 @@ def mimic_coordinates(
 def followed(
     joint: UrdfJoint, known: Mapping[str, UrdfJoint], source: str, ends: Collection[str] = ()
 ) -> Followed:
-    """Return the joint that a mimic joint follows: the first one that mimics none, or is among `ends`.
+    """Return the joint that a mimic joint follows, directly or through other mimic joints. The search ends at a joint
+    that is no mimic joint, or that is among `ends`.
 
-    InputError where the joints form a ring, or its leader is no movable joint.
+    Raises InputError if the joints form a ring, or if the leader is not a movable joint.
     """
     _refuse_wide(joint, source)
     ratio, offset, here, passed = 1.0, 0.0, joint, [joint.name]

@@ -1,6 +1,7 @@
-"""Moving links without inertia in a URDF: massless, as the standard says, or unknown where a user or the whole file says so.
+"""Decides whether moving links without inertia in a URDF are massless or have unknown inertia. They are massless by
+the URDF standard. They are unknown if the user says so, or if no moving link of the file has an inertia.
 
-A body is a link with all that is fixed to it, so that frames without inertia do not count.
+A link counts together with all links that are fixed to it, so a frame without inertia on a heavy link is not affected.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ MOST_NAMED = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedBodies:
-    """The bodies of n moving links.
+    """The inertias of n moving links, after the decision which links are massless and which are unknown.
 
-    parameters  n (11,), NaN where unknown
-    zeros       n names assumed zero: the mass of those without inertia
-    massless    links without inertia in the file, which is read as none
+    parameters  n (11,), NaN if unknown
+    zeros       n tuples of parameters assumed zero: the mass of massless links
+    massless    names of the links without inertia in the file that are treated as massless
     """
 
     parameters: tuple[Array, ...]
@@ -48,11 +49,13 @@ def judged_bodies(
     unknown: Sequence[str],
     source: str,
 ) -> JudgedBodies:
-    """The bodies (10,) of a route's movable joints, those that `unknown` names or the whole file lacks made unknown.
+    """Return the inertias of the links that the selected movable joints move. Inertias are unknown for links that
+    `unknown` names, and for all links if no moving link of the file has an inertia.
 
-    bodies   the links of each
+    bodies   for each joint, the links that move with it
+    merged   for each joint, the parameters (10,) of these links together
 
-    InputError where `unknown` names a link that does not move.
+    Raises InputError if `unknown` names a link that does not move.
     """
     children = [joint.child for joint in route.movable]
     bare = [robot.inertials[link] is None and not x.any() for link, x in zip(children, merged, strict=True)]
@@ -106,7 +109,8 @@ def _unknown(
 
 
 def with_massless_warning(chain: Mechanism) -> Mechanism:
-    """The mechanism with a first note that names massless links, what they make impossible, and the option for them."""
+    """Return the mechanism with a warning about massless links as the first note. The note names the links, what psdmc
+    cannot generate because of them, and the option that makes their inertia unknown."""
     if not chain.massless:
         return chain
     idle = [chain.joints[i].name for i in idle_joints(chain)]
@@ -127,20 +131,22 @@ def with_massless_warning(chain: Mechanism) -> Mechanism:
 
 
 def massless_words(chain: Mechanism) -> str:
-    """List the links without inertia in the file, as subject and verb of a sentence."""
+    """Return the beginning of a sentence that lists the links without inertia, such as "link 'fore' has no
+    <inertial>"."""
     if len(chain.massless) == 1:
         return f"link '{chain.massless[0]}' has no <inertial>"
     return f"{len(chain.massless)} links ({listed(chain.massless, MOST_NAMED)}) have no <inertial>"
 
 
 def unknown_option(chain: Mechanism) -> str:
-    """The option that keeps the parameters of massless links, as a shell takes it."""
+    """Return the option of the command line, quoted for a shell, that makes the inertia of massless links unknown."""
     few = len(chain.massless) <= MOST_NAMED
     return f"--unknown {shlex.quote(','.join(chain.massless)) if few else MISSING}"
 
 
 def idle_joints(chain: Mechanism) -> tuple[int, ...]:
-    """The joints that move no mass, inertia or drive inertia: with them, or by others that follow them."""
+    """Return the joints that move no mass, no inertia and no drive inertia. Masses that a joint moves through mimic
+    joints count."""
     leaders = [i if c.leader is None else c.leader for i, c in enumerate(chain.coordinates)]
     moving = {
         leaders[i] for body, x in enumerate(chain.parameters) if x[:DRIVE].any() for i in chain.path_to(body)

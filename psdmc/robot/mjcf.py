@@ -1,7 +1,8 @@
-"""An MJCF file as MuJoCo itself compiles it: defaults, includes, geometry's inertias and reference positions resolved.
+"""Reads an MJCF file by MuJoCo's own compiler, which resolves defaults, includes, inertias of shapes and reference
+positions.
 
-The compiled model is written down as a URDF of the same tree (psdmc/robot/mjcf_text.py). All that psdmc does with URDFs
-then holds for it, and a model file has a source that can be read again without MuJoCo and the file's includes.
+The compiled model is converted to a URDF of the same tree (psdmc/robot/mjcf_text.py). So all functions for URDFs work.
+A model file contains this URDF, which can be read again without MuJoCo and the included files.
 """
 
 from __future__ import annotations
@@ -46,7 +47,8 @@ REASON = 300
 
 @dataclass(frozen=True, slots=True)
 class MjcfRobot:
-    """text: a URDF of the tree; gravity m/s^2 in the world's frame; `is_free`: the root link is on a free joint."""
+    """The result of reading an MJCF file. `text` is a URDF of the tree, and `gravity` is in m/s^2 along the world's
+    axes. `is_free` says whether the root link is on a free joint."""
 
     text: str
     gravity: tuple[float, float, float]
@@ -54,11 +56,12 @@ class MjcfRobot:
 
 
 def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
-    """The robot in an MJCF file.
+    """Return the robot in an MJCF file.
 
-    root   the body under the world that the robot begins with, where several move: the others are left out
+    root   the robot's first body if several separate bodies move; the others are left out
 
-    InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
+    Raises InputError if MuJoCo is not installed or rejects the file, or if the file has elements that psdmc does not
+    model.
     """
     try:
         import mujoco
@@ -187,7 +190,8 @@ def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None
 
 
 def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
-    """Notes on what the model of rigid bodies leaves out, by name."""
+    """Return notes, with names, on elements of the MJCF file that the rigid-body model leaves out, such as
+    actuators."""
     joints, bodies = range(model.njnt), range(model.nbody)
     found = {
         "actuators are not modelled: efforts are those of the joints": _names(

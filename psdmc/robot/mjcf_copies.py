@@ -1,7 +1,7 @@
-"""Bounds on repeated elements of an MJCF file, in itself and in all that it includes and attaches.
+"""Limits how many repeated elements an MJCF file has, together with the files that it includes and attaches.
 
-MuJoCo's compiler takes time that grows with the square of the copies, and dies of a model that is a part of itself; no
-signal ends the one, no exception tells of the other.
+MuJoCo's compile time grows with the square of the number of copies and cannot be interrupted. A model that attaches
+itself crashes MuJoCo. So psdmc checks both before it calls MuJoCo.
 """
 
 from __future__ import annotations
@@ -65,9 +65,12 @@ class _Reading:
 
 
 def refuse_many_copies(path: Path, source: str) -> None:
-    """Raise InputError for a file with more than MAX_COPIES repeated elements, or one that attaches itself. Included
-    and attached files count. It also refuses a mesh or a field that is too large, and repetition in a file that is no
-    well-formed XML. Whatever else is wrong with it is left to MuJoCo."""
+    """Raise InputError if a file has more than MAX_COPIES repeated elements or attaches itself. Included and attached
+    files count.
+
+    The function also rejects meshes and height fields that are too large, and files with repetition that are not
+    well-formed XML. MuJoCo reports all other faults.
+    """
     copies = _of_document(path, _Reading(source)).copies
     if not copies <= MAX_COPIES:
         many = f"{copies:.0f}" if copies < MOST_DIGITS else f"more than {MOST_DIGITS:.0f}"
@@ -226,7 +229,8 @@ ROOM = ("nkey", "nuserdata", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_sit
 
 
 def refuse_large(element: Element, source: str) -> None:
-    """InputError where an element asks for more points, cells or numbers than a robot's file has use for."""
+    """Raise InputError if an element of an MJCF file asks for more points, cells or numbers than a robot's file
+    needs."""
     if element.tag == "mesh" and element.get("builtin"):
         most = MAX_CORNERS if element.get("builtin") == CONE else MAX_POINTS
         _refuse(_points(element), most, "points", f"mesh {_name(element)}", source)

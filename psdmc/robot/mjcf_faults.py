@@ -1,4 +1,5 @@
-"""Elements of an MJCF file that change how the tree moves: followers, and elements that psdmc refuses by name."""
+"""Finds elements of an MJCF file that change how the robot moves: mimic joints, which follow other joints, and elements
+that psdmc rejects by name."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
 
 @dataclass(frozen=True, slots=True)
 class Follows:
-    """q of a joint is ratio times that of `leader`, plus offset."""
+    """Describes a mimic joint of an MJCF file: its position q is ratio times that of `leader`, plus offset."""
 
     leader: str
     ratio: float
@@ -23,7 +24,7 @@ class Follows:
 
 
 def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """InputError that names all constraints and joints that psdmc has no model of."""
+    """Raise InputError with the names of all constraints and joints that psdmc cannot model."""
     faults = [
         *_loops(mujoco, model),
         *_followed_twice(mujoco, model, names),
@@ -48,7 +49,8 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
 
 
 def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """InputError that names joints whose reference position is no place that sine and cosine are exact for."""
+    """Raise InputError with the names of joints whose reference position is outside the accepted range. At larger
+    angles, sine and cosine lose digits."""
     ranges = {int(mujoco.mjtJoint.mjJNT_HINGE): ANGLE, int(mujoco.mjtJoint.mjJNT_SLIDE): LENGTH}
     found = []
     for j in range(model.njnt):
@@ -60,7 +62,7 @@ def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> Non
 
 
 def refuse_armatures(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """InputError that names joints and actuators with negative armatures, which MuJoCo takes."""
+    """Raise InputError with the names of joints and actuators that have negative armatures. MuJoCo accepts them."""
     own = [(j, float(model.dof_armature[model.jnt_dofadr[j]])) for j in range(model.njnt)]
     found = [f"joint {shown(names.joint(j))}: armature {value:g}" for j, value in own if value < 0.0]
     found += [
@@ -116,12 +118,13 @@ def _wide_drives(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
 
 
 def of_balls(mujoco: Any, model: Any) -> list[int]:
-    """Numbers of the ball joints."""
+    """Return the numbers of the ball joints among the joints of MuJoCo's model."""
     return [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL]
 
 
 def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
-    """Joints that an equality constraint makes follow another: q1 - ref1 = c0 + c1 (q2 - ref2)."""
+    """Return the joints that follow another joint by an equality constraint q1 - ref1 = c0 + c1 (q2 - ref2). Here ref1
+    and ref2 are the reference positions of the joints."""
     found = {}
     for k in range(model.neq):
         if not (is_active(mujoco, model, k) and _is_linear(mujoco, model, k)):

@@ -1,6 +1,7 @@
-"""Values that a compiled MJCF spreads over several arrays: drive inertias, force coefficients, active constraints.
+"""Collects values that a compiled MJCF file stores in several arrays: drive inertias, force coefficients and active
+constraints.
 
-Arrays that the installed MuJoCo does not have yet are zero.
+If the installed version of MuJoCo does not have an array, its values count as zero.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ Array = NDArray[np.float64]
 
 
 def armatures(mujoco: Any, model: Any) -> Array:
-    """(njnt,) drive inertia at each joint, kg m^2 (kg): its own, and that of each actuator by the square of its gear."""
+    """Return the drive inertia at each of MuJoCo's joints (njnt,), in kg m^2 (kg). It is the joint's armature plus each
+    actuator's armature times the square of the gear ratio."""
     found = np.array(model.dof_armature[model.jnt_dofadr], dtype=float)
     for k in _with_armature(model):
         if model.actuator_trntype[k] in _joint_transmissions(mujoco):
@@ -26,37 +28,50 @@ def armatures(mujoco: Any, model: Any) -> Array:
 
 
 def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
-    """Actuators with armature that act on something else than a joint: on a tendon."""
+    """Return the actuators that have an armature (rotor inertia) but do not act on a joint; for example, they act on a
+    tendon."""
     return [k for k in _with_armature(model) if model.actuator_trntype[k] not in _joint_transmissions(mujoco)]
 
 
 def reflected(model: Any, actuator: int) -> float:
-    """Inertia of an actuator at its joint."""
+    """Return the inertia of an actuator as seen at the joint: the actuator's armature times the square of the gear
+    ratio."""
     return float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
 
 
 def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Find the joints (kind jnt), degrees of freedom, tendons or actuators that have such a force. The force may have
-    any sign and power of position or velocity. word: stiffness, damping, frictionloss."""
+    """Return for each object of one kind whether a force of the given kind acts on it. The force may have any sign, and
+    may be nonlinear in position or velocity.
+
+    kind  objects to examine: jnt (joints), dof (degrees of freedom), tendon or actuator
+    word  kind of force: stiffness, damping or frictionloss
+    """
     return np.asarray(_of(model, kind, word) != 0.0) | is_odd(model, kind, word)
 
 
 def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Whether such a force is of no linear law or of the wrong sign, for which URDFs have no word."""
+    """Return for each object of one kind whether the force of the given kind is nonlinear or has the wrong sign. URDF
+    cannot express such forces.
+
+    kind  objects to examine, as in `acting`
+    word  kind of force, as in `acting`
+    """
     powers = getattr(model, f"{kind}_{word}poly", None)
     linear = _of(model, kind, word)
     return np.asarray(linear < 0.0) | (powers != 0.0).any(axis=1) if powers is not None else linear < 0.0
 
 
 def is_active(mujoco: Any, model: Any, equality: int) -> bool:
-    """Whether an equality constraint holds: not where it, or all of them, are switched off."""
+    """Return whether an equality constraint is active. It is inactive if the file switches off this constraint, or all
+    constraints."""
     bits = mujoco.mjtDisableBit
     off = int(model.opt.disableflags) & int(bits.mjDSBL_EQUALITY | bits.mjDSBL_CONSTRAINT)
     return bool(model.eq_active0[equality]) and not off
 
 
 def gravity(mujoco: Any, model: Any) -> tuple[float, float, float]:
-    """m/s^2 in the world's frame; none where it is switched off."""
+    """Return the acceleration of gravity in m/s^2 along the world's axes. It is zero if the file switches gravity
+    off."""
     if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return 0.0, 0.0, 0.0
     x, y, z = model.opt.gravity.tolist()
@@ -88,7 +103,8 @@ def _sizes(model: Any) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names by number; `taken` are all of them."""
+    """Names of bodies and joints, by the numbers that MuJoCo gives them. Bodies and joints without a name in the file
+    get a new name."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
@@ -107,7 +123,7 @@ class Names:
 
 
 def named(mujoco: Any, model: Any, kind: str, number: int) -> str:
-    """The file's own name of an object, '' where it has none; kind: BODY, JOINT, TENDON and so on."""
+    """Return the name of an object in the file, or '' if it has none; `kind` is BODY, JOINT, TENDON and so on."""
     return mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), number) or ""
 
 

@@ -1,9 +1,11 @@
-"""The tree of a compiled MJCF as the text of a URDF, every number with all its digits.
+"""Converts the tree of a compiled MJCF to the text of a URDF, with all digits of every number.
 
-MuJoCo places a body in its parent, then moves it by its joints one after the other, each about or along an axis through
-a point of the body, by q - ref. A URDF has one joint per link, about the link's own origin: a body with k joints becomes
-a chain of k links, each in its joint's anchor, and where the last anchor is not the body's origin one more, fixed.
-Turning (shifting) a joint's frame by -ref makes its q MuJoCo's.
+MuJoCo places a body in its parent, then moves it by its joints one after the other. Each joint moves about or along an
+axis through a point of the body by q - ref. URDF has one joint per link, about the origin of the link.
+
+So a body with k joints becomes a chain of k links, each at the anchor of its joint. A fixed link follows if the last
+anchor is not the body's origin. Each joint frame is rotated (or shifted) by -ref, so that the q of the URDF's joint
+equals MuJoCo's.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ class _Writer:
     joints: set[str] = field(default_factory=set)
 
     def link(self, name: str, body: int | None = None) -> None:
-        """A link with the inertia of a body, if that has one; without a body it is between two joints, and has zero."""
+        """Add a link to the URDF, with the inertia of a body of the MJCF if the body has one. Without a body, add a
+        link with zero inertia, which lies between two joints of one body."""
         element = SubElement(self.root, "link", name=name)
         if body is not None and not (self.model.body_mass[body] > 0.0 or self.model.body_inertia[body].any()):
             return
@@ -72,7 +75,12 @@ def tree_text(
     free: int | None,
     notes: Sequence[str],
 ) -> str:
-    """A URDF; `follows` are the joints that follow others, `free` is the body that is to be the root, on a free joint."""
+    """Return the text of a URDF with the tree of a compiled MJCF.
+
+    follows  the mimic joints
+    free     the body that becomes the root link, on a free joint
+    notes    sentences that the URDF carries for the command `show`
+    """
     # The model's own name is the first of its names.
     robot = Element(
         "robot",
@@ -214,7 +222,8 @@ COMPILER = {
 
 
 def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
-    """A <mujoco> element: bodies, inertias, joints, their drives' inertias and gravity."""
+    """Return a <mujoco> element with the bodies, inertias, joints, drive inertias and gravity of the compiled model,
+    and nothing else."""
     root = Element("mujoco", model="kept")
     SubElement(root, "compiler", COMPILER)
     SubElement(root, "option", gravity=_kept_numbers(model.opt.gravity))

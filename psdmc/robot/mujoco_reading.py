@@ -1,5 +1,5 @@
-"""MuJoCo's reading of a URDF, where MuJoCo is installed: a second reference, whose parser and algorithm are not
-Pinocchio's."""
+"""Computes a robot's torques with MuJoCo, if it is installed. MuJoCo is a second reference besides Pinocchio: it reads
+files and computes torques by other code."""
 
 from __future__ import annotations
 
@@ -46,18 +46,20 @@ States = tuple[Array, Array, Array]
 
 
 class NotCompared(Exception):
-    """MuJoCo cannot read this robot; the message says why."""
+    """An exception: MuJoCo is not installed or cannot read a robot, so nothing is compared with MuJoCo. The message
+    says why."""
 
 
 def mujoco_version() -> str:
-    """Return the version of the installed MuJoCo; NotCompared if there is none."""
+    """Return the version of the installed MuJoCo. Raises NotCompared if there is none."""
     return str(_mujoco().__version__)
 
 
 def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Array:
-    """(k, nv) torques of the robot's own bodies as MuJoCo reads the file, at q (k, nq), qd and qdd (k, nv), N m (N).
+    """Return the torques (k, nv), N m (N), that MuJoCo computes from the robot's file. They are for k states q (k, nq),
+    qd and qdd (k, nv).
 
-    NotCompared where MuJoCo is not installed, or does not read this file.
+    Raises NotCompared if MuJoCo is not installed, or does not read this file.
     """
     mujoco = _mujoco()
     chain, own = loaded.mechanism, _own_file(loaded)
@@ -160,8 +162,11 @@ def _entries(first: Array, counts: Sequence[int]) -> list[int]:
 
 
 def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-    """States (k, nq), (k, nv) of a robot whose first joint is free, by MuJoCo's conventions: quaternion wxyz, linear rates
-    along the world's axes. Their derivatives are accelerations: a + w x v along the root's axes is that of its origin."""
+    """Return k states q (k, nq), qd and qdd (k, nv) of a robot with a floating base, in MuJoCo's conventions.
+
+    The quaternion becomes (w, x, y, z). The linear rates become those along the world's axes. The acceleration of the
+    base's origin is a + w x v along the base's axes, for rates v, w and their derivatives a.
+    """
     turn = _rotations(q[:, [6, 3, 4, 5]])
     linear, angular = qd[:, :3], qd[:, 3:6]
     return (
@@ -172,7 +177,8 @@ def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
 
 
 def force_from_mujoco(q: Array, tau: Array) -> Array:
-    """Efforts (k, nv) at MuJoCo's q with the force on the root along the root's own axes."""
+    """Return joint efforts (k, nv) for k states with the force on the floating base along the axes of the base.
+    MuJoCo's efforts have the force along the world's axes; `q` is in MuJoCo's convention."""
     back = np.swapaxes(_rotations(q[:, 3:7]), 1, 2)
     return np.concatenate([_turned(back, tau[:, :3]), tau[:, 3:]], axis=1)
 

@@ -1,4 +1,4 @@
-"""Checks of names of links and joints: any text that fits on a line, each used once."""
+"""Checks the names of links and joints. A name is any text that fits on one line, and no two are equal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from psdmc.robot.limits import MAX_NAME, shown
 
 
 def naming_faults(names: Sequence[str], what: str) -> list[str]:
-    """Describe the faults of the names of a robot's links or joints, one sentence each."""
+    """Return what is wrong with the names of a robot's links or joints, one sentence for each fault."""
     counts = Counter(names)
     faults = [f"a {what} has no name"] if counts[""] else []
     faults += [fault for name in counts for fault in name_faults(name, what)]
@@ -18,7 +18,7 @@ def naming_faults(names: Sequence[str], what: str) -> list[str]:
 
 
 def name_faults(name: str, what: str) -> list[str]:
-    """Describe the faults of one name, one sentence each."""
+    """Return what is wrong with one name, one sentence for each fault."""
     faults = [f"{what} name {shown(name)} has control characters"] if _has_control(name) else []
     if len(name) > MAX_NAME:
         faults.append(f"{what} name {shown(name)}: expected at most {MAX_NAME}")
@@ -31,7 +31,7 @@ def _has_control(name: str) -> bool:
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """`wanted`, with underscores behind it until nothing else has it; it is taken then."""
+    """Return `wanted`, with underscores appended until the name is not in `taken`. The name is then added to `taken`."""
     while wanted in taken:
         wanted += "_"
     taken.add(wanted)

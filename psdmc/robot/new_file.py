@@ -1,4 +1,4 @@
-"""A robot file to begin with: a commented DH table that can be derived as it is."""
+"""Writes a first robot file for the user to edit: a commented DH table that `derive` accepts."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ TEMPLATE = "template.toml"
 
 
 def write_new_robot(path: Path) -> None:
-    """Write a commented DH table, whose robot is called as the file.
+    """Write a commented DH table. The robot gets the name of the file.
 
-    InputError where something is at the path already, or its name does not end as that of a DH table.
+    Raises InputError if `path` exists already, or if its suffix is not that of a DH table.
     """
     if path.suffix.lower() != ".toml":
         raise InputError(f"{path}: a DH table's name ends with .toml", f"such as psdmc new {path.stem}.toml")

@@ -1,7 +1,8 @@
-"""Numbers in robot files: plain decimals in ASCII, and nothing else.
+"""Reads numbers in robot files. A number must be a plain decimal in ASCII.
 
-Python's float also takes underscores, digits of other alphabets and further kinds of spaces. C++'s streams take none of
-them, and urdfdom then reads zero without a message. With one grammar, all readers agree.
+Python's float also accepts underscores, digits of other alphabets and other kinds of spaces. The C++ streams of urdfdom
+accept none of them and read zero without a message. Because psdmc accepts only plain decimals, all readers get the same
+number.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ _NOT_ZERO = re.compile("[1-9]")
 
 
 def words(text: str) -> list[str]:
-    """The words of a text between ASCII white space."""
+    """Return the words of a text that are separated by ASCII white space."""
     return [word for word in _GAP.split(text) if word]
 
 
 def decimal(word: str) -> float | None:
-    """The number that a word writes, or None where it is no finite decimal number or too long or small a one."""
+    """Return the number that a word represents. Return None if the word is no finite decimal number, or if it is too
+    long or too small."""
     if len(word) > MAX_CHARACTERS or not DECIMAL.fullmatch(word):
         return None
     value = float(word)

@@ -1,8 +1,7 @@
-"""A URDF's text for Pinocchio: links, inertials and joints only, in the author's own digits.
+"""Converts a URDF to a text for Pinocchio: links, inertials and joints only, with the digits of the original file.
 
-Elements without meaning for dynamics are left out: a mesh may be missing, and urdfdom prints errors about many things
-that psdmc has accepted or refused by then. White space around numbers is removed, because urdfdom takes it for a fault
-and reads zero.
+Elements that do not affect the dynamics are left out, because a mesh may be missing, and urdfdom prints errors about
+things that psdmc has accepted. White space around numbers is removed, because urdfdom would read zero.
 """
 
 from __future__ import annotations
@@ -35,14 +34,14 @@ def pinocchio_model(
     kinds: Mapping[str, str] | None = None,
     free_root: str | None = None,
 ) -> pinocchio.Model:
-    """Pinocchio's model of a URDF that read_urdf has accepted, joints called JOINT_PREFIX + name.
+    """Return Pinocchio's model of a URDF that read_urdf has accepted. Its joints are called JOINT_PREFIX + name.
 
-    movable   names of joints; every other one is fixed, so that its bodies are merged (None: all stay)
-    kinds     types of joints that replace the file's, by type
-    free_root name of a free joint for the root link (None: it stands)
+    movable   names of joints; all others become fixed, and their bodies are merged (None: all joints stay)
+    kinds     joint types of the file -> types that replace them
+    free_root name of a free joint for the root link (None: the root link is fixed)
 
-    A continuous joint becomes a revolute one (Pinocchio would give it a cosine and a sine). InputError where Pinocchio
-    refuses the text.
+    A continuous joint becomes a revolute one, because Pinocchio would use a cosine and a sine as its coordinates.
+    Raises InputError if Pinocchio rejects the text.
     """
     root = parse_xml(text, source, "robot")
     wanted = tostring(
@@ -75,7 +74,11 @@ def _with_balls(model: pinocchio.Model, balls: Collection[str]) -> pinocchio.Mod
 
 
 def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Model:
-    """The model with these joints, called JOINT_PREFIX + name, fixed where they are held; their bodies merged."""
+    """Return Pinocchio's model with some joints fixed at given positions. The bodies that such a joint connects are
+    merged.
+
+    held  positions by joint name, without JOINT_PREFIX
+    """
     if not held:
         return model
     q = pinocchio.neutral(model)
@@ -87,9 +90,9 @@ def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Mo
 
 
 def reduced(model: pinocchio.Model, joints: Sequence[int], q: Array) -> pinocchio.Model:
-    """The model with these joints fixed where they are at q.
+    """Return Pinocchio's model with some joints fixed at their positions in q.
 
-    Pinocchio lets the frames of such joints hang on themselves: they get the parents back that they had.
+    Pinocchio gives a frame of a fixed joint a wrong parent: the frame itself. This function restores the right parents.
     """
     found = pinocchio.buildReducedModel(model, list(joints), q)
     number = {_key(frame): k for k, frame in enumerate(found.frames)}
@@ -105,7 +108,8 @@ def _key(frame: pinocchio.Frame) -> tuple[str, bool]:
 
 
 def dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:
-    """The elements and attributes of a <robot> that carry dynamics, numbers trimmed; arguments as of pinocchio_model."""
+    """Return a <robot> element with only those elements and attributes that affect the dynamics, without white space
+    around numbers. The arguments are those of pinocchio_model."""
     robot = Element("robot", name=root.get("name") or "robot", version=VERSION)
     for link in root.findall("link"):
         copy = SubElement(robot, "link", name=link.get("name", ""))

@@ -1,4 +1,4 @@
-"""The placement of one frame in another."""
+"""The class Placement: the position and orientation of one frame in another."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
-    """A private read-only float64 copy of `values`; ValueError where its shape is another."""
+    """Return a read-only float64 copy of `values`. Raises ValueError if its shape differs from `shape`."""
     array = np.array(values, dtype=np.float64)
     if array.shape != shape:
         raise ValueError(f"{what} has shape {array.shape}, expected {shape}")
@@ -23,13 +23,14 @@ def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
 
 
 def made_again(value: Any) -> tuple[type[Any], tuple[Any, ...]]:
-    """For `__reduce__` of a dataclass: pickle and copy call its constructor, so that its arrays are read-only there, too."""
+    """Return the value of `__reduce__` with which pickle and copy call the constructor of a dataclass. The arrays of
+    the copy are then read-only, too."""
     return type(value), tuple(getattr(value, field.name) for field in fields(value) if field.init)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where a frame sits in another: x_outer = rotation @ x_inner + translation.
+    """Position and orientation of a frame in another: x_outer = rotation @ x_inner + translation.
 
     rotation     (3, 3)  orthonormal
     translation  (3,)    m

@@ -1,4 +1,5 @@
-"""Pinocchio's dynamics of a robot's source on arrays of states, as the reference for everything else."""
+"""Computes the dynamics of a robot with Pinocchio from the robot's own file, for arrays of states. psdmc compares its
+results with this reference."""
 
 from __future__ import annotations
 
@@ -24,11 +25,11 @@ DIFFERENCE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """Pinocchio's dynamics of one model on arrays of states: q, qd, qdd, tau (..., n), SI.
+    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n) with n joints, SI.
 
-    tip_name     the frame of `jacobian`
+    tip_name     name of the frame of which `jacobian` returns the Jacobian
     frame_names  the named frames; empty: the tip alone
-    rows         of the contact at each of them; empty: all are points
+    rows         for each named frame, 3 for a contact point, 6 for a surface, 0 for none; empty: all are points
     """
 
     model: pinocchio.Model
@@ -38,7 +39,8 @@ class Reference:
 
     @property
     def contacts(self) -> list[tuple[int, int]]:
-        """Pinocchio's number of the frame and the rows of each contact."""
+        """Return for each contact the number of the contact's frame in Pinocchio's model, and the number of rows (3 or
+        6)."""
         ids = self.frame_ids
         return [
             (frame, rows) for frame, rows in zip(ids, self.rows or (POINT,) * len(ids), strict=True) if rows
@@ -51,7 +53,8 @@ class Reference:
 
     @property
     def joint_types(self) -> list[JointType]:
-        """Return the types of the joints in Pinocchio's order; all with one coordinate are called revolute."""
+        """Return the types of the joints in the order of Pinocchio's model. All joints with one coordinate count as
+        revolute."""
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
@@ -62,7 +65,7 @@ class Reference:
         return self.each(pinocchio.aba, q, qd, tau)
 
     def mass_matrix(self, q: Array) -> Array:
-        """(..., n, n), both triangles."""
+        """Return the mass matrices (..., n, n) at positions q, with both triangles."""
         upper = np.triu(self.each(pinocchio.crba, q))
         return upper + np.swapaxes(np.triu(upper, 1), -1, -2)
 
@@ -73,11 +76,12 @@ class Reference:
         return self.each(pinocchio.computeGeneralizedGravity, q)
 
     def coriolis_matrix(self, q: Array, qd: Array) -> Array:
-        """(..., n, n)"""
+        """Return the Coriolis matrices (..., n, n)."""
         return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
     def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """(..., n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
+        """Return the derivatives of the joint torques by q, qd and qdd, an array (..., n, n) each. Row i belongs to
+        tau[i]."""
 
         def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
@@ -89,7 +93,8 @@ class Reference:
     def forward_dynamics_derivatives(
         self, q: Array, qd: Array, tau: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Accelerations (..., n), and (..., n, n) each: their derivatives by q, qd and tau; row i: of qdd[i]."""
+        """Return the joint accelerations (..., n), and their derivatives by q, qd and tau, an array (..., n, n) each.
+        Row i belongs to qdd[i]."""
 
         def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
@@ -99,7 +104,8 @@ class Reference:
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
     def integrated(self, q: Array, way: Array) -> Array:
-        """(..., nq) positions where constant rates lead from q; `way` are these times seconds."""
+        """Return the positions (..., nq) after a motion from q at constant rates. `way` is the rates multiplied by the
+        duration."""
 
         def moved(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.asarray(pinocchio.integrate(model, *state))
@@ -107,7 +113,8 @@ class Reference:
         return self.each(moved, q, way)
 
     def integrated_slopes(self, q: Array, way: Array) -> tuple[Array, Array]:
-        """(..., nv, nv) each: how `integrated` moves along its tangent with q, and with the way."""
+        """Return the derivatives of `integrated` by q and by `way`, an array (..., nv, nv) each. Changes of positions
+        are small motions along the joint rates."""
 
         def slopes(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.array(
@@ -118,8 +125,10 @@ class Reference:
         return by_start, by_way
 
     def coordinate_rates(self, q: Array, qd: Array) -> Array:
-        """(..., nq) how the coordinates change at these rates: the central difference of eighth order of `integrate`, which
-        is wrong by 1e-12 of the rates."""
+        """Return the time derivatives (..., nq) of the coordinates at these rates.
+
+        They are computed by a central difference of eighth order, with an error of 1e-12 of the rates.
+        """
         step = DIFFERENCE / max(1.0, float(np.abs(qd).max()))
         total = np.zeros_like(q)
         for k, weight in enumerate(CENTRAL, start=1):
@@ -127,7 +136,7 @@ class Reference:
         return total / step
 
     def restored(self, q: Array) -> Array:
-        """(..., nq) with quaternions of length one."""
+        """Return q (..., nq) with quaternions of length one."""
 
         def unit(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
             return np.asarray(pinocchio.normalize(model, q))
@@ -135,7 +144,8 @@ class Reference:
         return self.each(unit, q)
 
     def jacobian(self, q: Array) -> Array:
-        """(..., 6, n) of the tip frame: linear then angular, along the base frame's axes."""
+        """Return the Jacobian (..., 6, n) of the tip frame along the axes of the base frame: three linear rows, then
+        three angular rows."""
         frame = self.model.getFrameId(self.tip_name)
         aligned = pinocchio.LOCAL_WORLD_ALIGNED
 
@@ -149,7 +159,7 @@ class Reference:
         return self.each(of_tip, q)
 
     def poses(self, q: Array, link_names: Sequence[str]) -> Array:
-        """(..., len(link_names) + 1, 4, 4) of the links' frames and the tip's in the base frame."""
+        """Return the poses (..., number of links + 1, 4, 4) of all links' frames and of the tip in the base frame."""
         kind = pinocchio.FrameType.BODY
         frames = [self.model.getFrameId(name, kind) for name in link_names]
         frames.append(self.model.getFrameId(self.tip_name))
@@ -162,13 +172,13 @@ class Reference:
 
     @property
     def gravity_vector(self) -> Array:
-        """(3,) m/s^2 in the base frame."""
+        """(3,) m/s^2, gravity in the base frame."""
         return np.array(self.model.gravity.linear)
 
     @property
     def path_length(self) -> float:
-        """Longest way from the base to the tip, or to an end of a tree, over every frame between, m, at neutral; with every
-        fixed joint's detour."""
+        """Return the length in m of the longest path from the base to an end of the tree, at the neutral position. The
+        path goes through all frames, including those of fixed joints."""
         model, data = self.model, self.model.createData()
         pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
         parents = list(model.parents)
@@ -178,7 +188,8 @@ class Reference:
         return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
 
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
-        """Values of a function of Pinocchio's (model, data, state ...) at every state of broadcast arrays."""
+        """Return the values of a Pinocchio function of (model, data, state ...) at every state. The leading axes of the
+        states broadcast as in NumPy."""
         data = self.model.createData()
         rows = [np.asarray(state, dtype=float) for state in states]
         lead = np.broadcast_shapes(*(row.shape[:-1] for row in rows))
@@ -202,7 +213,7 @@ def _way_to(frame: int, model: pinocchio.Model, data: pinocchio.Data) -> float:
 
 
 def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None) -> Reference:
-    """The Reference of reference_model."""
+    """Return the Reference for a robot, from the Pinocchio model that `reference_model` returns."""
     model = reference_model(loaded, snapped=snapped, parameters=parameters)
     names = tuple(frame.name for frame in loaded.mechanism.frames)
     rows = tuple(frame.rows for frame in loaded.mechanism.frames)
@@ -210,7 +221,7 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
 
 
 def pinocchio_version() -> str:
-    """The version of the Pinocchio that is loaded."""
+    """Return the version of the installed Pinocchio."""
     return str(pinocchio.__version__)
 
 
@@ -218,7 +229,8 @@ def pinocchio_version() -> str:
 # must come before its followers.
 @dataclass(frozen=True, slots=True, eq=False)
 class OnCoordinates:
-    """A Reference's dynamics in the coordinates q, qd, qdd, tau (..., nv) of a robot whose joints may follow others."""
+    """The dynamics of a robot with mimic joints, computed with Pinocchio. The arrays q, qd, qdd, tau (..., nv) are for
+    the joints that follow no other joint."""
 
     free: Reference
     following: Following
@@ -231,12 +243,13 @@ class OnCoordinates:
         return self.following.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))
 
     def on_joints(self, q: Array, *rates: Array) -> tuple[Array, ...]:
-        """(..., n) of every joint."""
+        """Return the positions and rates (..., n) of all n joints from those of the joints that follow no other
+        joint."""
         return self.following.positions(q), *map(self.following.rates, rates)
 
     @property
     def follows(self) -> bool:
-        """Whether some joint follows another."""
+        """Whether the robot has mimic joints."""
         joints, coordinates = self.following.ratios.shape
         return bool(joints > coordinates)
 

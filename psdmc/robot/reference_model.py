@@ -1,13 +1,14 @@
-"""Pinocchio's own model of a robot's source, as the reference for everything else.
+"""Builds Pinocchio's model of a robot from the robot's own file. psdmc compares its results with this model.
 
-It shares the file's text with the chain and as little code as possible: a URDF is read, merged and locked by Pinocchio,
-a DH table is read by `dh_model`. Only names come from the chain: of its joints, links, base and tip. For the snapped
-robot the joints' placements come from the chain too, because the file does not have them; the bodies are still
-Pinocchio's.
+The model shares as little code as possible with psdmc's own reader. Pinocchio reads a URDF, merges its links and locks
+its joints; `dh_model` reads a DH table. Only the names of joints, links, base and tip come from psdmc's mechanism.
 
-The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's order, the
-chain's base as their universe, and a frame for the tip: they work with any function of Pinocchio and plain q, qd, qdd
-(n,).
+For a robot with snapped rotations, the placements of the joints also come from the mechanism, because the file does not
+have them.
+
+The model has one coordinate per joint (a continuous joint is an angle) and the joints in the order of the mechanism.
+The root frame of the model (Pinocchio's universe) is the base, and there is a frame for the tip. All Pinocchio
+functions take plain arrays q, qd, qdd (n,).
 """
 
 from __future__ import annotations
@@ -32,13 +33,13 @@ from psdmc.robot.urdf import read_urdf
 def reference_model(
     loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None
 ) -> pinocchio.Model:
-    """Pinocchio's model of the robot.
+    """Return Pinocchio's model of the robot.
 
-    snapped      joints placed as the chain's are; False: as in the file, rounding included
-    parameters   (n, 11) standard parameters about the link frames instead of the source's own
+    snapped      True: joints are placed as in the mechanism; False: as in the file, rounding included
+    parameters   (n, 11) standard parameters about the link frames that replace those of the file
 
-    Bodies with parameters assumed zero get the chain's values, which the source does not have. ValueError where
-    parameters are needed and unknown.
+    Bodies with parameters assumed zero (option assume_zero) get the mechanism's values, because the file does not have
+    them. Raises ValueError if parameters are needed and unknown.
     """
     chain = loaded.mechanism
     model = as_written(loaded)
@@ -59,7 +60,8 @@ def reference_model(
 
 
 def as_written(loaded: LoadedRobot) -> pinocchio.Model:
-    """Pinocchio's own model of the file, with nothing of the chain but names; bodies as far as the file gives them."""
+    """Return the model that Pinocchio makes from the robot file alone, without psdmc's assumptions. psdmc only chooses
+    the joints and names them. Links without inertia in the file have none in the model."""
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:
@@ -106,9 +108,10 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
 
 
 def body_of(parameters: Array) -> pinocchio.Inertia:
-    """Pinocchio's body with ten standard parameters, physical or not.
+    """Return Pinocchio's inertia object with the given ten standard parameters, which need not be physically possible.
 
-    Pinocchio divides by the mass. A body without mass gets the smallest one, and loses its first moments.
+    Pinocchio divides by the mass. A body without mass gets the smallest possible mass, and the first moments of the
+    body are lost.
     """
     if not parameters[:DRIVE].any():
         return pinocchio.Inertia.Zero()
@@ -119,7 +122,8 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
 
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
-    """Whether some bodies are not determined by the file alone: assumed zeros and unknown values."""
+    """Return whether parameters of some bodies are assumed zero or unknown, so that the file alone does not determine
+    these bodies."""
     return bool(_assumed(loaded.mechanism))
 
 
@@ -168,9 +172,10 @@ MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelP
 
 
 def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
-    """Pinocchio's model of a table that read_dh has accepted, links called link1, link2 and so on.
+    """Return Pinocchio's model of a DH table that read_dh has accepted. The links of the model are called link1, link2
+    and so on. A body with unknown numbers gets zeros.
 
-    gravity   m/s^2 in the base frame instead of the table's; bodies that the table leaves open in part are zero
+    gravity   m/s^2 in the base frame, replaces that of the table
     """
     table = tomllib.loads(text)
     is_modified = table.get("convention", "standard") == "modified"
@@ -199,7 +204,7 @@ def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
 
 
 def standard_matrix(theta: float, d: float, a: float, alpha: float) -> Array:
-    """(4, 4) Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), multiplied out."""
+    """Return the transform (4, 4) Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha) of a standard DH row."""
     ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
     return np.array(
         [
@@ -212,7 +217,7 @@ def standard_matrix(theta: float, d: float, a: float, alpha: float) -> Array:
 
 
 def modified_matrix(theta: float, d: float, a: float, alpha: float) -> Array:
-    """(4, 4) Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d), multiplied out."""
+    """Return the transform (4, 4) Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d) of a modified DH row."""
     ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
     return np.array(
         [

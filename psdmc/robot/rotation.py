@@ -1,4 +1,4 @@
-"""Rotations from angles."""
+"""Computes rotation matrices from angles and quaternions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from psdmc.robot.snap import snap_rotation
 
 
 def about(axis: int, angle: float) -> Array:
-    """(3, 3) rotation by `angle` (rad) about coordinate axis 0, 1 or 2."""
+    """Return the matrix (3, 3) of a rotation by `angle` (rad) about the x, y or z axis; `axis` is 0, 1 or 2."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     rotation = np.eye(3)
     rotation[i, i] = rotation[j, j] = cosine(angle)
@@ -20,7 +20,8 @@ def about(axis: int, angle: float) -> Array:
 
 
 def roll_pitch_yaw(angles: tuple[float, float, float], snap: float = 0.0) -> Array:
-    """(3, 3) Rz(yaw) Ry(pitch) Rx(roll), each turn snapped separately, as each is a number that a file rounded.
+    """Return the rotation matrix (3, 3) Rz(yaw) Ry(pitch) Rx(roll). Each of the three rotations is snapped (a near
+    right angle becomes exact) separately, because the file rounds each angle separately.
 
     angles, snap   rad
     """
@@ -29,7 +30,7 @@ def roll_pitch_yaw(angles: tuple[float, float, float], snap: float = 0.0) -> Arr
 
 
 def from_quaternion(x: float, y: float, z: float, w: float) -> Array:
-    """(3, 3) rotation of a unit quaternion whose real part is w."""
+    """Return the rotation matrix (3, 3) of a unit quaternion, whose real part is w."""
     return np.array(
         [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],

@@ -1,9 +1,10 @@
-"""Rotations with exact zeros and ones in place of a file's rounded ones.
+"""Replaces the rounded entries of a file's rotations by exact zeros and ones.
 
-Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16: either turns an exact zero of the dynamics into a tiny number
-that no later stage can distinguish from a small one. A rotation matrix has six zeros (axes map to axes), four (it turns
-about an axis and maps it to one), one, or none: two zeros in different rows and columns force a third in one of their
-rows, because the rows are orthogonal. So only these three patterns are tried, the sparsest first.
+Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16 in floats. Both turn an exact zero of the dynamics into a tiny
+number, which later steps would take for a real value.
+
+Because the rows are orthogonal, a rotation matrix has six zeros (axes map to axes), four (one axis maps to an axis),
+one, or none. The patterns with six, four and one zero are tried, in this order.
 """
 
 from __future__ import annotations
@@ -27,10 +28,11 @@ zero. What a file means by 1.57079632679 for a right angle is a thousand times l
 
 
 def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
-    """The sparsest rotation within `tolerance` (rad) of a (3, 3) rotation, and how far away it is (rad).
+    """Return a rotation (3, 3) near the given one, with as many exact zeros as possible, and the angle between both
+    (rad). The angle is at most `tolerance` (rad).
 
-    Its zeros and ones are exact, its other entries orthonormal to machine precision. Where none is near, the
-    rotation itself and 0. Floating-point noise (ROUNDING) is cleaned whatever the tolerance.
+    Zeros and ones are exact, and the other entries are orthonormal to machine precision. If no rotation with zeros is
+    near, the function returns the given rotation and 0. Floating-point noise (ROUNDING) is removed with any tolerance.
     """
     if np.all((rotation == 0.0) | (np.abs(rotation) == 1.0)):
         return rotation + 0.0, 0.0
@@ -45,7 +47,8 @@ def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
 
 
 def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
-    """A near unit vector (3,) with exact zeros, within `tolerance` (rad), and how far away it is (rad)."""
+    """Return a unit vector (3,) near the given axis, with as many exact zeros as possible, and the angle between both
+    (rad). The angle is at most `tolerance` (rad)."""
     unit = axis / length(axis)
     kept = np.where(np.abs(unit) > max(tolerance, ROUNDING) / math.sqrt(2.0), unit, 0.0)
     snapped = np.sign(kept) if np.count_nonzero(kept) == 1 else kept / length(kept)
@@ -53,12 +56,13 @@ def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
 
 
 def snap_translation(translation: Array, chain_length: float) -> Array:
-    """A translation (3,) in m without the noise of composing placements (LENGTH_ROUNDING)."""
+    """Return a translation (3,) in m, in which entries that are only rounding errors (LENGTH_ROUNDING) are set to
+    zero."""
     return np.where(np.abs(translation) > LENGTH_ROUNDING * chain_length, translation, 0.0) + 0.0
 
 
 def angle_between(a: Array, b: Array) -> float:
-    """Angle of the rotation from a to b, rad; accurate for tiny angles."""
+    """Return the angle between the orientations a and b (rotation matrices), rad. It is accurate for tiny angles."""
     return float(2.0 * arcsine(min(1.0, length((a - b).reshape(-1)) / math.sqrt(8.0))))
 
 
@@ -121,10 +125,11 @@ def _unit(x: float, y: float) -> tuple[float, float]:
 
 
 def link_rotation(axis: Array) -> Array:
-    """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link.
+    """Return the rotation (3, 3) from a link's frame into the joint frame that psdmc chooses. The z axis of the joint
+    frame is the given unit axis in the link.
 
-    x is the coordinate axis that is most perpendicular to the joint's axis, made perpendicular: coordinate axes thus
-    give exact signed permutations, and parallel axes parallel frames.
+    The x axis of the joint frame is the coordinate axis most perpendicular to z, made exactly perpendicular. So an axis
+    along a coordinate axis gives an exact signed permutation, and parallel axes give parallel frames.
     """
     k = int(np.argmin(np.abs(axis)))
     x = np.eye(3)[k] - axis[k] * axis
@@ -139,10 +144,11 @@ MOST = 8
 
 
 def coarse_right_angles(angles: Mapping[str, Sequence[float]], snap: float) -> tuple[str, ...]:
-    """A note where joints have multiples of pi/2 rounded to these digits, further than `snap` (rad) from the exact ones;
-    none where the file's angles are wanted as they are (snap 0).
+    """Return a note if the file states right angles with few digits, such as 1.57. The note names joints whose angles
+    differ by more than `snap` (rad) from exact multiples of pi/2.
 
     angles  rad, by the joint's name
+    snap    rad; 0 means that the user wants the file's angles, so there is no note
     """
     found = {
         name: coarse

@@ -1,7 +1,8 @@
-"""Bound of the change of torques by snapping, from Pinocchio's model of the file as written.
+"""Computes an upper bound of the change of torques by snapping, which replaces rotations by near ones with exact zeros.
+The bound is computed with Pinocchio's model of the original file.
 
-Of the snapped chain only the angles that it reports are used. Each one is applied to every degree of freedom that it
-could have acted on, and the changes of the torques are added up: a bound to first order.
+Each snapped angle is applied to Pinocchio's model in every direction that it could affect. The sum of the changes of
+the torques is a bound to first order.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ MARGIN = 2.0
 
 
 def angles_by_segment(snaps: Sequence[Snap], n: int, largest: float) -> Array:
-    """(n + 2,) rad: snapped angles between joints (0 to n - 1), to the tip (n) and, last, from root to base.
+    """Return the snapped angles, summed for each section of the robot, rad (n + 2,). The sections are before each joint
+    (0 to n - 1), before the tip (n), and from root to base (last).
 
-    largest   rad: no single angle counts for more, whatever its report says
+    largest   rad: each single angle counts at most this much
     """
     angles = np.zeros(n + 2)
     for snap in snaps:
@@ -31,9 +33,10 @@ def angles_by_segment(snaps: Sequence[Snap], n: int, largest: float) -> Array:
 
 
 def torque_bound(reference: Reference, angles: Array, q: Array, qd: Array, qdd: Array) -> Array:
-    """(n,) largest change of each joint's torque over the states (k, n), N m (N).
+    """Return an upper bound (n,) of the change of each joint's torque by snapped rotations, N m (N). The bound covers
+    all k states q, qd, qdd (k, n).
 
-    angles   (n + 2,) rad, as angles_by_segment gives them
+    angles   (n + 2,) rad, as from angles_by_segment
     """
     exact = reference.inverse_dynamics(q, qd, qdd)
     change = np.zeros_like(exact)

@@ -1,5 +1,5 @@
-"""Words that psdmc adds to the URDF that it makes of an MJCF, in a name space that other readers skip. They are drive
-inertias, ball joints and notes."""
+"""Reads the XML elements and attributes that psdmc adds to a URDF made from an MJCF: drive inertias, ball joints and
+notes. They are in an XML name space that other readers ignore."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ MOST_NOTES = 100
 
 
 def with_source_words(draft: Draft, text: str, source: str) -> Draft:
-    """The draft with what a text of psdmc's own making says beside its URDF; InputError where a number of it is wrong."""
+    """Return the robot with the drive inertias, ball joints and notes that psdmc wrote into the URDF. Raises InputError
+    if one of their numbers is wrong."""
     if SPACE not in text:
         return draft
     root = parse_xml(text, source, "robot")
@@ -55,7 +56,7 @@ def with_source_words(draft: Draft, text: str, source: str) -> Draft:
 
 
 def ball_names(robot: Element) -> tuple[str, ...]:
-    """Joints of a text of psdmc's own making that are ball joints."""
+    """Return the names of the joints that psdmc marked as ball joints in a URDF."""
     return tuple(
         joint.get("name", "")
         for joint in robot.findall("joint")

@@ -1,4 +1,4 @@
-"""Selection of a URDF's joints: its whole tree, or the chain from a base link to a tip link."""
+"""Selects joints of a URDF: its whole tree, or the chain from a base link to a tip link."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ BALL = "a URDF has no joint about every axis: write it as three revolute ones th
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """to_base: joints from the root to the base link; path: from there to the tip, fixed ones included.
+    """The joints of a URDF that a model contains, with the fixed joints between them. `to_base` is the path from the
+    root to the base link, `path` that from the base link to the tip.
 
-    ends   links that a whole tree ends in, where `path` is that: each branch in a row, joints on one link by name, which is
-           the order of Pinocchio's buildModelFromUrdf; empty for a chain
+    ends   end links if `path` is the whole tree; empty for a chain. The joints of a tree are in the order of
+           Pinocchio's buildModelFromUrdf: branch by branch, and by name if they are on the same link
     """
 
     base: str
@@ -41,11 +42,11 @@ class Route:
 def find_route(
     robot: UrdfRobot, base: str | None, tip: str | None, source: str, frames: Sequence[str] = ()
 ) -> Route:
-    """The chain from base (default: the root) to tip (default: see default_tip); where neither is given and the joints
-    branch, the whole tree, whose tip is the first of `frames`, or of its ends.
+    """Return the joints from the base link (default: the root) to the tip link (default: see default_tip).
 
-    InputError where a link is unknown, the tip is not below the base, no joint moves, or joints cannot be
-    modelled.
+    If neither link is given and the joints branch, return the whole tree. The tip of a tree is the first of `frames`,
+    or of the end links. Raises InputError if a link is unknown, the tip is not below the base, no joint moves, or psdmc
+    cannot model a joint.
     """
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in robot.inertials:
@@ -94,7 +95,7 @@ def _tree(robot: UrdfRobot, frames: Sequence[str], source: str) -> Route:
 
 
 def outward(robot: UrdfRobot) -> Iterator[UrdfJoint]:
-    """All joints from the root outward, each branch in a row, joints on one link by name."""
+    """Yield all joints from the root outward, branch by branch; joints on the same link are sorted by name."""
     stack = [robot.root]
     above = {joint.child: joint for joint in robot.joints}
     below: dict[str, list[UrdfJoint]] = {}
@@ -143,7 +144,8 @@ def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
 
 
 def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
-    """Joints from link `start` down to link `end`; None where it is not below."""
+    """Return the joints on the path from link `start` outward to link `end`. Return None if `end` is not beyond
+    `start`."""
     above = {joint.child: joint for joint in robot.joints}
     path: list[UrdfJoint] = []
     link = end
@@ -156,10 +158,12 @@ def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, .
 
 
 def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[str, ...]]:
-    """The end of the path with most movable joints, and a note where there was a choice.
+    """Return the name of the link at the end of the path with most movable joints. Return a note, too, if several ends
+    were possible.
 
-    Where several paths have equally many (the fingers of a gripper), it is the link where they part, if the way there
-    has more movable joints than each has beyond. Otherwise the arm is ambiguous, and InputError lists the ends.
+    If several paths have equally many joints, like the fingers of a gripper, the tip is the link where they branch.
+    That link must have more movable joints before it than each path has after it. Otherwise the function raises an
+    InputError that lists the ends.
     """
     depth = _movable_depths(robot, base)
     most = max(depth.values())

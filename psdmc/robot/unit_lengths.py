@@ -1,4 +1,4 @@
-"""Whether quaternions in q, and cosines with their sines, are of length one."""
+"""Checks that quaternions in q, and pairs of cosine and sine, have length one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ SLACK = 1e-6
 
 
 def units_of(types: Iterable[JointType]) -> tuple[tuple[int, int], ...]:
-    """Parts of q, from an entry to before another, whose length must be one, for joints of these types in a row."""
+    """Return the slices (start, stop) of q that are quaternions or pairs of cosine and sine, whose length must be one.
+    `types` are the types of the robot's joints, in order."""
     found, start = [], 0
     for kind in types:
         if kind.unit.stop:
@@ -26,8 +27,11 @@ def units_of(types: Iterable[JointType]) -> tuple[tuple[int, int], ...]:
 
 
 def refuse_other_lengths(what: str, q: NDArray[Any], units: Sequence[tuple[int, int]]) -> None:
-    """InputError that names the first row of q (..., nq) with a part that is not of length one; `units` are these parts,
-    from an entry to before another."""
+    """Raise InputError for the first row of q (..., nq) in which a quaternion, or a pair of cosine and sine, has not
+    length one.
+
+    units  slices (start, stop) of q that must have length one
+    """
     rows = np.reshape(q, (-1, q.shape[-1]))
     for start, stop in units:
         lengths = np.linalg.norm(rows[:, start:stop].astype(np.float64), axis=1)

@@ -1,4 +1,4 @@
-"""A URDF as plain data with every number checked, before a chain is chosen in it."""
+"""Reads a URDF into plain data and checks every number. The joints of the robot are selected later (tree.py)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ normalized."""
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a frame sits in another: xyz (m), and either rpy (rad) or a unit quaternion (x, y, z, w)."""
+    """The placement of a frame in another one, as in a URDF: xyz (m), and either rpy (rad) or a unit quaternion (x, y,
+    z, w)."""
 
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)
@@ -50,8 +51,9 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class UrdfInertial:
-    """mass kg; inertia kg m^2 (INERTIA_NAMES) about the centre of mass, along the inertial frame's axes; origin
-    places that frame, whose origin is the centre of mass, in the link."""
+    """The element <inertial> of a link: mass in kg, and inertia in kg m^2 (INERTIA_NAMES). The inertia is about the
+    centre of mass, along the axes of the inertial frame. `origin` is the placement of the inertial frame in the link;
+    the origin of this frame is the centre of mass."""
 
     mass: float
     inertia: tuple[float, ...]
@@ -60,7 +62,7 @@ class UrdfInertial:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """q = multiplier * q of the joint of that name + offset."""
+    """The element <mimic> of a joint: q = multiplier * (q of the joint with the name `joint`) + offset."""
 
     joint: str
     multiplier: float
@@ -69,9 +71,14 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One <joint>. `origin` places the child link in the parent at q = 0; `axis` is in the child; `mimic` is the joint
-    that it follows, if any; `has_dynamics` whether it has friction, damping or a spring; `held`, of a joint that was
-    locked, where its child is at `origin`."""
+    """One element <joint> of a URDF.
+
+    origin        placement of the child link in the parent at q = 0
+    axis          axis of the joint in the child link
+    mimic         for a mimic joint, which joint is followed, and how
+    has_dynamics  whether the joint has friction, damping or a spring
+    held          for a locked joint, the additional placement of the child by the locked position
+    """
 
     name: str
     type: str
@@ -91,11 +98,12 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class UrdfRobot:
-    """A tree of links. `inertials` has every link in the file's order, None where it has no <inertial>.
+    """The content of a URDF: a tree of links. `inertials` contains every link in the file's order, and None for a link
+    without <inertial>.
 
-    notes      contents of the file that no chain holds, one sentence each
-    free_root  the joint that was put above the file's root link, if any
-    shapes     links that are shapes for collisions alone: neither inertia nor looks
+    notes      content of the file that psdmc ignores, one sentence each
+    free_root  the free joint that was added above the file's root link, if any
+    shapes     links with collision shapes only: they have neither inertia nor a visual
     """
 
     name: str
@@ -111,7 +119,7 @@ class UrdfRobot:
 
 
 def read_urdf(text: str, source: str) -> UrdfRobot:
-    """The file's content; InputError names everything that is wrong with its links and joints at once."""
+    """Return the content of a URDF. Raises one InputError that names all faults of its links and joints."""
     root = parse_xml(text, source, "robot")
     hint = f"psdmc reads URDF {VERSIONS[0]} to {VERSIONS[-1]}; see docs/robot_files.md"
     _refuse(robot_faults(root), source, hint)
@@ -304,7 +312,7 @@ Ends = tuple[str, str, str]
 
 
 def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
-    """The reasons why the links are not one tree, one sentence each."""
+    """Return the reasons why the links of a URDF do not form one tree, one sentence for each."""
     known = dict.fromkeys(links)
     faults = []
     parents: dict[str, list[str]] = {}

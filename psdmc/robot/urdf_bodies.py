@@ -1,4 +1,4 @@
-"""Bodies of a URDF, merged into the links of a chain by psdmc and compared with Pinocchio's merging."""
+"""Merges the inertias of URDF links that move together, and compares them with Pinocchio's result."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ to 1e3 rad leaves 1e-13, another reading of a number far more."""
 
 
 def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
-    """The placement of an <origin>'s frame; turns about axes are snapped one by one (rad)."""
+    """Return the placement that an <origin> element states. The rotations about the three axes are snapped one by one:
+    near right angles become exact (`snap` in rad)."""
     if origin.quaternion is None:
         return Placement(roll_pitch_yaw(origin.rpy, snap), np.array(origin.xyz))
     return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
 
 
 def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
-    """Where a joint puts its child link: at q = 0, or where it is held; turns snapped (rad)."""
+    """Return the placement of a joint's child link at q = 0, or at the locked position of the joint. Rotations are
+    snapped: near right angles become exact (`snap` in rad)."""
     place = placement_of(joint.origin, snap)
     if joint.held is None:
         return place
@@ -39,15 +41,17 @@ def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
 
 
 def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
-    """Ten standard parameters per movable joint, of all that moves with it, about its child link's frame.
+    """Return ten standard parameters for each movable joint, about the frame of the joint's child link. The parameters
+    are those of all links that move with the joint.
 
-    Joints beside the chain and beyond the tip are locked at neutral.
+    Joints that are not among the selected ones are locked at their neutral position.
     """
     return [without_noise(_merged(robot, body)) for body in bodies_of(robot, route.movable)]
 
 
 def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:
-    """The links that move with each of these joints alone, by their places in its child link's frame, which come first."""
+    """Return for each movable joint the links that it moves together, up to the next movable joints. A link has the
+    placement in the frame of the joint's child link, which comes first."""
     below: dict[str, list[tuple[str, Placement]]] = {}
     moves = {joint.name for joint in movable}
     for joint in robot.joints:
@@ -57,7 +61,8 @@ def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, 
 
 
 def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
-    """(10,) standard parameters of a link's body about the frame in which the link sits at `place`."""
+    """Return the standard parameters (10,) of a link about another frame, in which the link has the placement
+    `place`."""
     if body is None:
         return np.zeros(10)
     at = place @ placement_of(body.origin)
@@ -73,10 +78,11 @@ def hold_against_pinocchio(
     source: str,
     held: Mapping[str, float],
 ) -> None:
-    """InputError that names the first link whose body Pinocchio reads or merges differently.
+    """Raise InputError with the name of the first link whose inertia Pinocchio reads or merges differently.
 
-    Each link is first compared alone (every joint made a revolute one, so that nothing is merged), then the merged
-    bodies. `held` are the joints that are locked elsewhere than at neutral.
+    First each link is compared alone, in a model where every joint is revolute, so that no links are merged. Then the
+    merged inertias are compared. `held` are the positions of joints that are locked at another position than the
+    neutral one.
     """
     free = robot.free_root
     alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), free_root=free)
@@ -128,7 +134,7 @@ def _listed(values: Array) -> str:
 
 
 def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:
-    """The frame 'tool', given by x y z (m), roll pitch yaw (rad) in the tip's."""
+    """Return the named frame 'tool', placed in the tip frame by x y z (m) and roll pitch yaw (rad)."""
     # Turns are about fixed axes x, y, z in turn, as in URDF.
     x, y, z, roll, pitch, yaw = tool
     return NamedFrame(

@@ -1,4 +1,5 @@
-"""Reader that makes a robot from a URDF: places joints and merges bodies by the file's numbers."""
+"""Makes a robot from a URDF: places the joints and merges the inertias of links that move together, by the numbers of
+the file."""
 
 from __future__ import annotations
 
@@ -41,9 +42,12 @@ ALONG_Z = (0.0, 0.0, 1.0)
 
 
 def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
-    """The chain from base to tip, or the whole tree (find_route), with gravity in the root frame, rotations near exact ones
-    snapped, joints locked, the root freed and inertias unknown as the options say. A tree's ends are its named frames
-    where none are named."""
+    """Return the robot of a URDF: the chain from base to tip, or the whole tree (see find_route). Gravity is in the
+    root frame.
+
+    The options determine snapped rotations, locked joints, a floating base and unknown inertias. If the options name no
+    frames, the named frames of a tree are the end links.
+    """
     snap, frames = options.snap, options.frames
     read = read_urdf(text, source)
     robot = locked(read, options.lock, source)
@@ -177,7 +181,8 @@ def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap], segment: int) -> P
 def merged_placement(
     place: Placement, where: str, snap: float, snaps: list[Snap], segment: int, reach: float
 ) -> Placement:
-    """The product of several merged placements, snapped; the change is added to `snaps`."""
+    """Return the product of several placements, with the rotation snapped (replaced by a near one with exact zeros).
+    The angle of this change is appended to `snaps`."""
     rotation, angle = snap_rotation(place.rotation, snap)
     _record(snaps, where, angle, segment)
     return Placement(rotation, snap_translation(place.translation, reach))
@@ -218,7 +223,8 @@ WORLD = "universe"
 
 
 def on_free_root(robot: UrdfRobot) -> UrdfRobot:
-    """The robot with its root link on a free joint, whose frames are the world's and the root link's own."""
+    """Return the robot with a free joint (six degrees of freedom) between the world frame and the frame of the root
+    link."""
     name = free_name(ROOT_JOINT, {joint.name for joint in robot.joints})
     world = free_name(WORLD, set(robot.inertials))
     free = UrdfJoint(
@@ -249,9 +255,10 @@ def urdf_frames(
     names: Iterable[str],
     source: str,
 ) -> tuple[NamedFrame, ...]:
-    """The named links, placed by the file's own numbers; the tip as in the chain.
+    """Return the named frames of these links, placed by the numbers of the file. The placement of the tip equals that
+    in the chain.
 
-    InputError where a link does not exist, does not move, or is not rigidly on one of the chain's links.
+    Raises InputError if a link does not exist, does not move, or is not rigidly attached to a link of the chain.
     """
     carriers = {joint.name: number for number, joint in enumerate(joints)}
     return tuple(

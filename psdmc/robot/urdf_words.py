@@ -1,8 +1,8 @@
-"""The words of a URDF: which elements and attributes are read, which are allowed besides, and which are refused.
+"""Lists the elements and attributes of a URDF that psdmc reads, that it accepts without reading, and that it rejects.
 
-A word that is misspelt or misplaced is not read, and the robot silently gets other dynamics. Within the elements that
-carry dynamics every word must therefore be known; outside them, a word that looks like one of them is refused, and any
-other is noted.
+psdmc does not read a misspelt or misplaced word, which would change the dynamics without a message. So within elements
+that affect the dynamics, psdmc rejects every unknown word. Elsewhere it rejects words that resemble a known one, and
+prints a note for all others.
 """
 
 from __future__ import annotations
@@ -73,13 +73,13 @@ MOST_NOTED = 12
 
 
 def link_faults(link: Element) -> list[str]:
-    """Words of one <link> that are not allowed there, one sentence each."""
+    """Return a sentence for each word in a <link> element that is not allowed there."""
     inertial = link.find("inertial")
     return [*_children_faults(link, "link"), *([] if inertial is None else _strict_faults(inertial))]
 
 
 def joint_faults(joint: Element) -> list[str]:
-    """Words of one <joint> that are not allowed there, one sentence each."""
+    """Return a sentence for each word in a <joint> element that is not allowed there."""
     inside = [child for child in joint if child.tag in ("origin", "axis", "parent", "child")]
     return [
         *_children_faults(joint, "joint"),
@@ -88,7 +88,8 @@ def joint_faults(joint: Element) -> list[str]:
 
 
 def robot_faults(root: Element) -> list[str]:
-    """Words directly in <robot> that are not allowed there, and an unknown version."""
+    """Return a sentence for each word directly in the <robot> element that is not allowed there. An unknown version
+    gives a sentence, too."""
     version = " ".join(words(root.get("version", "1.0")))
     faults = [] if version in VERSIONS else [f"version {shown(version)} is not supported"]
     if len(_unknown(root)) > MAX_UNKNOWN:
@@ -100,7 +101,7 @@ def robot_faults(root: Element) -> list[str]:
 
 
 def unread_words(root: Element) -> list[str]:
-    """A note for each kind of word that is neither read nor known to be harmless."""
+    """Return a note for each kind of element or attribute that psdmc neither reads nor recognises as harmless."""
     found = _unknown(root)
     more = (
         [f"{len(found) - MOST_NOTED} more kinds of elements are not read"] if len(found) > MOST_NOTED else []
@@ -122,7 +123,7 @@ def _unknown(root: Element) -> list[tuple[str, str]]:
 
 
 def has_dynamics(joint: Element) -> bool:
-    """Whether a joint's <dynamics> contain damping, friction or a spring."""
+    """Return whether the <dynamics> element of a joint contains damping, friction or a spring."""
     return any(
         letter in "123456789"
         for dynamics in joint.findall("dynamics")

@@ -1,4 +1,4 @@
-"""A xacro file as the URDF that xacro makes of it, where xacro is installed."""
+"""Expands a xacro file to a URDF by the program xacro, if it is installed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ASSIGNED = ":="
 
 
 def parsed_arguments(texts: Sequence[str]) -> dict[str, str]:
-    """Values by argument from texts of the command line such as "name:=ur5e"."""
+    """Return the values of a xacro file's arguments by name, from texts of the command line such as "name:=ur5e"."""
     found: dict[str, str] = {}
     for text in texts:
         name, assigned, value = text.partition(ASSIGNED)
@@ -57,12 +57,13 @@ class _Arguments(dict[str, str]):
 
 
 def expanded(file: Path, source: str, given: Mapping[str, str], packages: Mapping[str, Path]) -> str:
-    """The text of the URDF. Expanding runs the expressions that the file holds, and reads the files that it includes.
+    """Return the text of the URDF that xacro makes. xacro evaluates the expressions in the file and reads the files it
+    includes.
 
     given      values of the file's arguments
-    packages   folders of packages that it names, besides those that psdmc finds
+    packages   folders of ROS packages that the file names, in addition to those that psdmc finds
 
-    InputError where xacro is not installed, or refuses the file; where the file has no such argument; and where a package
+    Raises InputError if xacro is not installed or rejects the file, if the file has no such argument, or if a package
     is not found.
     """
     try:
@@ -139,7 +140,8 @@ NAMED = re.compile(rb"<name>\s*([\w.-]+)\s*</name>")
 
 
 def checked_packages(packages: Mapping[str, str | os.PathLike[str]] | None) -> dict[str, Path]:
-    """Folders by package; InputError where a name is none, or a folder does not exist."""
+    """Return the folders of ROS packages by package name, after a check. Raises InputError if a package name is not
+    valid, or if a folder does not exist."""
     found = {}
     for name, folder in (packages or {}).items():
         path = Path(folder).expanduser()
@@ -152,9 +154,11 @@ def checked_packages(packages: Mapping[str, str | os.PathLike[str]] | None) -> d
 
 
 def package_folder(name: str, given: Mapping[str, Path], file: Path) -> Path | None:
-    """Return the absolute folder of a package, or None. It is the given one, else that of AMENT_PREFIX_PATH (its
-    share/NAME) or of ROS_PACKAGE_PATH (the first package.xml with that name), else one above or next to the robot's
-    file."""
+    """Return the absolute folder of a ROS package, or None.
+
+    The folder comes from `given`, from AMENT_PREFIX_PATH (its share/NAME), from ROS_PACKAGE_PATH (the first
+    package.xml with that name), or from the folders above or next to the robot's file, in this order.
+    """
     if not NAME.fullmatch(name):
         return None
     found = given.get(name) or next((folder for folder in _candidates(name, file)), None)

@@ -1,4 +1,4 @@
-"""XML that is checked before anything else reads it, and numbers in its attributes."""
+"""Parses XML after a safety check, and reads numbers from XML attributes."""
 
 from __future__ import annotations
 
@@ -31,14 +31,17 @@ UNDECLARED = "urn:psdmc:undeclared:"
 
 
 def root_tag(text: str) -> str:
-    """Name of the root element of an XML text; '' where there is none."""
+    """Return the name of the root element of an XML text, or '' if there is none."""
     found = ROOT.match(text.lstrip("\ufeff"))
     return found[1] if found else ""
 
 
 def parse_xml(text: str, source: str, expected: str) -> Element:
-    """The root element, its default name space, if any, taken off; InputError where it is no XML, has another root than
-    `expected`, or defines or fetches entities."""
+    """Return the root element of an XML text, without its default name space.
+
+    Raises InputError if the text is no XML, if the root element is not `expected`, or if it defines or fetches
+    entities.
+    """
     try:
         root = _without_space(_parsed(text.lstrip()))
     except DefusedXmlException as error:
@@ -86,7 +89,7 @@ def _without_space(root: Element) -> Element:
 
 
 def only(parent: Element, tag: str) -> Element | None:
-    """The child element of that name, None where there is none; ValueError where there are several."""
+    """Return the child element with this name, or None if there is none. Raises ValueError if there are several."""
     found = parent.findall(tag)
     if len(found) > 1:
         raise ValueError(f"{len(found)} <{tag}> elements, expected one")
@@ -96,7 +99,8 @@ def only(parent: Element, tag: str) -> Element | None:
 def numbers(
     element: Element | None, attribute: str, default: tuple[float, ...], accepted: Range
 ) -> tuple[float, ...]:
-    """Numbers from an attribute, as many as `default` has, each in its range; ValueError says what was found."""
+    """Return the numbers that an XML attribute lists, as many as `default` has. Raises ValueError, with the text found,
+    if a number is out of range."""
     text = None if element is None else element.get(attribute)
     if element is None or text is None:
         return default
@@ -121,7 +125,8 @@ def numbers(
 def number(
     element: Element | None, attribute: str, default: float, accepted: Range, *, is_magnitude: bool = False
 ) -> float:
-    """One number; with `is_magnitude`, ValueError where it is negative."""
+    """Return one number from an attribute. Raises ValueError if the number is out of range, or negative although
+    `is_magnitude` is true."""
     value = numbers(element, attribute, (default,), accepted)[0]
     if is_magnitude and value < 0.0 and element is not None:
         raise ValueError(f"<{element.tag}> {attribute}='{value:g}' is negative, expected no less than zero")
@@ -129,7 +134,7 @@ def number(
 
 
 def required_number(element: Element | None, tag: str, attribute: str, accepted: Range) -> float:
-    """A number that must be there; ValueError where it is not."""
+    """Return a number from an attribute. Raises ValueError if the attribute or its element is missing."""
     if element is None:
         raise ValueError(f"<{tag}> is missing")
     if element.get(attribute) is None:

@@ -1,13 +1,16 @@
-"""Parameters assumed zero: the values that a link keeps, and the parameter vectors that remain possible.
+"""Applies the assumption that some parameters of a link are zero. Computes which values remain, and which parameter
+vectors are possible.
 
-A zero about the link frame ("Ixz") removes a coordinate. A zero about the centre of mass ("rx", "Ixz@com") does not:
-the frame's Ixz is Ixz@com - m rx rz, and remains while rx and rz do. The result is the span of all parameter vectors
-that fulfil the statement. They are polynomials in m, r and the inertia about the centre of mass,
+A zero about the link frame ("Ixz") removes a parameter. A zero about the centre of mass ("rx", "Ixz@com") does not: the
+frame's Ixz is Ixz@com - m rx rz and can differ from zero while rx and rz do.
 
-    (m, m r, I_com + sum over i, j of m r_i r_j V_ij),
+The result is the span of all parameter vectors that fulfil the assumption. With the centre of mass r, the parameters
+about the link frame are
 
-whose monomials are linearly independent, so that the span is that of the coefficient vectors of the monomials that the
-zeros leave: exact, without sampling.
+    (m, m r, I_com + sum over i, j of m r_i r_j V_ij).
+
+V_ij are constant vectors. The monomials m, m r_i, m r_i r_j and the entries of I_com are linearly independent. So the
+vectors that multiply the remaining monomials span the result.
 """
 
 from __future__ import annotations
@@ -28,8 +31,8 @@ ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """Complete an assumption, in a fixed order: no mass means no body, no first moment puts the centre of mass at the
-    origin."""
+    """Return the assumed zeros of one link with the zeros that follow from them, in a fixed order. Without mass, all
+    parameters of the body are zero. Zero first moments imply a centre of mass at the origin, and conversely."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY_PARAMETERS]) | set(COM_NAMES)
@@ -40,7 +43,8 @@ def canonical(names: Collection[str]) -> tuple[str, ...]:
 
 
 def link_span(names: Collection[str]) -> Array:
-    """(11, k) columns that span one link's parameters when `names` are zero, in reduced echelon form."""
+    """Return a basis (11, k), of k columns, of one link's possible parameters if the parameters `names` are zero. The
+    basis is in reduced column echelon form."""
     zero = canonical(names)
     generators = [] if "m" in zero else [_unit("m"), *_moments(zero), *_second_moments(zero)]
     generators += [_unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)]
@@ -52,7 +56,8 @@ def link_span(names: Collection[str]) -> Array:
 
 
 def link_values(parameters: Array, names: Collection[str]) -> Array:
-    """(11,) standard parameters with the statements applied, those about the centre of mass first."""
+    """Return the standard parameters (11,) of a link with the assumed zeros applied. Zeros about the centre of mass are
+    applied first."""
     zero = canonical(names)
     values = np.array(parameters, dtype=float)
     if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY_PARAMETERS]).any():
@@ -67,7 +72,7 @@ def link_values(parameters: Array, names: Collection[str]) -> Array:
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:
-    """(11 n, k) from n blocks (11, k_i)."""
+    """Return the block-diagonal matrix (11 n, k) of n blocks with 11 rows each. The blocks have k columns together."""
     span = np.zeros((sum(b.shape[0] for b in blocks), sum(b.shape[1] for b in blocks)))
     row = column = 0
     for block in blocks:
@@ -79,9 +84,10 @@ def block_diagonal(blocks: Sequence[Array]) -> Array:
 def parse_statements(
     statements: Iterable[str], link_names: Sequence[str], joint_names: Sequence[str], source: str
 ) -> tuple[tuple[str, ...], ...]:
-    """Zero names per link from texts such as "link5:rx" or "link5:Ixz@com"; joints' names do too.
+    """Return the names of zero parameters per link, from texts such as "link5:rx" or "link5:Ixz@com". A joint's name
+    can replace the name of its link.
 
-    InputError names every text that does not fit, and what would.
+    Raises InputError with every wrong text and the accepted names.
     """
     found: list[list[str]] = [[] for _ in link_names]
     problems = []
@@ -104,9 +110,9 @@ def parse_statements(
 
 
 def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
-    """Reduced column echelon form of (rows, k) columns, dependent ones dropped.
+    """Return columns (rows, k) in reduced column echelon form, without columns that depend on the others.
 
-    The entries met here are small integers, so elimination is exact; `tolerance` only guards a division.
+    The entries in this module are small integers, so the elimination is exact. `tolerance` only protects a division.
     """
     work = np.array(columns, dtype=float)
     rank = 0
@@ -123,13 +129,15 @@ def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
 
 
 def leading_rows(span: Array) -> NDArray[np.int64]:
-    """(k,) row of each column's leading one, for (rows, k) columns in reduced echelon form."""
+    """Return for each of the k columns of a reduced echelon form (rows, k) the row of the column's leading one,
+    (k,)."""
     leads: NDArray[np.int64] = np.argmax(span != 0.0, axis=0).astype(np.int64)
     return leads
 
 
 def outside(span: Array, x: Array) -> Array:
-    """Magnitudes by which x misses the vector of the span that has its leading entries: zero where it lies in the span."""
+    """Return by how much each entry of x differs from a vector in the span of the columns of `span`. The vector has the
+    leading entries of x. All differences are zero if x is in the span."""
     missed: Array = np.abs(x - span @ x[leading_rows(span)])
     return missed
 

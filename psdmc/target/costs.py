@@ -1,4 +1,4 @@
-"""Costs of arithmetic on a machine, for lowering's search and the passes."""
+"""Costs of arithmetic operations on a processor. psdmc uses them to choose among equivalent programs."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Cycles until a result can be used; only their order of magnitude matters.
+    """Number of processor cycles until the result of an operation can be used. Only the order of magnitude matters.
 
-    fused   of a multiply-add; where there is none, of a product and a sum
-    sincos  of the inline sine and cosine
-    choice  of a comparison and of what it chooses
-    call    of an elementary function of the C library
+    fused   for a multiply-add; if the processor has none, for a product and a sum
+    sincos  for the sine and cosine that psdmc writes into the code
+    choice  for a comparison and the selection of a value by its result
+    call    for an elementary function of the C library
     """
 
     load: int
@@ -28,29 +28,35 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """Figures for choosing among equal programs. Weights are in additions.
+    """Costs and thresholds by which psdmc chooses among equivalent programs. The unit of a weight is the cost of one
+    addition. A lane is one element of a SIMD vector; code for lanes computes one state per lane.
 
-    latency             for the order of sums (fuse_sums)
+    latency             processor cycles per operation, for the order of additions (fuse_sums)
     div, neg            weight of a division, of a change of sign
-    fused               weight that a multiply-add saves on its product and its sum
-    sincos              weight of one inline sincos, which serves `angles_per_sincos` angles
+    fused               weight that a multiply-add saves compared with a product and a sum
+    sincos              weight of one sincos (sine and cosine written into the code), which computes `angles_per_sincos`
+                        angles
     choice              weight of a minimum, maximum, magnitude or selection
-    call                weight of an elementary function of the C library: in lanes one for each state
-    angle               weight of each further angle: to put it in and to take sine and cosine out
-    angles_per_sincos   in code for one state; 1 where the target has no vectors
-    registers           for reals; used where `spills_wait`
-    spills_wait         whether a spilled value delays the code (one instruction after the other); other machines hide it
-    crowded             lanes take the order for one state unless it keeps this many times more values alive
-    worth_two_bodies    lanes get a body of their own where it saves this factor
-    worth_sharing       one state takes the lanes' arithmetic where that costs it no more than this factor: one body, and
-                        the lanes' sines saved
-    shared_from         additions from which that is considered
-    loops_from          rows from which products of square matrices behind a PROGRAM are loops in code for one state
-    worth_limbs         limbs run in lanes where this saves that factor
-    limb_real           weight of bringing one of a limb's inputs into its lane, or an output out of it
-    limb_shared         weight of bringing one of the core's values into all lanes
+    call                weight of an elementary function of the C library; code for lanes calls it once per state
+    angle               weight of each further angle in a sincos: to load it and to extract sine and cosine
+    angles_per_sincos   angles per sincos in code for one state; 1 if the target has no vectors
+    registers           number of registers for floating-point numbers; used if `spills_wait`
+    spills_wait         whether a spilled value (without a register) delays the code, as on processors that run one
+                        instruction after the other
+    crowded             code for lanes uses the operation order of the code for one state, unless that order keeps this
+                        many times more values alive
+    worth_two_bodies    code for lanes gets a function body of its own if it is this factor cheaper
+    worth_sharing       code for one state uses the arithmetic of the code for lanes if it costs at most this factor:
+                        then one body is enough
+    shared_from         number of additions in a function from which `worth_sharing` is considered
+    loops_from          number of rows from which products of square matrices are loops in code for one state
+    worth_limbs         equal limbs (such as legs) are computed in parallel lanes if the code is cheaper by at least
+                        this factor
+    limb_real           weight of moving one input or output of a limb into or out of its lane
+    limb_shared         weight of copying one value of the robot's trunk into all lanes
     limb_sum            weight of a sum over the lanes
-    longest_of_two      additions; with parameters at run time a longer body is not written twice: it is tens of kilobytes
+    longest_of_two      number of additions; a longer function with parameters at run time gets no second body, which
+                        would take tens of kilobytes
     """
 
     latency: Latency
@@ -77,5 +83,5 @@ class Costs:
 
     @property
     def has_vectors(self) -> bool:
-        """Whether code with one state per lane differs from code for one state."""
+        """Return whether code that computes one state per SIMD lane differs from code for one state."""
         return self.angles_per_sincos > 1

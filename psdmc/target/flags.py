@@ -1,4 +1,4 @@
-"""Compiler flags for psdmc's C on every target, in packages' own builds and in psdmc's."""
+"""Compiler flags for the generated C code on every target, for builds of packages and for psdmc's own builds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The default target: fixed figures, and C that uses the vectors of whatever machine the compiler builds for."""
+"""The default target. It has the same costs on every machine, and C code that uses the SIMD vectors of the machine for
+which the compiler builds."""
 
 from __future__ import annotations
 

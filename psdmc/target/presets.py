@@ -1,4 +1,4 @@
-"""The targets that users choose by name."""
+"""The targets that users choose by name, such as "cortex-m4f"."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ PRESETS = {
 
 
 def preset(name: str) -> Target:
-    """The target of that name; InputError where there is none."""
+    """Return the target (processor) with this name, such as "cortex-m4f". Raises InputError if there is none."""
     if name not in PRESETS:
         raise InputError(f"target is {name!r}", f"choose one of {', '.join(PRESETS)}")
     return PRESETS[name]

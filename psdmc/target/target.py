@@ -1,4 +1,5 @@
-"""The machine and form that generated code is for. All that psdmc knows about machines is in this folder."""
+"""The class Target, which describes the processor for which psdmc generates code. Only the files in this folder contain
+facts about processors."""
 
 from __future__ import annotations
 
@@ -18,21 +19,22 @@ FORMS: tuple[Form, ...] = ("single", "batch", "batch_soa")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A machine, and the form of code for it.
+    """A processor, and the form of the code that psdmc generates for this processor.
 
-    about          for people: what it is and what differs from the default
-    real, trig     precision, and source of sines, where the user chooses none
-    vectors        registers that the C is written for, widest first: the first whose macro is defined is used, else the
-                   last; none: plain C
-    forms          of each function
-    texts          whether joints' names, units and parameters' equations are tables in the library
+    about          description for people: what it is and what differs from the default
+    real, trig     default of the precision and of the method of sines
+    vectors        kinds of vector registers that the C code supports, widest first. The first kind whose macro is
+                   defined is used, else the last; empty: plain C
+    forms          forms of each function: for one state, for states in rows of an array, for one state per SIMD lane
+    texts          whether the library contains tables of joint names, units and equations of parameters
     hosted         whether there is an operating system: shared libraries, position-independent code, threads
-    cache_line     bytes of one prefetch
-    blocks_ahead   how many blocks before their use a batch prefetches its inputs
-    flags          for the compiler, which must take them
-    host_flags     the first of these that a compiler takes means the machine at hand; in a package only if its user asks
-    costs          figures for the search and the passes
-    tools          what the names of its usual compiler and ar begin with; empty: those of the machine at hand
+    cache_line     bytes of a cache line, which one prefetch loads
+    blocks_ahead   how many blocks before their use a batch function prefetches its inputs
+    flags          flags that the compiler must accept
+    host_flags     flags for the machine at hand; the first that the compiler accepts is used. In a package, it is used
+                   only if the package's user asks for it
+    costs          costs by which psdmc chooses among programs
+    tools          prefix of the names of the compiler and archiver; empty: those of the machine at hand
     """
 
     name: str
@@ -61,5 +63,5 @@ class Target:
 
     @property
     def has_batches(self) -> bool:
-        """Whether functions for many states are made."""
+        """Whether psdmc generates functions for many states."""
         return "batch" in self.forms

@@ -1,4 +1,4 @@
-"""Vector registers that a target may have, and the macros and types by which C uses them."""
+"""SIMD vector registers that a target may have, and the macros and types by which the C code uses them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ interface."""
 
 @dataclass(frozen=True, slots=True)
 class SignMask:
-    """The instruction that gathers the sign bits of all lanes in one integer.
+    """The processor instruction that puts the sign bits of all numbers in a SIMD vector into one integer.
 
-    macro             which compilers predefine where it exists
-    float64, float32  its name in GCC and clang, for vectors of these
-    operand           'real' or 'integer': what it takes
+    macro             macro that compilers predefine if the instruction exists
+    float64, float32  name of the instruction in GCC and clang, for vectors of these types
+    operand           type of the operand: 'real' or 'integer'
     """
 
     macro: str
@@ -34,10 +34,11 @@ class SignMask:
 
 @dataclass(frozen=True, slots=True)
 class Narrower:
-    """Registers for the sines of one state, where wide ones slow the scalar code around them.
+    """Narrower vector registers for the sines of a single state. They are for processors on which wide registers slow
+    the other code, which computes single numbers.
 
     unit    the narrower registers
-    unless  C condition: processors that wide ones do not slow
+    unless  C condition that selects processors on which wide registers do not slow the other code
     """
 
     unit: VectorUnit
@@ -46,12 +47,12 @@ class Narrower:
 
 @dataclass(frozen=True, slots=True)
 class VectorUnit:
-    """Registers of `bytes`.
+    """A kind of SIMD vector registers, each of the size `bytes`.
 
-    macro      which compilers predefine where there are such registers; a target's narrowest unit needs none
-    sign_mask  None: signs are gathered lane by lane
-    narrower   for sines within scalar code; None: this unit
-    half       registers of half as many bytes that the same processors have; None: there are none, or none is needed
+    macro      macro that compilers predefine if the registers exist; the narrowest unit of a target needs none
+    sign_mask  the instruction that collects sign bits; None: signs are read number by number
+    narrower   registers for sines within code that computes single numbers; None: this kind
+    half       registers of half the size on the same processors; None if not available or not needed
     """
 
     bytes: int

@@ -1,4 +1,4 @@
-"""Build an emitted package with its own build files and run its own test."""
+"""Builds a generated C package with the package's build files, and runs the self-test of the package."""
 
 from __future__ import annotations
 
@@ -33,13 +33,14 @@ MARKS = (UNFINISHED, "CMakeCache.txt", "CMakeFiles", "compiled_by")
 
 
 def build_package(directory: str | Path, edited: bool = False, progress: Progress = silent) -> str:
-    """Build under DIR/build, run the self-test, and return what the tools printed.
+    """Build the package in the folder `build` of `directory`, run the self-test of the package, and return the output
+    of the tools.
 
-    edited    build although files are missing or differ from what emit-c wrote
-    progress  called with how many files are compiled, and their share
+    edited    True: build although files are missing or differ from what the command `emit-c` wrote
+    progress  function that psdmc calls with the number of compiled files and their share
 
-    With CMake where there is one, else make. InputError where DIR holds no package, or an edited one; ToolchainError
-    where a tool is missing or fails.
+    The build uses CMake if it is installed, else make. Raises InputError if the folder holds no package, or an edited
+    one. Raises ToolchainError if a tool is missing or fails.
     """
     root = Path(directory)
     _check_files(root, edited)
@@ -126,7 +127,7 @@ def _self_test(words: list[str], root: Path) -> str:
 
 
 def checks_of(report: str) -> str:
-    """Return the self-test's summary: '39 checks of 15 functions'."""
+    """Return the summary of a package's self-test, such as '39 checks of 15 functions'."""
     found = re.findall(r": (\d+ checks of \d+ functions), 0 failed", report)
     return found[-1] if found else "nothing to check"
 
@@ -143,10 +144,11 @@ FOLDERS = ("src", "test")
 
 @contextmanager
 def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
-    """Tell `progress` of the share of `files` object files that have come below `build`, until the block ends.
+    """Report the progress of a build until the block ends: how many of `files` object files exist below the folder
+    `build`.
 
-    A compiler says nothing while it works: without this a build would be one step, however long. Files of an earlier
-    build are there from the beginning, and then the time left is not known.
+    Compilers print nothing while they work, so the files are counted. If an earlier build left its files, the time left
+    is not known.
     """
     done, most = threading.Event(), 0
 

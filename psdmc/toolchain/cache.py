@@ -1,9 +1,9 @@
-"""Compiled libraries by content: each is compiled once.
+"""The compile cache, which keeps compiled libraries by their content, so that each one is compiled only once.
 
-The key covers everything that the binary depends on: sources, flags, compiler, CPU features, psdmc's version and the
-platform. An entry is used while its files have the digests that they were sealed with, and is built again otherwise.
-A process that needs an entry while another one builds it waits and uses it. Where files cannot be locked, two may build
-the same entry, each in a folder of its own that it renames into place: the later one uses the earlier one's.
+The key of an entry covers everything that the binary depends on: sources, flags, compiler, CPU features, psdmc's
+version and the platform. psdmc uses an entry only if its files have the recorded digests, and builds it again
+otherwise. If another process builds the same entry, psdmc waits for it. On file systems without locks, two processes
+may build the same entry, each in its own folder; the later one then uses the entry of the earlier one.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ from psdmc.toolchain.cache_room import (
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
-    """Hex digest of file names, texts and everything else that the binary depends on."""
+    """Return the key of a cache entry: a hex digest of file names, texts and everything else on which the library
+    depends."""
     platform = (sys.platform, sysconfig.get_platform(), str(sysconfig.get_config_var("SOABI")))
     digest = hashlib.sha256()
     for part in (*platform, *parts, *(item for path in sorted(files) for item in (path, files[path]))):
@@ -48,11 +49,12 @@ def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
 
 
 def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()) -> Path:
-    """The folder that `build` filled for this key, now or earlier, unaltered since.
+    """Return the folder of the cache entry for this key. If there is no complete, unaltered entry, the function `build`
+    first fills a new folder.
 
-    products  files that it must have made
+    products  files that `build` must have made
 
-    ToolchainError where the cache cannot be written or other users may write it, or where a product is missing.
+    Raises ToolchainError if the cache cannot be written, if other users may write it, or if a product is missing.
     """
     place = open_cache()
     final = place / key
@@ -86,7 +88,8 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
 
 
 def found(key: str) -> Path | None:
-    """The folder kept for a key, unaltered; None where there is none. ToolchainError as `cached`."""
+    """Return the folder of the cache entry for a key, or None if there is no complete, unaltered entry. Errors are
+    those of `cached`."""
     final = open_cache() / key
     if not re.fullmatch(r"[0-9a-f]{64}", key) or not is_sound(final):
         return None
@@ -113,10 +116,11 @@ BETWEEN = 0.02
 
 @contextlib.contextmanager
 def turn(place: Path, key: str) -> Iterator[None]:
-    """Hold the only right to build an entry, waiting for the process or thread that has it.
+    """Within the block, hold the lock that allows one process or thread to build an entry. If another process has the
+    lock, wait.
 
-    The lock is given back explicitly: a process that was forked meanwhile has a copy of the handle, which would keep it.
-    Where the file system has no locks, no process waits.
+    The lock is released explicitly, because a forked process with a copy of the handle would keep it. On file systems
+    without locks, no process waits.
     """
     path = place / f".turn-{key[:16]}"
     handle = _taken(path)

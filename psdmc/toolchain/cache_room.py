@@ -1,5 +1,5 @@
-"""The compile cache's contents, and how its size is limited: leftovers of killed builds and the oldest entries are
-removed."""
+"""Limits the size of the compile cache. Leftovers of killed builds are removed first, then the entries that were not
+used for longest."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ build; the last form is that of psdmc 0.1."""
 
 @dataclass(frozen=True, slots=True)
 class CacheContents:
-    """The cache's folder, its number of entries and bytes, and how many bytes it may have."""
+    """The folder of the compile cache, its number of entries and bytes, and its size limit in bytes."""
 
     place: Path
     entries: int
@@ -41,14 +41,15 @@ class CacheContents:
 
 
 def cache_contents() -> CacheContents:
-    """The present contents; ToolchainError where other users may write the folder."""
+    """Return the present contents of the compile cache. Raises ToolchainError if other users may write its folder."""
     place = cache_directory()
     entries = _entries(place)
     return CacheContents(place, len(entries), sum(size for _, size, _ in entries), cache_limit())
 
 
 def clear_cache() -> int:
-    """Remove every entry and what killed builds left, nothing else; returns the number of entries removed."""
+    """Remove all entries of the compile cache and the leftovers of killed builds. Return the number of entries
+    removed."""
     place = cache_directory()
     entries = _entries(place)
     with hold(place):
@@ -59,7 +60,8 @@ def clear_cache() -> int:
 
 
 def make_room(place: Path, keep: Path, limit: int) -> None:
-    """Remove the least recently used entries beyond `limit` bytes, except `keep` and those just used."""
+    """Remove the least recently used entries until the cache has at most `limit` bytes. The entry `keep` and entries
+    that were just used stay."""
     entries = _entries(place)
     total = sum(size for _, size, _ in entries)
     old = time.time() - IN_USE
@@ -73,7 +75,7 @@ def make_room(place: Path, keep: Path, limit: int) -> None:
 
 
 def sweep(place: Path) -> None:
-    """Remove the folders of processes that have ended."""
+    """Remove the build folders, in the compile cache, of processes that have ended."""
     with contextlib.suppress(OSError):
         for name in sorted(os.listdir(place)):
             if _PASSING.fullmatch(name):
@@ -81,7 +83,8 @@ def sweep(place: Path) -> None:
 
 
 def new_folder(place: Path) -> tuple[int, Path]:
-    """An empty folder to build in, locked by the handle while this process lives."""
+    """Return a new empty folder to build in, and a handle whose lock marks the folder as in use while this process
+    runs."""
     while True:
         own = place / f".build-{secrets.token_hex(8)}"
         own.mkdir(mode=0o700)
@@ -96,7 +99,8 @@ def new_folder(place: Path) -> tuple[int, Path]:
 
 @contextlib.contextmanager
 def hold(place: Path) -> Iterator[None]:
-    """Lock the cache while entries are moved, where the file system can lock."""
+    """Within the block, lock the cache folder, so that no other process moves entries. File systems without locks are
+    accepted."""
     handle = _opened(place)
     try:
         lock(handle)
@@ -111,8 +115,8 @@ def _opened(folder: Path) -> int:
 
 
 def remove(entry: Path) -> None:
-    """Rename the entry in one step, so that no process finds half of it, then delete it. One that another process has
-    removed since it was listed is gone already."""
+    """Remove a cache entry. The entry is first renamed, so that no other process finds an incomplete entry. An entry
+    that another process has just removed is ignored."""
     gone = entry.parent / f".gone-{secrets.token_hex(8)}"
     try:
         entry.rename(gone)
@@ -164,7 +168,7 @@ LARGEST_SEAL = 1 << 20
 
 
 def seal(folder: Path) -> None:
-    """List every file with its digest, and make all of them writable by nobody but this user."""
+    """Write a list of all files of a cache entry with their digests. Make the entry writable for this user only."""
     files: dict[str, str] = {}
     size = 0
     for path in sorted(folder.rglob("*")):
@@ -180,7 +184,7 @@ def seal(folder: Path) -> None:
 
 
 def is_sound(folder: Path) -> bool:
-    """Whether an entry is complete, unaltered and writable by this user alone, and so safe to open."""
+    """Return whether a cache entry is complete, unaltered and writable by this user alone, and thus safe to load."""
     try:
         if not _is_own(folder, stat.S_ISDIR):
             return False
@@ -194,13 +198,14 @@ def is_sound(folder: Path) -> bool:
 
 
 def touch(folder: Path) -> None:
-    """Note that an entry was used now; ignored where the cache cannot be written."""
+    """Record that a cache entry was used now. The function does nothing if the cache cannot be written."""
     with contextlib.suppress(OSError):
         os.utime(folder / SEAL)
 
 
 def used_and_size(folder: Path) -> tuple[float, int]:
-    """When an entry was last used (s since 1970) and its bytes; for one without seal, when it was made."""
+    """Return when a cache entry was last used (s since 1970), and the entry's size in bytes. For an incomplete entry,
+    return the time when it was made."""
     try:
         content, used = _seal_of(folder)
         return used, int(content["bytes"])
@@ -253,8 +258,8 @@ _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_directory() -> Path:
-    """PSDMC_CACHE_DIR, else the platform's place for caches, as an absolute path; ToolchainError where neither is
-    known."""
+    """Return the absolute path of the cache folder: PSDMC_CACHE_DIR, else the platform's folder for caches. Raises
+    ToolchainError if neither is known."""
     chosen = os.environ.get(VARIABLE)
     if chosen:
         return Path(os.path.abspath(chosen))
@@ -277,7 +282,8 @@ def _home() -> Path:
 
 
 def cache_limit() -> int:
-    """Bytes that PSDMC_CACHE_SIZE allows: a number, or one with K, M, G or T; InputError where it is neither."""
+    """Return the size limit in bytes from PSDMC_CACHE_SIZE: a number, or one with K, M, G or T. Raises InputError for
+    other text."""
     text = os.environ.get(SIZE_VARIABLE) or DEFAULT_SIZE
     found = re.fullmatch(r"([0-9]{1,12})([KMGT]?)", text.strip().upper())
     if found is None:
@@ -286,8 +292,8 @@ def cache_limit() -> int:
 
 
 def open_cache() -> Path:
-    """The cache's folder, made where it is missing; ToolchainError where it cannot be made or other users could write
-    into it."""
+    """Return the cache folder, and make the folder if it is missing. Raises ToolchainError if the folder cannot be
+    made, or if other users could write into it."""
     place = cache_directory()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -299,7 +305,7 @@ def open_cache() -> Path:
 
 
 def check_place(place: Path) -> None:
-    """ToolchainError where other users own the cache's folder, may write it, or may replace it."""
+    """Raise ToolchainError if other users own the cache folder, may write it, or may replace it."""
     resolved = Path(os.path.realpath(place))
     status = resolved.stat()
     if not is_private(status):
@@ -316,7 +322,7 @@ def check_place(place: Path) -> None:
 
 
 def is_private(status: os.stat_result) -> bool:
-    """Whether a file or folder belongs to this user or root, and no other user may write it."""
+    """Return whether a file or folder belongs to this user or root, and no other user may write it."""
     return os.name != "posix" or (_is_ours(status) and not status.st_mode & _OTHERS_MAY_WRITE)
 
 
@@ -325,7 +331,7 @@ def _is_ours(status: os.stat_result) -> bool:
 
 
 def unusable(place: Path, error: OSError) -> ToolchainError:
-    """The error for a cache folder that cannot be written to."""
+    """Return the exception to raise for a cache folder that cannot be written."""
     return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _choose())
 
 

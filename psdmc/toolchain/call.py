@@ -1,6 +1,6 @@
-"""A compiled robot called from Python: a method for each function of psdmc/functions.
+"""The class CompiledRobot, which has a Python method for each generated function of psdmc/functions.
 
-Type checkers and editors read the methods' types from call.pyi, which `python -m psdmc.toolchain.stubs` writes.
+Type checkers and editors read the types of the methods from call.pyi, which `python -m psdmc.toolchain.stubs` writes.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ class CompiledRobot(CompiledFunctions):
 
 
 def is_direct(function: Signature, units: Sequence[tuple[int, int]]) -> bool:
-    """Whether DirectCall takes a function: it has inputs, not too many arrays or parts whose length must be one."""
+    """Return whether the extension module (direct_calls.py) can call a function. The function needs inputs, and not too
+    many arrays or quaternions."""
     arrays = len(function.inputs) + len(function.outputs)
     return bool(function.inputs) and arrays <= MOST_ARRAYS and len(function.inputs) * len(units) <= MOST_UNITS
 

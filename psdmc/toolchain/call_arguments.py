@@ -1,7 +1,5 @@
-"""The arguments of a function that is called from Python: inputs, then theta_b and out where they are given.
-
-Compiled robots and models take the same, with the same refusals.
-"""
+"""Checks the arguments of a method of a robot: the inputs, theta_b and out. Compiled robots and models share these
+checks."""
 
 from __future__ import annotations
 
@@ -32,9 +30,9 @@ THETA_B = Quantity("theta_b", ("l",))
 class RobotAxes:
     """Sizes and names of the axes of one robot's arrays.
 
-    sizes  lengths of axes by their words
-    names  of the entries of q (nq), of rates (nv), joints (n) and named frames (frames)
-    units  parts of q, from an entry to before another, whose length must be one
+    sizes  lengths of axes: word, such as nq -> length
+    names  names of the entries of q (nq), of rates (nv), joints (n) and named frames (frames)
+    units  slices (start, stop) of q that must have length one, such as quaternions
     """
 
     sizes: Sizes
@@ -45,7 +43,8 @@ class RobotAxes:
 def bound_arguments(
     function: Signature, given: Sequence[Any], named: Mapping[str, Any]
 ) -> tuple[tuple[Any, ...], Any, Any]:
-    """Inputs, theta_b and out of a call; TypeError, which names the function, where they do not fit."""
+    """Return the inputs, theta_b and out of a call, from positional and named arguments. Raises TypeError, which names
+    the function, if arguments are missing or unknown."""
     try:
         bound = signature_of(function).bind(None, *given, **named)
     except TypeError as error:
@@ -58,7 +57,7 @@ def bound_arguments(
 
 @cache
 def signature_of(function: Signature) -> inspect.Signature:
-    """Return the signature of a method, `self` included."""
+    """Return the Python signature (inspect.Signature) of the method for a generated function, including `self`."""
     defaults: dict[str, float | None] = {q.name: q.default for q in function.inputs if q.default is not None}
     defaults["theta_b"] = None
     return inspect.Signature(
@@ -77,8 +76,8 @@ def signature_of(function: Signature) -> inspect.Signature:
 def states(
     function: Signature, axes: RobotAxes, inputs: Sequence[ArrayLike], dtype: DTypeLike
 ) -> list[Array]:
-    """The inputs as arrays (..., *axes of one state); InputError where one has another shape, or a quaternion in it has not
-    the length one."""
+    """Return the inputs of a function as arrays with batch axes first: (..., then the axes for one state). Raises
+    InputError for another shape, or if a quaternion in q has not length one."""
     arrays = []
     for quantity, values in zip(function.inputs, inputs, strict=True):
         what = f"{function.name}: {quantity.name}"
@@ -99,7 +98,7 @@ def states(
 def other_shape(
     what: str, shape: tuple[int, ...], tail: tuple[int, ...], words: Sequence[str], axes: RobotAxes
 ) -> tuple[str, str]:
-    """Message and hint where an array has not the axes of one state."""
+    """Return the message of the error for an array whose last axes do not fit one state, and a hint for the user."""
     expected = ", ".join(("...", *map(str, tail)))
     frames, joints = axes.names["frames"], axes.names["n"]
     hint = f"the robot has {len(joints)} joints: {', '.join(joints)}"
@@ -113,7 +112,8 @@ def other_shape(
 
 
 def common_lead(function: Signature, arrays: Sequence[Array]) -> tuple[int, ...]:
-    """The leading axes that the arrays broadcast to; InputError where they do not."""
+    """Return the batch axes (leading axes, one entry per state) to which all inputs broadcast. Raises InputError if the
+    inputs do not broadcast."""
     pairs = list(zip(function.inputs, arrays, strict=True))
     leads = [array.shape[: array.ndim - len(quantity.axes)] for quantity, array in pairs]
     if len(set(leads)) < 2:
@@ -129,7 +129,7 @@ def common_lead(function: Signature, arrays: Sequence[Array]) -> tuple[int, ...]
 
 
 def has_rows(function: Signature, theta_b: ArrayLike | None) -> bool:
-    """Check if theta_b has axes of states."""
+    """Return whether theta_b has batch axes, that is, another set of base parameters for each state."""
     if theta_b is None or hasattr(theta_b, "ndim"):
         return theta_b is not None and theta_b.ndim > 1
     return real_array(f"{function.name}: theta_b", theta_b).ndim > 1
@@ -137,7 +137,8 @@ def has_rows(function: Signature, theta_b: ArrayLike | None) -> bool:
 
 @cache
 def with_rows(function: Signature) -> Signature:
-    """The function with theta_b among its inputs: one per state."""
+    """Return the signature of a function with theta_b as an additional input, so that each state can have another
+    theta_b."""
     return replace(function, inputs=(*function.inputs, THETA_B))
 
 
@@ -150,7 +151,7 @@ def _refuse_no_numbers(what: str, array: Array) -> None:
 
 
 def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike) -> Array:
-    """theta_b as an array (l,); InputError where it has another shape."""
+    """Return theta_b as an array (l,). Raises InputError if theta_b has another shape."""
     array = np.ascontiguousarray(real_array(f"{function.name}: theta_b", theta_b, dtype, ("l",)))
     if array.shape != (l,):
         raise InputError(
@@ -163,10 +164,12 @@ def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike
 def indefinite(
     function: Signature, axes: RobotAxes, pivot: int, scalars: Mapping[str, float], state: Sequence[int]
 ) -> InputError | None:
-    """The error of a state at which a function's pivot with this number is not positive; None if NaN says it.
+    """Return the error for a state at which a pivot (divisor of a matrix factorisation) is not positive. Return None if
+    the function reports this state by NaN.
 
-    scalars  the function's scalar inputs at this state
-    state    its place among many
+    pivot    number of the pivot
+    scalars  values of the function's scalar inputs at this state
+    state    index of the state in the batch
     """
     for matrix in function.factorises:
         shape = axes.sizes.shape(matrix.axes)
@@ -182,13 +185,14 @@ def indefinite(
 
 
 def scalar_inputs(function: Signature, arrays: Sequence[Array], state: tuple[int, ...]) -> dict[str, float]:
-    """The scalar inputs at one state, from arrays of the common leading axes."""
+    """Return the inputs that are single numbers, such as a time step, at one state: name -> value. `arrays` are all
+    inputs, broadcast to common batch axes."""
     pairs = zip(function.inputs, arrays, strict=True)
     return {quantity.name: float(array[state]) for quantity, array in pairs if not quantity.axes}
 
 
 def finite_states(function: Signature, arrays: Sequence[Array]) -> NDArray[np.bool_]:
-    """At which states all inputs are finite, from arrays of the common leading axes."""
+    """Return for each state whether all inputs are finite. The inputs are broadcast to common batch axes."""
     each = [
         np.isfinite(array).all(axis=tuple(range(-len(quantity.axes), 0)))
         for quantity, array in zip(function.inputs, arrays, strict=True)
@@ -200,8 +204,8 @@ Shapes = Sequence[tuple[int, ...]]
 
 
 def checked_outputs(function: Signature, out: Any, shapes: Shapes, dtype: np.dtype[Any]) -> tuple[Array, ...]:
-    """The caller's arrays, one for each output. InputError where one has another shape or dtype, cannot be written, or
-    shares memory with another."""
+    """Return the caller's arrays `out`, one for each output. Raises InputError if one of the arrays has another shape
+    or dtype, cannot be written, or shares memory with another array."""
     names = [output.name for output in function.outputs]
     given = tuple(out) if len(names) > 1 and isinstance(out, tuple | list) else (out,)
     if len(given) != len(names):
@@ -232,6 +236,7 @@ def _faults(array: Any, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Iterato
 
 
 def takes_results(array: Array, inputs: Sequence[Array]) -> bool:
-    """Whether C may write into an array of the caller's: it is contiguous, and no input lies there."""
+    """Return whether C code may write results into an array of the caller. The array must be contiguous and share no
+    memory with an input."""
     plain = array.flags.carray and array.dtype.isnative
     return plain and not any(np.may_share_memory(array, given) for given in inputs)

@@ -1,4 +1,5 @@
-"""Compiled libraries with their interfaces kept in the compile cache: an equal call of `compile` only opens one."""
+"""Keeps compiled libraries and their interfaces in the compile cache, so that a second equal call of `compile` only
+loads them."""
 
 from __future__ import annotations
 
@@ -31,13 +32,13 @@ INTERFACE = "interface.json"
 def compiled_once(
     parts: Sequence[str], make: Callable[[], PackageView], target: Target = NATIVE
 ) -> tuple[Interface, Path]:
-    """Interface and shared library of the package that `make` returns, from the cache where an equal call was made
-    before.
+    """Return the interface and the shared library of a package. They come from the compile cache if an equal call was
+    made before. Else `make` generates the package, which is then compiled.
 
-    parts   all that the package depends on besides psdmc's own sources: the model's hash, the options
-    target  the package's
+    parts   everything that the package depends on except psdmc's own sources: the model's hash, the options
+    target  the target of the package
 
-    Raises what `make` and `compile_library` raise. An interface whose library is missing or altered is not used.
+    Raises the errors of `make` and `compile_library`. If the library is missing or altered, the interface is not used.
     """
     made: list[tuple[Interface, Path]] = []
 
@@ -81,10 +82,10 @@ LIBRARY = "library.so"
 
 
 def compile_library(package: PackageView) -> Path:
-    """The shared library of a package, from the cache or compiled now.
+    """Return the shared library of a package, from the cache or newly compiled.
 
-    ToolchainError where there is no compiler, it fails or makes no library, or the cache cannot be written or is
-    writable by other users.
+    Raises ToolchainError if there is no compiler, if it fails or makes no library, or if the cache cannot be written
+    or is writable by other users.
     """
     files = library_files(package)
     compiler = find_compiler(package.options.target)
@@ -127,11 +128,12 @@ DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "rob
 
 
 def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
-    """The kernels that `lower` returns, from the compile cache where an equal call was made before.
+    """Return the generated programs (kernels) that the function `lower` computes. They come from the compile cache if
+    an equal call was made before.
 
-    parts  all that the result depends on besides psdmc's own sources: the model's hash, the options
+    parts  everything that the result depends on except psdmc's own sources: the model's hash, the options
 
-    Where the cache cannot be used, `lower` is called and nothing is kept.
+    If the cache cannot be used, `lower` is called and its result is not stored.
     """
     made: dict[str, Kernel] = {}
 
@@ -149,14 +151,16 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
 
 @cache
 def sources_digests() -> tuple[str, ...]:
-    """NumPy's version and the digest of the files that lowering runs, so that an edited psdmc lowers again."""
+    """Return NumPy's version and a digest of psdmc's source files. If one of them changes, cached programs are not
+    used."""
     root = resources.files("psdmc")
     modules = [file for file in root.iterdir() if file.name.endswith(".py")]
     return (np.__version__, digest([*modules, *(root / folder for folder in DECIDES)]))
 
 
 def digest(places: Iterable[Traversable]) -> str:
-    """SHA-256 of the names and contents of these files, and of all files in these folders and the folders within them."""
+    """Return a SHA-256 digest of the names and contents of these files, and of all files in these folders and their
+    subfolders."""
     found = hashlib.sha256()
     for name, content in _files("", places):
         found.update(repr((name, content)).encode())

@@ -1,4 +1,4 @@
-"""A compiled package's functions on NumPy arrays, broadcasting over leading axes like ufuncs."""
+"""Calls the functions of a compiled package with NumPy arrays. Leading axes broadcast as in NumPy's ufuncs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ Vector = NDArray[np.float64]
 
 
 class JointLimits(NamedTuple):
-    """Limits of n joints as (n,) arrays, in rad or m and their rates, N m or N; infinite where the robot's file has none."""
+    """Limits of n joints as arrays (n,), in rad or m and their rates, N m or N. A limit that the robot file does not
+    give is infinite."""
 
     lower: Vector
     upper: Vector
@@ -52,7 +53,7 @@ class JointLimits(NamedTuple):
 
 
 class RobotFacts:
-    """Names, sizes, limits and parameters of a compiled robot with n joints and l base parameters."""
+    """The properties of a compiled robot with n joints and l base parameters: names, sizes, limits and parameters."""
 
     def __init__(self, interface: Interface) -> None:
         self._interface = interface
@@ -79,7 +80,7 @@ class RobotFacts:
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
-        """Return the number of base parameters, the length of theta_b."""
+        """Return the number of base parameters, which is the length of theta_b."""
         return self._interface.l
 
     @property
@@ -184,10 +185,12 @@ Array = NDArray[Any]
 
 
 class CompiledFunctions(RobotFacts):
-    """Calls the library of a compiled package by each function's signature.
+    """Calls the C functions of a compiled package with NumPy arrays. The signature of a function says which inputs and
+    outputs it has.
 
-    more    compiles a function, by its name, that the package does not have; None: such a call is an error
-    origin  the request from which another process builds the same robot; None: it cannot be pickled
+    more    function that compiles a generated function, by name, that the package does not have; None: such a call
+            fails
+    origin  the request from which another process builds the same robot; None: the robot cannot be pickled
     """
 
     def __init__(
@@ -362,19 +365,22 @@ class CompiledFunctions(RobotFacts):
         return (kernels[function] if function in kernels else kernels[f"{function}_theta"]).tails
 
     def call_at(self, kernel: str, count: int, addresses: Sequence[int]) -> None:
-        """Compute `count` states, whose inputs and outputs, theta_b between them, are contiguous rows at these addresses.
+        """Compute `count` states from memory addresses of the arrays: those of the inputs, then theta_b, then the
+        outputs. An array has the states in contiguous rows.
 
         Nothing is checked. If a matrix is not positive definite, the results of that state are NaN.
         """
         self._kernel(kernel).batch(count, *(self._ffi.cast(self._pointer, address) for address in addresses))
 
     def tails(self, kernel: str) -> tuple[tuple[int, ...], ...]:
-        """Trailing axes of each output of a kernel."""
+        """Return for each output of a generated function the shape for one state, without batch axes."""
         return self._kernel(kernel).tails
 
     def address_of(self, kernel: str) -> int:
-        """Return where in memory a batch function in C is, such as that of 'gravity' or of 'gravity_theta', compiled now if
-        it was not. It stays there as long as the robot lives."""
+        """Return the memory address of a batch function in C, such as 'gravity' or 'gravity_theta'.
+
+        psdmc compiles the function if that has not been done. The address is valid as long as the robot object exists.
+        """
         return int(self._ffi.cast("uintptr_t", self._kernel(kernel).batch))
 
     def _rows(self, lead: tuple[int, ...], function: Signature, arrays: Sequence[Array]) -> list[Array]:
@@ -394,7 +400,8 @@ class CompiledFunctions(RobotFacts):
 
 @dataclass(frozen=True, slots=True)
 class OnArrays:
-    """A function of a robot, with theta_b where it is given, that goes to other processes with it."""
+    """A function of a robot, with optional base parameters theta_b, that can be called with arrays. The object can be
+    pickled and sent to other processes."""
 
     robot: CompiledFunctions
     function: str
@@ -427,5 +434,5 @@ class _Kernel:
 
 @cache
 def results(function: Signature) -> Any:
-    """The named tuple that a function with several outputs returns."""
+    """Return the named tuple class for the results of a function with several outputs."""
     return namedtuple(result_name(function), [output.name for output in function.outputs])

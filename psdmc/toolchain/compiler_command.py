@@ -1,4 +1,4 @@
-"""The C compiler: which one, what it can do, and how it is run."""
+"""Finds the C compiler, determines its features, and runs it."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Compiler:
 
     command   the words that start it
     version   its version text, for cache keys
-    portable  FLAGS, and GCC's own where it is GCC
-    flags     those, and the one for this machine's CPU
-    target    macros that it predefines under its flags: they name the CPU features that it found
+    portable  flags for every machine: FLAGS, and further ones for GCC
+    flags     the portable flags, and those for the target or this machine's CPU
+    target    macros that the compiler predefines with these flags; they name the CPU features
     """
 
     command: tuple[str, ...]
@@ -44,14 +44,17 @@ class Compiler:
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """The compiler's properties that a library depends on, for cache keys."""
+        """Return the properties of the compiler on which a compiled library depends. They are part of cache keys."""
         return (*self.command, self.version, self.target, *self.flags)
 
 
 def find_compiler(target: Target = NATIVE) -> Compiler:
-    """The compiler that CC names, else the first of CANDIDATES, with its flags for a target. ToolchainError where there
-    is none, where it does not accept the target's flags, or where this machine cannot run the code that it then
-    makes."""
+    """Return the compiler that the environment variable CC names, else the first of CANDIDATES, with its flags for a
+    target.
+
+    Raises ToolchainError if there is no compiler, if it does not accept the target's flags, or if this machine cannot
+    run code for the target.
+    """
     return _described(_command(os.environ.get("CC", "")), target)
 
 
@@ -138,7 +141,8 @@ def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
-    """A program's standard output; ToolchainError with the first line of its error output where it fails."""
+    """Run a program and return the standard output. Raises ToolchainError with a line of the error output if the
+    program fails."""
     done = attempt(words, what, cwd)
     if done.returncode != 0:
         raise failure(words, what, done)
@@ -146,7 +150,8 @@ def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
 
 
 def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subprocess.CompletedProcess[str]:
-    """A program run to its end, whatever its status; ToolchainError where it cannot be run or takes too long."""
+    """Run a program to its end and return the result, with any exit status. Raises ToolchainError if it cannot be run
+    or takes too long."""
     try:
         return subprocess.run(
             words, cwd=cwd, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False
@@ -159,7 +164,7 @@ def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subproce
 
 
 def failure(words: Sequence[str], what: str, done: subprocess.CompletedProcess[str]) -> ToolchainError:
-    """The error for a program that was killed or ended with a status other than 0."""
+    """Return the error for a program that was killed or ended with a status other than 0."""
     if done.returncode < 0:
         return ToolchainError(
             f"{what}: {words[0]} was killed by {_signal_name(-done.returncode)}",

@@ -1,7 +1,8 @@
-"""The extension module that calls compiled functions without a detour through Python: compiled once a machine.
+"""The extension module that calls compiled functions from Python with little overhead. It is compiled once on each
+machine.
 
-It needs Python's C headers. Without them, or where it cannot be compiled or loaded, calls go through cffi and take some
-microseconds more; results are the same, bit for bit.
+The module needs Python's C headers. If the module cannot be compiled or loaded, calls go through cffi and take some
+microseconds longer. The results are the same, bit for bit.
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ MOST_ARRAYS, MOST_UNITS = 12, 64
 
 @dataclass(frozen=True, slots=True)
 class DirectCalls:
-    """Whether direct calls are possible here.
+    """The result of the test whether the extension module for direct calls works on this machine.
 
-    make    the type DirectCall(slow, address, failures, is_single, inputs, outputs, result, units, theta_address,
-            parameters); None where they are not. `failures`: 0, no state can fail; 1, the results of such a state are NaN;
-            2, `slow` repeats such a call, and raises an error
-    reason  why not, for people; empty where they are
-    remedy  how to have them
+    make    the type of callable objects: DirectCall(slow, address, failures, is_single, inputs, outputs, result, units,
+            theta_address, parameters); None if the module does not work. `failures`: 0, no state can fail; 1, the
+            results of a failed state are NaN; 2, the function `slow` repeats a failed call and raises an error
+    reason  why the module does not work, for people; empty if it works
+    remedy  what the user can do about the reason
     """
 
     make: Callable[..., Any] | None
@@ -54,7 +55,8 @@ class DirectCalls:
 
 
 def direct_calls() -> DirectCalls:
-    """The extension, compiled now where it was not before; never an error."""
+    """Return whether direct calls work, and compile the extension module if needed. The function never raises an
+    error."""
     if os.environ.get(VARIABLE, "").strip() == "0":
         return DirectCalls(None, f"{VARIABLE} is 0", f"unset {VARIABLE}")
     return _found()
@@ -92,10 +94,11 @@ def _library(headers: Path) -> Path:
 
 
 def called_from(source: Path, product: str, words: Sequence[str], parts: Sequence[str]) -> Path:
-    """The shared library of a C file of psdmc's own that calls robots' functions, from the cache or compiled now.
+    """Return the path of the shared library made from a C file of psdmc that calls robots' functions. The library comes
+    from the compile cache or is newly compiled.
 
-    words  for the compiler, behind its own
-    parts  what the library depends on besides, the first in words for messages
+    words  arguments for the compiler, after psdmc's own arguments
+    parts  what the library depends on besides the C file; the first part names the library in messages
     """
     texts = {path.name: path.read_text(encoding="utf-8") for path in (source, ARRAYS)}
     compiler = find_compiler()

@@ -1,8 +1,8 @@
-"""The data that calling a compiled library needs: names, sizes and prototypes, without the package that it was made
-from.
+"""The data with which a compiled library is called: names, sizes and prototypes. The generated package is not needed
+for a call.
 
-It is kept beside libraries in the compile cache: a model that was compiled before is called without being lowered,
-rendered or parsed again.
+The compile cache keeps this data with each library. So a model that was compiled before can be called without
+generating its code again.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ FORMAT = 7
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A compiled package as its caller needs it.
+    """The data that a caller of a compiled package needs.
 
-    robot        prefix of its symbols
-    real         C's name of its floating-point type; `dtype` is NumPy's
-    n, l         joints, base parameters
+    robot        prefix of the library's C symbols
+    real         C name of its floating-point type; `dtype` is the name in NumPy
+    n, l         numbers of joints and base parameters
     nq, nv       lengths of q, and of rates and torques
     joint_names  n, from base to tip
-    q_names      nq names of q's entries, and
-    v_names      nv names of rates' and torques'
-    frame_names  the named frames
-    contacts     names and rows of the contacts
-    units        parts of q, from an entry to before another, whose length must be one
-    limits       n rows: lower, upper, speed, acceleration, effort; infinite where unknown
-    gravity      3, m/s^2 in
-    base_frame   the base frame, or the world frame of a floating base: its words
-    theta_b      l base parameters; None while unknown
-    kernels      name -> trailing axes of each of its results
+    q_names      names of the nq entries of q
+    v_names      names of the nv entries of rates and torques
+    frame_names  names of the named frames
+    contacts     names and numbers of rows of the contacts
+    units        (start, stop) slices (start, stop) of q that must have length one, such as quaternions
+    limits       n rows: lower, upper, speed, acceleration, effort; infinite if unknown
+    gravity      3 numbers, m/s^2 along the axes of the base frame
+    base_frame   name of that frame in words: the base frame, or the world frame of a floating base
+    theta_b      l base parameters; None if unknown
+    kernels      name of each generated function in C -> shapes of the function's results for one state
     patterns     function -> (row, column) of the entries of its matrix that may differ from zero
     cdef         C declarations of the functions that are called
     """
@@ -68,20 +68,24 @@ class Interface:
 
     @property
     def sizes(self) -> Sizes:
-        """Return the sizes that the words of signatures mean for this robot."""
+        """Return the lengths of this robot's axes, such as nq and nv."""
         rows = tuple(rows for _, rows in self.contacts)
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names), rows_of_contacts=rows)
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """Names along the axes of arrays, by the axes' words."""
+        """Return the names of the entries along each axis: word of the axis, such as nq -> names."""
         own = {"n": self.joint_names, "nq": self.q_names, "nv": self.v_names, "frames": self.frame_names}
         return own | contact_names(self.contacts)
 
 
 def interface_of(package: PackageView) -> Interface:
-    """The interface of a package's library: the batch function of each kernel, and where Python raises errors that name a
-    pivot the one for one state."""
+    """Return the interface of the library of a package. The interface has every generated function for batches of
+    states.
+
+    If a matrix that is not positive definite must raise an error in Python, the interface also has the function for one
+    state.
+    """
     values = [parameter.value for parameter in package.info.parameters]
     known = tuple(value for value in values if value is not None)
     return Interface(
@@ -115,22 +119,22 @@ def interface_of(package: PackageView) -> Interface:
 
 
 def batch_symbol(robot: str, kernel: str) -> str:
-    """The C function that computes a kernel for many states."""
+    """Return the name of the C function that computes a generated function for many states."""
     return f"{robot}_{kernel}_batch"
 
 
 def single_symbol(robot: str, kernel: str) -> str:
-    """The C function that computes a kernel for one state."""
+    """Return the name of the C function that computes a generated function for one state."""
     return f"{robot}_{kernel}"
 
 
 def interface_to_json(interface: Interface, library: str) -> str:
-    """JSON text of an interface and of the key of its library in the cache."""
+    """Return an interface, and the key of its library in the cache, as JSON text."""
     return json.dumps({"format": FORMAT, "library": library, "interface": asdict(interface)})
 
 
 def interface_from_json(text: str) -> tuple[Interface, str]:
-    """Interface and key from `interface_to_json`'s text; InternalError where the text is another's."""
+    """Return interface and key from the text that `interface_to_json` wrote. Raises InternalError for any other text."""
     try:
         whole = json.loads(text)
         if whole["format"] != FORMAT:
@@ -167,11 +171,11 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """How a compiled robot is had again.
+    """How a compiled robot can be built again, for example in another process.
 
-    again    importable by name; returns the robot
+    again    importable function that returns the robot
     request  its argument, which can be pickled
-    key      the same for equal robots
+    key      text that is equal for equal robots
     """
 
     again: Callable[[Any], Any]

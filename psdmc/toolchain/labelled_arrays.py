@@ -1,6 +1,6 @@
-"""A robot's functions over Dask's and xarray's arrays: lazily in chunks, and by named dimensions.
+"""Calls a robot's functions with arrays of Dask (computed lazily in chunks) and of xarray (with named dimensions).
 
-Both are optional, and nothing here is loaded before such an array is given.
+Both libraries are optional. psdmc imports them only if it gets such an array.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _COLUMNS = {JOINT: COLUMN, "axis": "axis_column", "state": "state_column", "cont
 
 
 def is_foreign(value: object) -> bool:
-    """Whether a value is an array of Dask's or xarray's."""
+    """Return whether a value is an array of Dask or xarray."""
     return _room(value) in ("dask", "xarray")
 
 
@@ -50,7 +50,7 @@ def _room(value: object) -> str:
 
 
 def refuse_out(function: Signature, out: Any) -> None:
-    """InputError where results are wanted in arrays of the caller's."""
+    """Raise InputError if the caller gives arrays for results (`out`), which these array types do not support."""
     if out is not None:
         raise InputError(f"{function.name}: out is for NumPy arrays", "leave it out")
 
@@ -63,7 +63,10 @@ def foreign(
     tails: Sequence[tuple[int, ...]],
     dtype: Any,
 ) -> tuple[Any, ...]:
-    """The outputs as xarray's arrays where an input is one, else as Dask's; `tails`: trailing axes of each output."""
+    """Return the outputs of a function as xarray arrays if an input is an xarray array, else as Dask arrays.
+
+    tails  shape of each output for one state
+    """
     if any(_room(given) == "xarray" for given in inputs):
         return by_names(call, axes, function, inputs)
     return in_chunks(call, axes, function, tails, inputs, dtype)
@@ -77,13 +80,13 @@ def in_chunks(
     inputs: Sequence[Any],
     dtype: Any,
 ) -> tuple[Any, ...]:
-    """The outputs as arrays of Dask's, computed chunk by chunk when they are asked for.
+    """Return the outputs as Dask arrays, which are computed chunk by chunk when their values are needed.
 
-    call    takes the inputs' chunks
-    tails   trailing axes of each output
+    call    function that computes the outputs for a chunk of the inputs
+    tails   shape of each output for one state
 
-    Inputs whose last axes are cut are put together along these; chunks of states are cut alike. InputError where an axis
-    has another length than the robot's, or than another input's.
+    If chunks divide the axes of one state, such as the joints, they are joined. All inputs get equal chunks of states.
+    Raises InputError if the length of an axis differs from that of the robot, or from that of another input.
     """
     import dask.array
 
@@ -177,13 +180,15 @@ def _core(quantity: Quantity) -> str:
 def by_names(
     call: Call, axes: RobotAxes, function: Signature, inputs: Sequence[Any]
 ) -> tuple[xr.DataArray, ...]:
-    """The outputs as data arrays: joints along the dimension 'joint', matrices' columns along 'joint_column', and so on;
-    every other dimension is one of states and broadcasts by its name. Names of joints and frames are coordinates.
+    """Return the outputs as xarray data arrays, whose dimensions have names.
 
-    call  takes the data, of NumPy or Dask, with the named dimensions last
+    The dimension of joints is 'joint', that of matrix columns 'joint_column', and so on. All other dimensions are batch
+    axes and broadcast by name. Names of joints and frames become coordinates.
 
-    InputError where a dimension is missing or has another length, or a coordinate has other names. Names in another order
-    are put in the robot's.
+    call  function that takes the NumPy or Dask data with the named dimensions last
+
+    Raises InputError if a dimension is missing or has another length, or if a coordinate has other names. Names in
+    another order are put into the robot's order.
     """
     import xarray as xr
 
@@ -208,7 +213,8 @@ def by_names(
 
 
 def dimensions(quantity: Quantity) -> tuple[str, ...]:
-    """The names of a quantity's axes, each once."""
+    """Return the names of the dimensions of a quantity, such as 'joint'. If a dimension occurs twice, the second gets
+    another name, such as 'joint_column'."""
     names: list[str] = []
     for axis in quantity.axes:
         name = _DIMENSIONS.get(axis, f"axis_of_{axis}" if axis not in WORDS else axis)

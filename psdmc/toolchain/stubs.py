@@ -1,5 +1,5 @@
-"""python -m psdmc.toolchain.stubs: writes call.pyi and model/answers.pyi, the methods of compiled robots and of models for
-type checkers."""
+"""Writes call.pyi and model/answers.pyi, which give type checkers the methods of compiled robots and of models. Run it
+as python -m psdmc.toolchain.stubs."""
 
 from __future__ import annotations
 
@@ -50,12 +50,13 @@ _ANSWER = "    def _answer(self, name: str, *given: Any, **named: Any) -> NDArra
 
 
 def arguments(function: Signature) -> tuple[str, ...]:
-    """Names of a method's arguments."""
+    """Return the names of a method's arguments."""
     return (*(quantity.name for quantity in function.inputs), *(("theta_b",) if function.theta else ()))
 
 
 def documentation(function: Signature) -> str:
-    """A method's docstring: what it computes, its arguments and results, what NaN means, and the lengths of axes."""
+    """Return the docstring of the method for a generated function: what it computes, arguments and results, when
+    results are NaN, and the lengths of axes."""
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [
@@ -110,7 +111,7 @@ def _rows(named: list[tuple[str, str]]) -> str:
 
 
 def stub(functions: Iterable[Signature]) -> str:
-    """The text of call.pyi."""
+    """Return the text of call.pyi."""
     shown = tuple(functions)
     several = [line for function in shown if len(function.outputs) > 1 for line in _results(function)]
     methods = [line for function in shown for line in _method(function)]
@@ -121,7 +122,7 @@ def stub(functions: Iterable[Signature]) -> str:
 
 
 def result_name(function: Signature) -> str:
-    """The named tuple that a function with several outputs returns."""
+    """Return the name of the named tuple that the method of a function with several outputs returns."""
     return "".join(word.capitalize() for word in function.name.split("_"))
 
 
@@ -146,13 +147,15 @@ def _shape(quantity: Quantity, lead: tuple[str, ...] = ("...",)) -> str:
 
 
 def own_methods() -> set[str]:
-    """Names of the model's own methods. Its source is read: nothing here imports it."""
+    """Return the names of the methods that the class of models defines itself. They are read from the source file of
+    the class, which is not imported."""
     tree = ast.parse((MODEL / "dynamics_model.py").read_text(encoding="utf-8"))
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
 
 
 def answers_stub(functions: Iterable[Signature]) -> str:
-    """The text of answers.pyi: what models answer besides their own methods."""
+    """Return the text of answers.pyi, which declares generated functions as methods of models. Methods that the class
+    of models defines itself are left out."""
     own = own_methods()
     shown = [function for function in functions if function.name not in own]
     several = sorted(result_name(function) for function in shown if len(function.outputs) > 1)

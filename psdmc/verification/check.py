@@ -1,9 +1,8 @@
-"""A finished model compared with other readers of the robot's source. Nothing of the derivation is used, and of the
-chain only names.
+"""Compares a model with other programs' dynamics of the same robot file. It uses no code of the derivation.
 
-Pinocchio reads the file as it is written, MuJoCo too where it is installed and reads such files. Where rotations were
-snapped, the file has no such robot. Then torques are compared with Pinocchio's bodies on joints placed as the chain's
-are, and the change by snapping is compared with the file's robot separately.
+Pinocchio reads the original file, and so does MuJoCo if it is installed and reads this format. Snapped rotations were
+replaced by near ones with exact zeros. For a model with snapped rotations, Pinocchio's joints are placed as in the
+model. The change of torques by snapping is checked separately, against the original file.
 """
 
 from __future__ import annotations
@@ -55,13 +54,13 @@ MUJOCO = "MuJoCo's mj_inverse"
 
 @dataclass(frozen=True, slots=True)
 class CheckRow:
-    """One comparison.
+    """The result of one comparison between the model and a reference.
 
     name     what was compared
     against  the function of Pinocchio, or other reference, that it was compared with
-    error    largest difference, relative to the largest magnitude (per joint where there is one per joint)
-    limit    largest error that passes; None where nothing could be compared
-    remark   why not, or what the limit allows for
+    error    largest difference, divided by the largest magnitude; for values per joint, divided joint by joint
+    limit    largest error that passes; None if nothing could be compared
+    remark   why nothing could be compared, or what the limit allows for
     """
 
     name: str
@@ -76,11 +75,13 @@ class CheckRow:
 
 
 def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tuple[CheckRow, ...]:
-    """Every function of the model compared with Pinocchio's; `source` None: the source embedded in the model.
+    """Compare every function of the model with Pinocchio and return one CheckRow for each comparison.
 
-    A model with other parameters than its source is compared under its own where its chain has them (a payload), and
-    under random physical ones where no standard parameters are known (unknown or calibrated theta_b). InputError where
-    the source is another robot.
+    source  the robot to compare with; None: the robot in the source text that the model contains
+
+    If the model's parameters differ from those of the source, the model's standard parameters are used if they are
+    known (after a payload was added). Else random physically possible parameters are used (theta_b unknown or
+    calibrated). Raises InputError if the source is another robot.
     """
     loaded = source_of(model) if source is None else source
     require_same_robot(model, loaded)
@@ -99,7 +100,7 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
 
 
 def readers(rows: Sequence[CheckRow]) -> str:
-    """Which readers of the source the rows come from, in words."""
+    """Return in words which programs the results were compared with, and their versions."""
     words = f"compared with Pinocchio {pinocchio_version()}'s reading of the source"
     if any(row.against == MUJOCO and row.limit is not None for row in rows):
         return f"{words} and with MuJoCo {mujoco_version()}'s"
@@ -226,12 +227,13 @@ def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Arra
 
 
 def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Array:
-    """(n + 1,) largest error of each link's pose in the one that it hangs on, and the tip's in its link.
+    """Return the largest errors (n + 1,) of poses. These are the poses of n links relative to their parent links, and
+    of the tip relative to its link.
 
-    found, expected   (k, n + 1, 4, 4), poses in the base frame
-    above             n + 1 of these that each hangs on, or BASE
+    found, expected   (k, n + 1, 4, 4), poses in the base frame at k states
+    above             parents of the n + 1 frames: index or BASE
 
-    The larger of the angle between (rad) and the distance between, relative to the robot's reach.
+    An error is the larger of the angle (rad) and the distance divided by the robot's reach.
     """
     reach = reach_of(expected, above)
     own, other = _in_the_one_above(found, above), _in_the_one_above(expected, above)
@@ -242,13 +244,14 @@ def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Arr
 
 
 def gravity_error(found: Array, expected: Array) -> float:
-    """Distance between two vectors (3,), relative to the larger."""
+    """Return the distance between two gravity vectors (3,), divided by the length of the larger one."""
     size = max(float(np.linalg.norm(found)), float(np.linalg.norm(expected)), np.finfo(float).tiny)
     return float(np.linalg.norm(found - expected)) / size
 
 
 def reach_of(poses: Array, above: Sequence[int]) -> float:
-    """Longest way outward over the largest distances from each frame to the next, m; one where there are none."""
+    """Return the reach of a robot in m: the length of the longest path from the base outward. The length of a path is
+    the sum of the largest distances between neighbouring frames. If all are zero, the reach is 1."""
     steps = np.linalg.norm(_in_the_one_above(poses, above)[..., :3, 3], axis=-1).max(axis=0)
     far: list[float] = []
     for step, outer in zip(steps.tolist(), above, strict=True):
@@ -283,9 +286,11 @@ NO_TORQUE = 1e-9
 
 
 def worst(values: Array, expected: Array, bound: Array, share: float) -> tuple[float, float]:
-    """Error and limit, `share` and bound, of the joint that uses most of it, both relative to its largest torque.
+    """Return the error and the limit of the joint whose error is closest to the limit. Both are relative to the joint's
+    largest torque.
 
-    values, expected  (states, nv);  bound  (nv,) what the errors may be beside `share` of the largest torque
+    values, expected  torques (states, nv)
+    bound             (nv,) errors that are allowed in addition to the fraction `share` of the joint's largest torque
     """
     scale = _scales(expected)
     error = np.abs(values - expected).max(axis=0)
@@ -294,10 +299,12 @@ def worst(values: Array, expected: Array, bound: Array, share: float) -> tuple[f
 
 
 def relative_error(values: Array, expected: Array, least: float = 0.0) -> float:
-    """Largest difference relative to the largest magnitude, joint by joint; a matrix as one.
+    """Return the largest difference, divided joint by joint by the joint's largest magnitude. A matrix counts as one
+    quantity and is divided by its largest entry.
 
-    A joint that does less than NO_TORQUE of the largest torque, such as one with a vertical axis under
-    gravity, is measured against that largest one; where all do less than `least`, against `least` / NO_TORQUE.
+    A joint's torques can be below NO_TORQUE of the largest torque, as for a vertical axis under gravity. The joint's
+    error is then relative to the largest torque of all joints. If all torques are below `least`, errors are relative to
+    `least` / NO_TORQUE.
     """
     if expected.ndim == 3:
         return float(np.abs(values - expected).max()) / _largest(expected)

@@ -1,4 +1,5 @@
-"""Functions beyond E, P and theta_b compared with Pinocchio: each recipe's NumPy reference with its counterpart."""
+"""Compares generated functions with Pinocchio. It covers those functions that are not written as torque polynomials;
+check.py compares the others. The functions are computed by their NumPy references."""
 
 from __future__ import annotations
 
@@ -35,8 +36,13 @@ ROUNDED = 1e-4
 def function_errors(
     model: DynamicsModel, theta: Array, robot: OnCoordinates, solvable: bool
 ) -> Iterator[tuple[Recipe, float, str]]:
-    """(recipe, largest error relative to each output's largest value, why there is none) for all functions that are no
-    part of the expansion; `solvable`: whether the mass matrix can be inverted."""
+    """Yield the results of the comparison of each function that is not written as torque polynomials. A result is the
+    function's recipe, the largest error, and the reason if the function was not compared.
+
+    The error is relative to the largest value of each output.
+
+    solvable  whether the mass matrix can be inverted
+    """
     arrays = RobotOnArrays.of(model, theta)
     # States and all else that functions read, (STATES, ...) each.
     rng = np.random.default_rng(SEED)

@@ -1,4 +1,5 @@
-"""What a model is compared with: the robot that it was derived from, and parameters that both can have."""
+"""Finds the robot with which a model is compared: the robot file from which the model was derived. Chooses parameters
+that both the model and this robot can have."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
 
 
 def source_of(model: DynamicsModel) -> LoadedRobot:
-    """The robot that the model was derived from, read again from the source embedded in it."""
+    """Return the robot from which the model was derived, read again from the source text that the model contains."""
     kept = model.provenance
     if not {"source_text", "source_format", "options"} <= set(kept):
         raise InputError(f"the model of '{model.mechanism.name}' holds no source", "give the robot's file")
@@ -21,7 +22,7 @@ def source_of(model: DynamicsModel) -> LoadedRobot:
 
 
 def require_same_robot(model: DynamicsModel, loaded: LoadedRobot) -> None:
-    """InputError where a source has other joints or links than the model."""
+    """Raise InputError if the joints or links of the source differ from those of the model."""
     found, expected = loaded.mechanism, model.mechanism
     for what, there, here in (
         ("joints", found.joint_names, expected.joint_names),
@@ -39,7 +40,8 @@ def _links(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def compared_parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array | None]:
-    """theta_b (l,), and the standard parameters (n, 11) that Pinocchio must be given; None: its own."""
+    """Return the base parameters theta_b (l,) and the standard parameters (n, 11) with which the model and Pinocchio
+    are compared. None instead of the standard parameters means those of the source."""
     if model.theta_b is not None:
         theta = np.asarray(model.theta_b)
         for known in (loaded.mechanism.parameters, model.mechanism.parameters):

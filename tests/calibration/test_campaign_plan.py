@@ -19,7 +19,7 @@ from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.motions.allowed import GivenLimits, bounded
 from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
-from psdmc.calibration.motions.trajectory import read_trajectory
+from psdmc.calibration.motions.trajectory import limit_faults, read_trajectory
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.compiler import derive
 from psdmc.errors import InputError
@@ -141,6 +141,35 @@ def test_one_log_is_planned_and_calibrated_by_the_folder(arm, tmp_path: Path):
     assert record.model.theta_b is not None
     size = np.abs(arm.model.theta_b).max()
     assert np.abs(record.model.theta_b - arm.model.theta_b).max() < 0.05 * size
+
+
+def test_no_value_is_fitted_to_a_validation_run(arm, tmp_path: Path):
+    options = replace(QUICK, one_log=True, validation=True, repeats=4)
+    plan = plan_campaign(arm.model, arm.regressor, options)
+    folder, given = tmp_path / "two", {"shoulder": 12.0, "elbow": 5.0}
+    write_campaign(folder, plan.runs, plan.found, "npz")
+    simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
+    fitted, other = (folder / "logs" / f"{name}.npz" for name in ("exciting", "validation"))
+
+    record = calibrate(arm.model, folder, regressor=arm.regressor, torque_constants=given)
+    apart = calibrate(arm.model, fitted, regressor=arm.regressor, torque_constants=given, validation=other)
+
+    assert [(run.step, run.name) for run in plan.runs] == [
+        ("inertial", "exciting"),
+        ("validation", "validation"),
+    ]
+    a, b = (read_trajectory(folder / "trajectories" / file.name).q for file in (fitted, other))
+    assert np.abs(np.resize(a, b.shape) - b).max() > 0.1
+    assert allowed_faults(plan) == []
+    assert record.model.theta_b is not None
+    assert np.array_equal(record.model.theta_b, apart.model.theta_b)
+    held = [both.held_out.r2 for both in record.steps[0].joints.values()]
+    assert held == [both.held_out.r2 for both in apart.steps[0].joints.values()]
+    assert min(held) > 0.99
+
+
+def allowed_faults(plan) -> list[str]:
+    return [fault for run in plan.runs for fault in limit_faults(run.motion, plan.chain)]
 
 
 def test_a_search_that_the_clock_ends_says_so(arm):

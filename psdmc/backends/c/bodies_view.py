@@ -1,4 +1,4 @@
-"""The function that computes theta_b from all bodies of the robot, as templates print it."""
+"""C text for the function that computes theta_b (the base parameters) from the masses and inertias of all bodies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodiesView:
-    """The map as C text, printed for one real type."""
+    """The linear map from all bodies' parameters to theta_b (the base parameters), as C text for float or double."""
 
     robot: str
     real: CReal
@@ -37,7 +37,8 @@ class BodiesView:
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """{base parameter, factor} of every entry of the map that is not zero, column by column."""
+        """Return the nonzero entries of the matrix from body parameters to base parameters, column by column. Each
+        entry is C text {index of the base parameter, factor}."""
         return tuple(
             f"{{{row}, {number(float(column[row]), self.real)}}}"
             for column in self.map.columns.T
@@ -46,7 +47,8 @@ class BodiesView:
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """For each body where the entries of each of its ten parameters end."""
+        """Return, for each body and each of its ten parameters, the index in `entries` after the last entry of this
+        parameter. Each body is one line of C text."""
         ends = np.cumsum((self.map.columns != 0.0).sum(axis=0)).reshape(self.count, -1)
         return tuple(", ".join(map(str, row)) for row in ends.tolist())
 

@@ -1,6 +1,8 @@
-"""The straight-line body of one PROGRAM, line by line, for the body template.
+"""Makes the C code of one PROGRAM (the list of scalar operations to generate), line by line, for the template of
+function bodies.
 
-Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share vectors.
+Sines and cosines are computed in groups, as early as their angles are known. In code for one state, the angles of a
+group then share one SIMD vector.
 """
 
 from __future__ import annotations
@@ -40,15 +42,17 @@ def make_body(
     products: Sequence[Product] = (),
     uniform: Collection[str] = UNIFORM_VECTORS,
 ) -> Body:
-    """Lay out a PROGRAM, and products of what it puts out.
+    """Return the C statements of a PROGRAM (the list of operations to generate) and of the matrix products that follow
+    it, divided into sections.
 
-    inputs        vectors of the signature that may be read
-    sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
-    suffix        of constants: '' or 'f'
-    stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
-    in_groups     vectors that are also stored in groups of four, as soon as the last of them is known; where there are
-                  others beside them, STORE_BLOCK stores those
-    uniform       vectors that are the same in all lanes
+    inputs        vectors of the C function that the statements may read
+    sizes         length of each output vector; entries that the PROGRAM does not store become zero
+    suffix        of C constants: '' for double, 'f' for float
+    stores_early  True: store a value as soon as it is known (large outputs); False: store all at the end (small
+                  outputs)
+    in_groups     vectors that the batch variant stores four entries at a time, as soon as the fourth is known; any
+                  other vector is then stored by the macro STORE_BLOCK
+    uniform       vectors that are equal for all states of a batch, such as theta_b
     """
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
     stored = without_products(sizes, multiplied)
@@ -57,13 +61,14 @@ def make_body(
 
 
 def without_products(sizes: Mapping[str, int], products: Sequence[Multiplication]) -> dict[str, int]:
-    """Vectors that a PROGRAM stores, with their lengths, where it also has the products' outputs."""
+    """Return the output vectors that the PROGRAM (the list of operations to generate) stores, with their lengths. Left
+    out are outputs that matrix products after the PROGRAM compute."""
     outputs = {product.output for product in products}
     return {name: size for name, size in sizes.items() if name not in outputs}
 
 
 def unread(program: Program, inputs: Sequence[str]) -> tuple[str, ...]:
-    """Inputs that the PROGRAM never reads, by name."""
+    """Return the names of the function's inputs that the PROGRAM (the list of operations to generate) never reads."""
     read = {slot.vector for slot in program.inputs()}
     return tuple(name for name in inputs if name not in read)
 
@@ -83,7 +88,9 @@ def sections_of(
     uniform: Collection[str],
     with_zeros: bool = True,
 ) -> tuple[Section, ...]:
-    """The sections of a PROGRAM; `with_zeros`: entries of the vectors in `sizes` that it does not store become zero."""
+    """Return the C statements of a PROGRAM (the list of operations to generate), divided into sections. With
+    `with_zeros`, output entries that the PROGRAM does not store are set to zero. `sizes` are the lengths of the output
+    vectors."""
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
     apart = frozenset(beside.difference(in_groups))

@@ -1,7 +1,9 @@
-"""PROGRAM -> C expressions: a value that is used once is written at its use, other values get names.
+"""Translates a PROGRAM (the list of operations to generate) to C expressions. A value that is used once is written at
+its use; any other value gets a C variable.
 
-The texts are the same for one state and for one state per lane: a value is `V` (a real, or a vector of them) or uniform
-(the same for all states: constants and what is computed from parameters alone), and C combines scalars with vectors.
+The C text for one state is also the text for a SIMD vector with one state per lane. A value has the C type `V`, which
+is a real number or a vector of real numbers. Values that are equal for all states, such as constants and parameters,
+are called uniform and have the type `real`.
 """
 
 from __future__ import annotations
@@ -29,24 +31,30 @@ _SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), 
 
 
 class Expr(NamedTuple):
-    """C text of a value, the binding strength of its outermost operator, and its depth of nesting."""
+    """C text of an expression, with the precedence of its outermost operator and the depth of its nested brackets."""
 
     text: str
     binding: int = _ATOM
     depth: int = 0
 
     def beside(self, binding: int, is_right: bool) -> str:
-        """The text as an operand: in brackets unless C would parse the same tree without them."""
+        """Return the expression as an operand of another operator. Brackets are added unless C parses the text with the
+        same meaning without them.
+
+        binding   precedence of the other operator
+        is_right  whether the expression is the right operand
+        """
         loose = self.binding < binding or (is_right and self.binding in (binding, _UNARY))
         return f"({self.text})" if loose else self.text
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of a PROGRAM's values in C, decided before any text is made.
+    """Which values of a PROGRAM (the list of operations to generate) become C variables, decided before any expression
+    is written.
 
-    named    values that get a name: outputs, and whatever is used more than once
-    uniform  values that are the same for all states
+    named    for each value, whether it becomes a variable: outputs, and values that are used more than once
+    uniform  for each value, whether it is equal for all states of a batch
     """
 
     program: Program
@@ -55,7 +63,8 @@ class Names:
 
     @staticmethod
     def of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> Names:
-        """`shared` are vectors that are the same in all lanes."""
+        """Return which values of a PROGRAM (the list of operations to generate) become C variables. The vectors in
+        `shared` are equal for all states of a batch."""
         named = [count > 1 for count in program.uses()]
         for _, index in program.outputs:
             named[index] = True
@@ -64,7 +73,8 @@ class Names:
 
 
 def uniform_of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> tuple[bool, ...]:
-    """Of each value whether it is the same for all states."""
+    """Return, for each value of the PROGRAM (the list of operations to generate), whether it is equal for all states of
+    a batch. Such a value is computed from constants and from the vectors `shared` only."""
     uniform: list[bool] = []
     for op, args, slot, _ in program.body:
         if len(args) == 2 and op in _OPERATORS:
@@ -92,18 +102,19 @@ def _cut_deep_trees(program: Program, named: list[bool]) -> None:
 
 
 def is_call(op: Op) -> bool:
-    """Whether the operation is a macro of its name: what C has no operator for, sines aside."""
+    """Return whether the generated C writes this operation as a macro, because C has no operator for it. Square roots
+    are an example. Sines and cosines have other code."""
     return op in _CALLS
 
 
 def literal(value: float, suffix: str) -> Expr:
-    """A constant that reads back as the same number; with suffix 'f' as the nearest float."""
+    """Return C text of a constant that reads back as the same number; with suffix 'f', as the nearest float."""
     value = rounded_out(value, "float" if suffix else "double")
     return Expr(f"{value!r}{suffix}", _UNARY if str(value).startswith("-") else _ATOM)
 
 
 def combine(op: Op, operands: list[Expr]) -> Expr:
-    """One operation on texts, brackets only where they change the meaning."""
+    """Return C text of one operation on given texts, with brackets only if they change the meaning."""
     if op is Op.NEG:
         return Expr(f"-{operands[0].beside(_UNARY, is_right=True)}", _UNARY, 1 + operands[0].depth)
     symbol, binding = _SYMBOL[op]

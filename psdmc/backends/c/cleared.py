@@ -1,7 +1,9 @@
-"""Outputs that are zero at every state, in runs: code for one state clears a run by vectors.
+"""Finds outputs that are zero at every state of the robot. Code for one state sets consecutive zeros with vector
+instructions.
 
-A matrix of a tree is mostly zeros: of solo12's regressor 1,164 entries of 1,692. Stored one by one, they take a third of the
-function's code. Code for lanes stores them with their neighbours, as before.
+Most entries of a tree robot's matrices are zero: 1,164 of 1,692 in the regressor of solo12. If they were stored one by
+one, they would take a third of the function's code. Code for batches stores these zeros together with neighbouring
+outputs.
 """
 
 from __future__ import annotations
@@ -20,14 +22,19 @@ LEAST = 256
 
 
 def cleared(program: Program, sizes: Mapping[str, int]) -> tuple[Cleared, ...]:
-    """The runs of zeros among outputs of these sizes; none where there are few."""
+    """Return the groups of consecutive output entries that are zero at every state. Return an empty tuple if there are
+    too few such entries to be worth it.
+
+    sizes  length of each output vector
+    """
     zero = zero_outputs(program, sizes)
     runs = tuple(run for vector in sizes for run in _runs(vector, zero[vector]))
     return runs if sum(run.count for run in runs) >= LEAST else ()
 
 
 def zero_outputs(program: Program, sizes: Mapping[str, int]) -> dict[str, list[int]]:
-    """For each vector its entries that the PROGRAM does not store, or stores as the constant zero."""
+    """Return, for each output vector, the entries that are zero at every state. The PROGRAM (the list of operations to
+    generate) does not store these entries, or stores the constant zero."""
     values = {slot: program.body[i].value for slot, i in program.outputs}
     return {
         vector: [index for index in range(size) if values.get(Slot(vector, index), 0.0) == 0.0]
@@ -36,7 +43,7 @@ def zero_outputs(program: Program, sizes: Mapping[str, int]) -> dict[str, list[i
 
 
 def without_zeros(program: Program, runs: tuple[Cleared, ...]) -> Program:
-    """The PROGRAM without the outputs in these runs."""
+    """Return the PROGRAM (the list of operations to generate) without the output entries in the given groups of zeros."""
     gone = {slot for run in runs for slot in run.slots}
     return Program(program.body, tuple((slot, i) for slot, i in program.outputs if slot not in gone))
 

@@ -1,4 +1,4 @@
-"""The C++17 class over the C functions: which members it has and how each calls C."""
+"""The C++17 class that wraps the C functions: its members, and how each member calls C."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from psdmc.backends.c.prototypes import Prototype
 
 @dataclass(frozen=True, slots=True)
 class CppMethod:
-    """One member function.
+    """One member function of the C++ class, which takes raw pointers.
 
-    parameters  on raw pointers
-    call        of the C function, with the class's own theta_b where it takes one
+    parameters  C++ text of the parameters
+    call        C++ text of the call of the C function; if the C function takes theta_b, that of the class is passed
     """
 
     name: str
@@ -30,9 +30,10 @@ class CppMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppArrayMethod:
-    """A member function on std::array.
+    """A member function that takes and returns std::array.
 
-    output  what is returned, of type result_type; '' where several results, or a result beside a status, are parameters
+    output  the output that is returned, of type result_type; '' if all outputs are parameters. Outputs are parameters
+            if there are several, or if the C function returns a status
     """
 
     name: str
@@ -45,9 +46,10 @@ class CppArrayMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppClass:
-    """A class: the functions that need no parameters, those with the robot's own, or with a user's.
+    """One C++ class with generated functions as members. There are three classes: for functions without base
+    parameters, for the base parameters of the robot file, and for base parameters that the user passes.
 
-    theta  whether it holds theta_b
+    theta  whether the class stores theta_b, the base parameters of the user
     """
 
     name: str

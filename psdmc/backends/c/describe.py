@@ -1,4 +1,4 @@
-"""The robot and its C functions in words, for the first lines of the header."""
+"""A description of the robot and its C functions, for the first lines of the C header."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from psdmc.target.target import Target
 def description(
     info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView], with_frames: bool
 ) -> tuple[str, ...]:
-    """The robot's facts, then what arrays and the forms of functions are; untrusted names still unescaped."""
+    """Return the text at the top of the C header, as lines. It gives the facts of the robot, the layout of arrays, and
+    the variants of functions (such as for many states). Names from the robot file are not escaped yet."""
     lines = [*facts(info, options), *_arrays(info), *_forms(options.target)]
     if any(function.name.endswith(THETA_ROWS) for function in functions):
         lines += [

@@ -1,4 +1,4 @@
-"""Friction of a calibrated model, as templates print it."""
+"""The joint friction of a calibrated model as C text for the templates."""
 
 from __future__ import annotations
 
@@ -52,7 +52,8 @@ class FrictionView:
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """What else the calibration found, in words without names from files."""
+        """Return sentences about effects that the calibration found in addition to joint friction and rigid bodies,
+        such as springs. The sentences contain no names from files."""
         return self.friction.beyond
 
     @property
@@ -79,13 +80,17 @@ class FrictionView:
 
     @property
     def speeds(self) -> tuple[str, ...]:
-        """Of the self-test: rest, a tenth of the speed over which the sign changes, both directions beyond it, and the
-        numbers of laws that have some."""
+        """Return, as C text, the joint speeds at which the self-test of the package compares friction torques.
+
+        The speeds are zero, a tenth of the speed over which friction changes sign, and speeds in both directions.
+        Constants of a friction law that are speeds are included, too.
+        """
         return self._printed(self._states)
 
     @property
     def expected(self) -> tuple[str, ...]:
-        """Friction at these, positions being equal to the speeds."""
+        """Return the friction torques that the self-test of the package expects, as C text. The self-test passes the
+        joint speeds as joint positions, too."""
         return self._printed(self.friction.torque(self._states, self._states))
 
     @property

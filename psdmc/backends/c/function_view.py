@@ -1,4 +1,4 @@
-"""Functions in the form that templates print: each with its kernels, and its C files."""
+"""The generated functions as data for the templates: each function with its variants and its C files."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from psdmc.robot.mechanism import BASE_FRAME
 
 @dataclass(frozen=True, slots=True)
 class FunctionView:
-    """A function with its kernels, baked first.
+    """One generated function with its kernels (its variants without and with theta_b as an input). The variant without
+    comes first.
 
-    shape  of its outputs, and of inputs that are no vectors of all joints, in words
+    shape  in words, the shape of each output and of each input that is no vector with one entry per joint
     """
 
     name: str
@@ -34,7 +35,8 @@ class FunctionView:
 
     @property
     def is_regions(self) -> bool:
-        """Whether it is made of loops and calls."""
+        """Return whether the C code of the function consists of loops and calls of other functions. Otherwise, it is
+        straight-line code."""
         return any(kernel.regions for kernel in self.kernels)
 
     @property
@@ -44,14 +46,16 @@ class FunctionView:
 
     @property
     def limbs(self) -> tuple[int, ...]:
-        """Numbers of limbs in lanes, over all kernels."""
+        """Return the numbers of equal limbs that the function computes in SIMD lanes, in ascending order. An example is
+        4 for the legs of a quadruped."""
         return tuple(
             sorted({count for kernel in self.kernels if kernel.limbs for count in kernel.limbs.counts})
         )
 
     @property
     def units(self) -> tuple[FunctionView, ...]:
-        """One for each C file, which has its name: the whole function, or a kernel each where bodies are in parts."""
+        """Return one object for each C file of the function. There is one file for the whole function, or one per
+        kernel (variant) if the code is so long that it is divided into parts."""
         if not any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels):
             return (self,)
         return tuple(replace(self, name=kernel.name, kernels=(kernel,)) for kernel in self.kernels)
@@ -68,8 +72,8 @@ def function_views(
     options: EmitOptions,
     base_frame: str = BASE_FRAME,
 ) -> tuple[FunctionView, ...]:
-    """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order. `base_frame`: what
-    their meanings call it."""
+    """Return the functions to which the given kernels (variants of generated functions) belong, in the order of the
+    function list. `base_frame` is the name of the base frame in the descriptions of the functions."""
     views = []
     for found in functions_of(kernels, base_frame):
         function = found.signature

@@ -1,4 +1,5 @@
-"""A kernel in the form that templates print: names, sizes and bodies, and the C text of its signatures and calls."""
+"""A kernel (one variant of a generated function) as data for the templates: names, sizes, function bodies, and C text
+of signatures and calls."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ LOOPED = 10
 
 @dataclass(frozen=True, slots=True)
 class VectorView:
-    """A quantity of a signature, `size` reals per state, with its axes' lengths."""
+    """An input or output of a C function. `size` is how many real numbers belong to one state, `shape` are the lengths
+    of the array's axes."""
 
     name: str
     size: int
@@ -28,10 +30,11 @@ class VectorView:
 
 @dataclass(frozen=True, slots=True)
 class OutputView(VectorView):
-    """An output.
+    """One output of a C function.
 
-    direct  a batch call writes its rows straight from registers, without a block of them on the stack
-    zero    entries that are zero at every state
+    direct  True: a batch call writes registers straight into the output array; False: a block of states is collected on
+            the stack first
+    zero    indices of entries that are zero at every state
     """
 
     direct: bool = False
@@ -40,14 +43,17 @@ class OutputView(VectorView):
 
 @dataclass(frozen=True, slots=True)
 class KernelView:
-    """One kernel: the file(s) with its body, its C functions and their signatures.
+    """One kernel (one variant of a generated function): its files with function bodies, its C functions and their
+    signatures.
 
-    single_file  body file, included once per instantiation; also `lanes_file` where one order serves both
-    limbs        a further body for one state; None where there is none
-    positive     what must be positive and is not put out; None where there is no such thing
-    pivot_order  its entries in the order in which they are found
-    places       of a packed matrix: (row, column) of each entry
-    regions      loops and calls, in the place of all bodies; None where there are none
+    theta        whether theta_b (the base parameters) is an input
+    single_file  file with the body for one state; also used as `lanes_file` if both need the same order of operations
+    lanes_file   file with the body for SIMD vectors that hold one state per lane
+    limbs        a further body for one state, which computes equal limbs (legs) in SIMD lanes; None if there is none
+    positive     the vector of pivots, which must be positive, if it is no output; None if there is no such vector
+    pivot_order  the order in which the entries of `positive` are computed
+    places       of a matrix that is stored without zeros: (row, column) of each stored entry
+    regions      loops and calls of functions, which replace all other bodies; None if there are none
     """
 
     name: str
@@ -70,19 +76,20 @@ class KernelView:
 
     @property
     def variant(self) -> str:
-        """Ending of its name that says where its parameters come from: '' if they are compiled in."""
+        """Return the ending of the kernel's name, which says where the base parameters come from. '' stands for
+        compiled-in parameters, '_theta' for an input theta_b, and '_theta_rows' for one theta_b per state of a batch."""
         if self.name.endswith(THETA_ROWS):
             return THETA_ROWS
         return "_theta" if self.theta else ""
 
     @property
     def pivots_in_loop(self) -> bool:
-        """Whether one state's pivots are looked at in a loop."""
+        """Return whether the code for one state checks in a loop that all pivots of a factorised matrix are positive."""
         return len(self.pivot_order) >= LOOPED and self.pivot_order == tuple(range(len(self.pivot_order)))
 
     @property
     def single_parts(self) -> str:
-        """File of the functions that a long body consists of."""
+        """Return the name of the file with the C functions into which a long function body is divided."""
         return self.single_file.replace(".inc", "_parts.inc")
 
     @property
@@ -91,30 +98,33 @@ class KernelView:
 
     @property
     def by_state(self) -> bool:
-        """Whether its forms for many states take one after the other: lines for lanes would be too many."""
+        """Return whether the batch function computes the states one after the other. It does so if code with one state
+        per SIMD lane would be too long."""
         return any(product.shape.n >= LARGE for product in self.single_body.products)
 
     @property
     def direct(self) -> bool:
-        """Whether a batch call writes rows of some output straight from registers."""
+        """Return whether a batch call writes at least one output straight from registers into the output array."""
         return any(output.direct for output in self.outputs)
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some outputs are written from registers and others, or what must be positive, are not."""
+        """Return whether a batch call needs both kinds of storage. One output is then written straight from registers
+        into the output array, while another output or the pivots are first collected in a block."""
         return self.direct and (
             self.positive is not None or not all(output.direct for output in self.outputs)
         )
 
     @property
     def fails_alone(self) -> bool:
-        """Whether the outputs that become NaN are one vector, as long as what must be positive."""
+        """Return whether the function has one output only, which becomes NaN on failure and has as many entries as
+        there are pivots."""
         shapes = [output.shape for output in self.outputs]
         return self.positive is not None and shapes == [self.positive.shape]
 
     @property
     def mark_rows(self) -> str:
-        """C expression for the first row of a block that fails."""
+        """Return a C expression for the number of the first state in a block of a batch whose computation failed."""
         assert self.positive is not None
         block = f"{self.positive.name}_block"
         if self.fails_alone:
@@ -123,12 +133,14 @@ class KernelView:
 
     @property
     def needs_lanes(self) -> bool:
-        """Whether anything calls the form that leaves its outputs lane by lane."""
+        """Return whether another C function calls the variant that stores its results as [entry][lane], with one state
+        per lane."""
         return not self.direct or "batch_soa" in self.prototypes
 
     @property
     def lanes(self) -> str:
-        """The static function that computes one state per lane."""
+        """Return the name of the static C function that computes one state per SIMD lane and stores its results as
+        [entry][lane]."""
         return f"{self.name}_lanes"
 
     @property
@@ -137,7 +149,8 @@ class KernelView:
 
     @property
     def rows(self) -> str:
-        """The static function that computes one state per lane and writes direct outputs into rows."""
+        """Return the name of the static C function that computes one state per SIMD lane. It writes outputs that need
+        no intermediate block straight into the array of the caller."""
         return f"{self.name}_rows"
 
     @property
@@ -166,7 +179,8 @@ class KernelView:
 
     @property
     def row_arguments(self) -> str:
-        """What the function for one state is called with for a row."""
+        """Return C text of the arguments for one call of the function for one state. The call is for the state `row` of
+        a batch, and reads and writes the arrays of the caller."""
         inputs, outputs = (
             [f"{vector.name} + row * {vector.size}" for vector in vectors]
             for vectors in (self.inputs, self.outputs)
@@ -175,7 +189,8 @@ class KernelView:
 
     @property
     def one_arguments(self) -> str:
-        """The same for one state that was taken out of its block of lanes."""
+        """Return C text of the arguments for one call of the function for one state. The state was first copied out of
+        a block that holds one state per lane."""
         return ", ".join(f"{vector.name}_one" for vector in (*self.inputs, *self.outputs))
 
     def _arguments(self, outputs: Iterable[str]) -> str:
@@ -187,12 +202,13 @@ class KernelView:
 
     @property
     def cost_text(self) -> str:
-        """Operations of one state, as text for the header."""
+        """Return the numbers of multiplications and additions for one state, as text for the C header."""
         limbs = f"; one state with limbs in lanes: {self.limbs.cost}" if self.limbs else ""
         return f"{self.name}: {self.cost}, {self.lowering}{limbs}"
 
     @property
     def blocks(self) -> tuple[VectorView, ...]:
-        """Buffers of a batch call: every vector lane by lane, except those whose rows are written directly."""
+        """Return the vectors for which a batch call has blocks on the stack with one state per lane. Outputs that are
+        written straight into the output array need no block."""
         outputs = (output for output in self.outputs if not output.direct)
         return (*self.inputs, *outputs, *((self.positive,) if self.positive else ()))

@@ -1,4 +1,5 @@
-"""The vectors of the generated C: which widths there are, and how a square of them is transposed in registers."""
+"""The SIMD vectors of the generated C: which widths exist, and how a square block of vectors is transposed in
+registers."""
 
 from __future__ import annotations
 
@@ -11,9 +12,12 @@ from psdmc.target.vectors import VectorUnit
 
 @dataclass(frozen=True, slots=True)
 class TransposeStage:
-    """One step of Eklundh's transposition: vectors i and i + distance exchange blocks of `distance` lanes.
+    """One step of Eklundh's transposition of a matrix in SIMD registers. In this step, the vectors i and i + distance
+    exchange groups of `distance` lanes.
 
-    first, second  lanes of the pair (0 ... 2 width - 1) that the new vectors i and i + distance consist of
+    distance       difference of the numbers of the two vectors, in lanes of each group
+    first, second  C text of the lane numbers that form the new vectors i and i + distance; the lanes of both old
+                   vectors are numbered from 0 to 2 width - 1
     """
 
     distance: int
@@ -23,7 +27,12 @@ class TransposeStage:
 
 @dataclass(frozen=True, slots=True)
 class VectorWidth:
-    """One vector size that the target may have: reals per vector, and the integer as wide as a real."""
+    """One SIMD vector size of a target machine.
+
+    lanes    number of real numbers in a vector
+    unit     registers of the machine
+    integer  C integer type with the size of one real number
+    """
 
     lanes: int
     unit: VectorUnit
@@ -31,7 +40,8 @@ class VectorWidth:
 
     @property
     def angles(self) -> VectorWidth:
-        """The vectors that take one state's angles where these are the widest."""
+        """Return the vector size with which code for one state computes the sines of several angles. This size is for a
+        machine on which no vectors are wider than the present ones."""
         narrower = self.unit.narrower
         if narrower is None:
             return self
@@ -39,18 +49,20 @@ class VectorWidth:
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose `lanes` vectors of `lanes` reals."""
+        """Return the steps that transpose a square block in registers. The block consists of `lanes` vectors with
+        `lanes` real numbers each."""
         distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
         return tuple(transpose_stage(self.lanes, distance) for distance in distances)
 
     @property
     def piece(self) -> int:
-        """Neighbours of a row that are stored at once where outputs go into rows group by group."""
+        """Return how many neighbouring entries of an output row are stored at once, if a batch call stores groups of
+        outputs."""
         return min(self.lanes, GROUP)
 
     @property
     def piece_stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose each square of `piece` vectors and lanes."""
+        """Return the steps that transpose, in registers, a square block of `piece` vectors with `piece` lanes each."""
         return tuple(stage for stage in self.stages if stage.distance < self.piece)
 
 
@@ -63,7 +75,8 @@ def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
 
 
 def transpose_stage(width: int, distance: int) -> TransposeStage:
-    """The step that exchanges blocks of `distance` lanes, in vectors of `width`."""
+    """Return the step of a matrix transposition that exchanges groups of `distance` lanes between vectors of `width`
+    lanes."""
     first = [k - distance + width if k & distance else k for k in range(width)]
     second = [k + width if k & distance else k + distance for k in range(width)]
     return TransposeStage(distance, ", ".join(map(str, first)), ", ".join(map(str, second)))

@@ -1,7 +1,8 @@
-"""How limbs' outputs are stored: each limb's neighbours side by side, as one vector, instead of one by one out of lanes.
+"""Decides how the outputs of limbs (such as legs) are stored: several neighbouring outputs of one limb as one vector.
 
-What a limb puts out is one lane of many vectors. Where several of its outputs are neighbours for every limb, as in the rows
-of a mass matrix, four of its vectors are transposed: each limb's four reals are stored at once.
+While code computes, one vector holds the same output of all limbs, one limb per lane. In memory, several outputs may be
+neighbours for every limb, as in the rows of a mass matrix. Four such vectors are then transposed in registers, and four
+neighbouring numbers of each limb are stored at once.
 """
 
 from __future__ import annotations
@@ -22,11 +23,14 @@ Lane = tuple[int, Slot, int]
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Up to four neighbours of every limb of a group, whose vectors are transposed.
+    """Up to four neighbouring outputs of every limb of a group (such as four legs). The vectors of the group, one limb
+    per lane, are transposed before the outputs are stored.
 
-    slots   of the group, in the order of the neighbours; None: zero
-    at      of each limb the index that its first neighbour has in the function's output
-    widths  of each limb how many reals are stored
+    vector  name of the function's output
+    group   the limbs
+    slots   for each neighbour, the entry of the group's vectors that is stored; None: zero
+    at      for each limb, the index of its first neighbour in the function's output
+    widths  for each limb, how many numbers are stored
     """
 
     vector: str
@@ -46,7 +50,12 @@ class Rows:
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """Two or three neighbours of every limb of a group, the limbs side by side: vectors that are woven into each other."""
+    """Two or three neighbouring outputs of every limb of a group (such as four legs). In memory, the limbs follow one
+    another without gaps, so their vectors are interleaved when they are stored.
+
+    slots  entries of the group's vectors, in the order of memory
+    first  index of the first output in the function's output vector
+    """
 
     vector: str
     group: LimbGroup
@@ -67,7 +76,8 @@ class Packed:
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """One output, or four neighbours, from any lanes; None: zero."""
+    """One output, or four neighbouring outputs, whose values come from any lanes (limbs) of any vectors. None in
+    `lanes` is the value zero."""
 
     vector: str
     first: int
@@ -83,10 +93,11 @@ Stored = Rows | Packed | Gathered
 
 
 def stores(limbs: LimbProgram, sizes: Mapping[str, int]) -> Iterator[Stored]:
-    """Stores of what limbs put out, and of zeros, in an order in which they have to be done; `sizes` are those of outputs.
+    """Yield the stores of all outputs of limbs, and of zeros, in the order in which the stores must be executed.
+    `sizes` are the lengths of the output vectors.
 
-    Keeps: what the core's stages have stored. A store may write over neighbours that a later one puts right.
-    Leaves out: what products store.
+    A store may overwrite a neighbouring entry only if a later store writes the right value there. Outputs that the core
+    (code outside limbs) has stored are kept. Outputs that matrix products store are left out.
     """
     own = {slot for stage in limbs.stages for slot, _ in stage.program.outputs}
     own |= limbs.products.written if limbs.products else set()
@@ -105,13 +116,15 @@ class _Run:
 
     @property
     def is_packed(self) -> bool:
-        """Whether fours of them are full, and woven of two or three vectors."""
+        """Return whether the outputs can be stored as full vectors of four numbers, by interleaving two or three
+        vectors."""
         count, wide = len(self.at), len(self.slots)
         side_by_side = tuple(range(self.at[0], self.at[0] + wide * count, wide))
         return wide < FOUR and count % FOUR == 0 and self.at == side_by_side
 
     def rows(self, vector: str, before: int) -> Iterator[Rows]:
-        """In pieces of four, the first of which begins that many places before it."""
+        """Yield the outputs of each limb in rows of four neighbours. The first row begins `before` entries earlier, and
+        these entries are None (zero)."""
         padded = (*(None,) * before, *self.slots, *(None,) * (-(before + len(self.slots)) % FOUR))
         for k in range(0, len(padded), FOUR):
             first = tuple(index - before + k for index in self.at)

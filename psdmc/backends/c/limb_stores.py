@@ -1,4 +1,4 @@
-"""The C statements that put out what limbs have computed."""
+"""The C statements that store the outputs of limbs, such as the legs of a quadruped."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ MADE_BY = {2: "pairs", 3: "triples", 4: "rows"}
 
 @dataclass(frozen=True, slots=True)
 class StoreView:
-    """One store, or those of all limbs.
+    """The C statements of one store of limb outputs, or of one such store for each limb (such as a leg).
 
-    vectors  whose rows the lines store: four that are transposed, or two or three that are woven; empty: none
-    count    limbs
+    vectors  vectors that are combined before the store: four are transposed, two or three are interleaved; empty: none
+    count    number of limbs
+    lines    C statements
     """
 
     vectors: tuple[str, ...]
@@ -37,7 +38,8 @@ class StoreView:
 
 
 def store_views(limbs: LimbProgram, sizes: Mapping[str, int]) -> tuple[StoreView, ...]:
-    """The stores of a kernel's outputs; `sizes` are those of its outputs."""
+    """Return the C statements that store the outputs of limbs (such as legs) in a kernel, the code of one function
+    variant. `sizes` are the lengths of the output vectors."""
     names = {group.number: (group.count, group.output) for group in limbs.groups}
 
     def text(lane: Lane | None) -> str:

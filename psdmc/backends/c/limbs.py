@@ -1,4 +1,5 @@
-"""A kernel whose limbs run in the lanes of a vector, and the vectors that it needs, in the form that templates print."""
+"""The code of a function that computes equal limbs (such as legs) at the same time, as data for the templates. Each
+limb is one lane of a SIMD vector. The data include the C vector types."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ each is then stored as soon as it is known."""
 
 @dataclass(frozen=True, slots=True)
 class LimbWidth:
-    """`count` limbs in registers of `lanes` reals, the lanes behind the last limb's being filled with the first's."""
+    """A C vector type that holds one real number for each of `count` limbs (such as legs). It consists of one or more
+    registers of `lanes` numbers each. Lanes after the last limb repeat the first limb."""
 
     count: int
     lanes: int
@@ -40,7 +42,8 @@ class LimbWidth:
 
     @property
     def filled(self) -> str:
-        """C: initialiser of all parts, from one macro argument per limb."""
+        """Return the C initialiser of a vector of limbs from macro arguments, of which each belongs to one limb (such
+        as a leg)."""
         names = [names_of(self.count)[k if k < self.count else 0] for k in range(self.parts * self.lanes)]
         parts = (names[k : k + self.lanes] for k in range(0, len(names), self.lanes))
         return ", ".join(f"{{{', '.join(part)}}}" for part in parts)
@@ -52,28 +55,30 @@ class LimbWidth:
 
     @property
     def folds(self) -> tuple[str, ...]:
-        """Lanes in the order in which a whole part is added to itself, half onto half, until two are left."""
+        """Return the lane orders with which the lanes of a register are summed. In each step, one half of the lanes is
+        added to the other half, until two lanes are left."""
         distances = [self.lanes >> k for k in range(1, self.lanes.bit_length() - 1)]
         return tuple(", ".join(str(lane ^ distance) for lane in range(self.lanes)) for distance in distances)
 
     @property
     def piece(self) -> int:
-        """Neighbours of a limb that a vector of four is made of."""
+        """Return how many neighbouring outputs of one limb (such as a leg) one vector holds when it is stored, at most
+        four."""
         return min(self.lanes, FOUR)
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """The steps that transpose each square of `piece` vectors and lanes."""
+        """Return the steps that transpose, in registers, a square block of `piece` vectors with `piece` lanes each."""
         return tuple(transpose_stage(self.lanes, distance) for distance in (1, 2) if distance < self.piece)
 
     @property
     def beyond(self) -> tuple[int, ...]:
-        """Lanes of the last part that are limbs', where it is not whole."""
+        """Return the lanes of the last register that hold limbs (such as legs), if the limbs do not fill the register."""
         return tuple(range(self.count % self.lanes))
 
 
 class NamedByCount:
-    """C names of what belongs to a number of limbs."""
+    """C names of types and macros that contain a number of limbs, such as limbs4 for four legs."""
 
     __slots__ = ()
     count: int
@@ -89,9 +94,11 @@ class NamedByCount:
 
 @dataclass(frozen=True, slots=True)
 class LimbVector(NamedByCount):
-    """The vectors for a number of limbs on every machine of a target.
+    """The C vector types for one number of limbs, such as four legs. Each machine of the target uses the widest type
+    that it supports.
 
-    widths  possible ones, widest first
+    widths   possible register sizes, widest first
+    integer  C integer type with the size of one real number
     """
 
     count: int
@@ -100,7 +107,8 @@ class LimbVector(NamedByCount):
 
     @property
     def in_fours(self) -> bool:
-        """Whether reals of all limbs fill vectors of four."""
+        """Return whether the number of limbs (such as legs) is a multiple of four, so that vectors of four have no
+        empty lane."""
         return self.count % FOUR == 0
 
     @property
@@ -114,7 +122,8 @@ def names_of(count: int) -> list[str]:
 
 
 def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVector, ...]:
-    """Those for groups of these numbers of limbs."""
+    """Return the C vector types for groups of limbs. `counts` are the numbers of limbs, such as 4 for the legs of a
+    quadruped."""
     narrowest = NARROWEST // options.real_bytes
     integer = "long long" if options.real == "float64" else "int"
     widest = max((unit.bytes // options.real_bytes for unit in options.target.vectors), default=1)
@@ -127,7 +136,8 @@ def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVec
 
 
 def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[VectorUnit, ...]:
-    """Registers that these vectors may be in, beyond those that a target's own code takes."""
+    """Return the register sizes that only the code for limbs (such as legs) uses. They are narrower than the registers
+    that the target uses for other code."""
     wanted = {width.lanes * options.real_bytes for vector in vectors for width in vector.widths}
     halves: list[VectorUnit] = []
     for unit in options.target.vectors:
@@ -140,7 +150,7 @@ def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[Vec
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """An array with one vector of limbs a row: a name, and rows of C texts, limb by limb."""
+    """A C array whose row is a vector with one number per limb. The data are the C name, and the C text of each row."""
 
     name: str
     rows: tuple[str, ...]
@@ -148,12 +158,12 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class GroupView(NamedByCount):
-    """One group of limbs in C.
+    """The C data of one group of equal limbs, such as the four legs of a quadruped.
 
-    inputs    read before anything is computed
-    constants the same at every state; None where there are none
-    arrays    what its stages store: name and number of rows
-    sums      what the core reads of them: its vector, and its length
+    inputs     values of q, qd and so on of the limbs, read before anything is computed
+    constants  lengths and other numbers of the limbs, which are equal at every state; None if there are none
+    arrays     name and number of rows of each array that the code of the group stores
+    sums       name and length of each vector of sums over the limbs; the code outside limbs reads the sums
     """
 
     count: int
@@ -165,9 +175,12 @@ class GroupView(NamedByCount):
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """One stage: its body, then what is done with what it has stored, line by line.
+    """One stage of the code of a function with limbs (such as legs). A stage is computed for all limbs of a group at
+    once, or for the core, which is everything outside limbs.
 
-    count  limbs whose lanes compute it; 0: the core
+    count  number of limbs that the stage computes in lanes; 0: the stage belongs to the core
+    body   C statements of the stage
+    after  C statements that handle what the body has stored
     """
 
     count: int
@@ -186,7 +199,14 @@ class StageView:
 
 @dataclass(frozen=True, slots=True)
 class SharesView:
-    """A group's part of thin products: the vector of T, where its rows begin in an output, and their product with x."""
+    """The rows of one group of limbs in a matrix product after a function with limbs (such as legs). In these rows, an
+    output is Y - T x.
+
+    vector   C name of the factor T
+    width    number of limbs
+    places   where the rows of each limb begin in an output
+    product  C text of the product T x
+    """
 
     vector: str
     width: int
@@ -196,17 +216,18 @@ class SharesView:
 
 @dataclass(frozen=True, slots=True)
 class ThinView:
-    """Products behind limbs.
+    """The matrix products at the end of a function with limbs (such as legs). For the core (everything outside limbs),
+    the rows of an n x n output are x = -V E. For a limb, they are Y - T x.
 
-    arrays   names and lengths of what stages store for them
-    outputs  names of the matrices that are multiplied, and
-    rights   of their E, and
-    known    first columns that are stored already, output by output
-    n        columns
-    places   where the core's rows begin in an output, and
-    begins   in E
-    rows     of the core, as C
-    groups   rows of limbs, group by group
+    arrays   names and lengths of the vectors with V, T and E
+    outputs  names of the output matrices
+    rights   names of the right factors E
+    known    for each output, how many of its first columns are stored already
+    n        number of columns
+    places   where the core's rows begin in an output
+    begins   where the core's rows begin in E
+    rows     C text of the core's rows
+    groups   rows of the limbs, group by group
     """
 
     arrays: tuple[tuple[str, int], ...]
@@ -248,13 +269,17 @@ def _thin_view(products: ThinProducts) -> ThinView:
 
 @dataclass(frozen=True, slots=True)
 class LimbsView:
-    """A kernel's body for one state with limbs in lanes.
+    """The code of a function for one state, which computes equal limbs (such as legs) in SIMD lanes.
 
-    least   lanes from which on it is taken
-    unused  inputs that it never reads
-    core    reals of the core that other stages read
-    stores  what puts out what limbs have computed, and zeros
-    products  done behind that; None: none are
+    file      name of the file with the code
+    least     the smallest number of lanes with which this code is faster than straight-line code
+    unused    inputs of the function that the code never reads
+    core      number of values outside limbs that the code of limbs reads
+    groups    the groups of limbs
+    stages    parts of the code, in their order
+    stores    C statements that store the outputs of limbs, and zeros
+    products  matrix products after all other code; None if there are none
+    cost      number of operations
     """
 
     file: str
@@ -273,14 +298,15 @@ class LimbsView:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Numbers of limbs of its groups, each once."""
+        """Return the numbers of limbs in the groups of the function, without duplicates, such as 4 for four legs."""
         return tuple(sorted({group.count for group in self.groups}))
 
 
 def limbs_view(
     name: str, limbs: LimbProgram, inputs: Sequence[str], sizes: dict[str, int], options: EmitOptions
 ) -> LimbsView:
-    """The view of a kernel's limbs; `sizes` are those of its outputs."""
+    """Return the code of a function that computes equal limbs (such as legs) in SIMD lanes, as data for the templates.
+    `sizes` are the lengths of the output vectors."""
     suffix = "" if options.real == "float64" else "f"
     read = {slot.vector for stage in limbs.stages for slot in stage.program.inputs()}
     read |= {own[0].vector for group in limbs.groups for _, own in group.inputs}

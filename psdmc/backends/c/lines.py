@@ -1,4 +1,4 @@
-"""Statements of a body in C, and the body that they make."""
+"""The statements of which the body of a generated C function consists, and the classes that hold them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def spread(text: str, uniform: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """An input that a section reads before its steps; a uniform one is the same for all states."""
+    """A statement that reads one entry of an input vector. A uniform entry is equal for all states of a batch."""
 
     name: str
     vector: str
@@ -36,7 +36,9 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A statement `const <V or real> name = text;`"""
+    """A C statement `const V name = text;` or `const real name = text;`, which stores the value of an expression in a C
+    variable. V is a real number or a SIMD vector. If `uniform`, the value is equal for all states of a batch and has
+    the type real."""
 
     name: str
     text: str
@@ -49,7 +51,8 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A statement `vector[index] = text`, where a uniform text must be spread over the lanes first; `macro` stores it."""
+    """A C statement `vector[index] = text`, written as a call of `macro`. If `uniform`, the value is equal for all
+    states of a batch, and is copied to all SIMD lanes first."""
 
     vector: str
     index: int
@@ -69,7 +72,8 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class Zeros:
-    """A statement that makes `count` outputs from the first on zero; whole groups, where a vector is stored in groups."""
+    """A statement that sets `count` consecutive outputs to zero. If the vector is stored in groups of four, zeros are
+    stored in groups of four, too."""
 
     vector: str
     first: int
@@ -82,7 +86,8 @@ class Zeros:
 
 @dataclass(frozen=True, slots=True)
 class Cleared:
-    """A statement that makes `count` outputs from the first on zero in code for one state; other code stores each."""
+    """A statement that sets `count` consecutive outputs to zero in code for one state. Code for a batch, with one state
+    per SIMD lane, stores each zero alone."""
 
     vector: str
     first: int
@@ -99,8 +104,8 @@ class Cleared:
 
 @dataclass(frozen=True, slots=True)
 class GroupStore:
-    """A statement `vector[index ...] = texts`: a group of outputs that are also stored one by one, for the form that
-    writes rows."""
+    """A C statement `vector[index ...] = texts` that stores several outputs at once, in batch code that writes into the
+    rows of the output array. Other code stores these outputs one by one."""
 
     vector: str
     index: int
@@ -116,7 +121,8 @@ Line = Step | Store | Zeros | Cleared | GroupStore | Entry | Multiplication
 
 @dataclass(frozen=True, slots=True)
 class Angle:
-    """One angle of a group, and the names of its sine and cosine (None: not needed)."""
+    """C text of one angle, and the C variables for its sine and cosine. A variable is None if the function does not
+    need the value."""
 
     text: str
     sine: str | None
@@ -125,10 +131,12 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of a body: loads, steps, then the sines and cosines of the angles that these steps compute.
+    """A part of a generated function body: statements that read inputs, statements that compute, and then the sines and
+    cosines of angles that were computed.
 
-    Inputs that no angle needs are loaded in the last section, after all sines, so that they need not be kept while libm
-    is called. Stores come with the last steps, after all loads: an output may overwrite an input.
+    Inputs that no angle depends on are read in the last section. Such inputs need not be kept in registers while the C
+    library computes sines. Outputs are stored after all inputs are read, because an output array may be one of the
+    input arrays.
     """
 
     loads: tuple[Load, ...]
@@ -139,13 +147,14 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A PROGRAM ready to print.
+    """The body of a generated C function, ready for the template.
 
-    unused    vectors of the signature that the PROGRAM never reads
-    products  done behind everything else
-    calls     operations that are macros
-    parts     functions that compute it, one after the other, where it is long; it has no sections of its own then
-    kept      declarations of the vectors between them
+    sections  the statements
+    unused    inputs that the body never reads
+    products  matrix products after all other statements
+    calls     operations that are written as C macros
+    parts     if the body is long, the C functions that compute it one after the other; `sections` is then empty
+    kept      C declarations of the arrays that pass values from one part to the next
     """
 
     sections: tuple[Section, ...]
@@ -163,11 +172,12 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A static function that computes a part of a body.
+    """A static C function that computes one part of a long function body.
 
-    parameters  their declarations
-    arguments   what it is called with
-    direct      outputs that are rows in the form that writes rows
+    parameters  C declarations of its parameters
+    arguments   C text of the arguments in its call
+    direct      outputs for which the batch variant passes rows of the output array
+    body        C statements
     """
 
     parameters: tuple[str, ...]

@@ -1,4 +1,5 @@
-"""The KernelView of a kernel: which outputs are written directly, in which files its bodies stand, which forms it has."""
+"""Decides how the C code of one kernel (one variant of a generated function) is written. The decisions are which
+outputs need no intermediate block, which files hold the code, and which C functions exist."""
 
 from __future__ import annotations
 
@@ -24,9 +25,10 @@ from psdmc.program.signature import Quantity, Signature, Sizes
 
 
 def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
-    """The kernel as templates print it. InternalError where C takes a quantity's name for something else.
+    """Return one kernel (one variant of a generated function) as data for the templates. Raises InternalError if the C
+    code itself uses a name of an input or output.
 
-    robot   identifier that the C functions' names start with
+    robot  identifier with which the names of the C functions begin
     """
     function, sizes = _checked(kernel.function), sizes_of(kernel, sizes)
     has_lanes = options.target.has_batches and not _is_by_state(kernel, sizes)
@@ -73,7 +75,8 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
 
 
 def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
-    """The robot's sizes, with the number of entries that this kernel puts out where it packs a matrix."""
+    """Return the sizes of the robot for one kernel (one variant of a generated function). If the kernel stores a matrix
+    without zeros, the number of stored entries is included."""
     return replace(sizes, nonzeros=len(kernel.places))
 
 

@@ -1,7 +1,7 @@
-"""Untrusted text on its way into C: names become identifiers, the rest is escaped.
+"""Conversion of untrusted text to C: names become identifiers, and all other text is escaped.
 
-A robot file may name its robot `a; system("x")`. Nothing of such a name may leave the identifier, the string
-or the comment that it is put into.
+A robot file may name its robot `a; system("x")`. No part of such a name may leave the identifier, the string or the
+comment into which it is written.
 """
 
 from __future__ import annotations
@@ -28,19 +28,20 @@ RESERVED = _listed()
 
 
 def is_reserved(word: str) -> bool:
-    """Whether a robot of this very name would meet somebody else's."""
+    """Return whether a robot with exactly this name would collide with a name of C, C++ or a library, or with a Windows
+    device."""
     return word in RESERVED or DEVICE.fullmatch(word) is not None
 
 
 def identifier(name: str) -> str:
-    """A C and C++ identifier for `name`, never a word of RESERVED."""
+    """Return a C and C++ identifier for `name`. It is never a name in RESERVED (words of C, C++ and their libraries)."""
     return identifier_of(name, is_reserved)
 
 
 def c_string(text: str) -> str:
-    """A C string literal of `text` as UTF-8: plain ASCII stays readable, everything else is an octal escape.
+    """Return a C string literal of `text` as UTF-8: plain ASCII stays readable, and everything else is an octal escape.
 
-    Octal escapes end after three digits whatever follows; '?' is escaped too, so that no trigraph can form.
+    Octal escapes end after three digits, whatever follows. '?' is escaped too, so that no trigraph can form.
     """
     plain = {ord('"'): '\\"', ord("\\"): "\\\\", ord("?"): "\\?"}
     body = "".join(
@@ -50,9 +51,10 @@ def c_string(text: str) -> str:
 
 
 def c_comment(text: str) -> str:
-    """`text` as it may stand inside a C comment: one line of ASCII that neither ends nor nests a comment.
+    """Return `text` in a form that is safe inside a C comment: one line of ASCII that neither ends nor nests a comment.
 
-    A '\\' could join lines, '/' beside '*' could open or close, '??' could be a trigraph: each is broken up.
+    A '\\' could join lines, '/' next to '*' could open or close a comment, and '??' could begin a trigraph. Each of
+    these is broken up.
     """
     ascii_text = "".join(chr(byte) if 32 <= byte < 127 else f"<{byte:02x}>" for byte in utf8(text))
     for dangerous, harmless in (("\\", "<5c>"), ("*/", "* /"), ("/*", "/ *"), ("??", "? ?")):

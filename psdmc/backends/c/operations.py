@@ -1,7 +1,8 @@
-"""C of the operations that C has no operator for, for one state and for vectors with one state or limb per lane.
+"""C code of the operations for which C has no operator, such as square roots. The code exists for one state, and for
+SIMD vectors with one state or one limb per lane.
 
-Each is a macro of its name in a body. What it means stands in roots.h (square roots, which every compiler has for vectors)
-and in operations.h.
+In a generated function body, each of these operations is a macro with the name of the operation. The macros are defined
+in two headers: square roots, which every compiler has for vectors, in roots.h, and all others in operations.h.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from psdmc.program.operations import Op, Unit
 
 @dataclass(frozen=True, slots=True)
 class CallView:
-    """One operation.
+    """The C code of one operation for which C has no operator.
 
-    parameters  of its macro and its functions
-    one         C expression of them for reals; FUNCTION(name) is the C library's for the package's real
-    many        the same for vectors, where BLEND(mask, x, y) is x in the lanes whose mask is set; '': lane by lane
+    parameters  names of the arguments of its macro and its C functions
+    one         C expression for one state; FUNCTION(name) becomes the C library's function for float or double
+    many        C expression for SIMD vectors; BLEND(mask, x, y) is x in lanes whose mask is set, else y; '': each lane
+                is computed alone with `one`
     """
 
     op: Op
@@ -48,7 +50,7 @@ class CallView:
 
     @property
     def lanes(self) -> str:
-        """What the macro is for one state per lane."""
+        """Return the definition of the operation's C macro in code that computes one state per SIMD lane."""
         return f"{self.function('lanes') if self.has_header else 'root_lanes'}({self.arguments})"
 
     @property
@@ -62,7 +64,8 @@ class CallView:
         return self.op.unit is Unit.CALL
 
     def function(self, kind: str) -> str:
-        """Name of its function for reals, lanes or limbs."""
+        """Return the name of the C function that computes the operation. `kind` says for what: reals (one state), lanes
+        (one state per lane) or limbs (one limb per lane)."""
         return f"{self.op}_{kind}"
 
     def declared(self, kind: str) -> str:
@@ -91,5 +94,5 @@ CALLS = {call.op: call for call in _ALL}
 
 
 def call_views(calls: frozenset[Op]) -> tuple[CallView, ...]:
-    """Those of some operations, in the table's order."""
+    """Return the C code of the given operations, in the order of the table CALLS."""
     return tuple(call for op, call in CALLS.items() if op in calls)

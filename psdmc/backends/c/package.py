@@ -1,4 +1,5 @@
-"""The emitted package in the form that templates print, from metadata and kernels."""
+"""The complete C package as data for the templates. It is made from the robot's metadata and the kernels (variants of
+generated functions)."""
 
 from __future__ import annotations
 
@@ -40,10 +41,11 @@ ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_w
 
 @dataclass(frozen=True, slots=True)
 class PackageView:
-    """One package, in the form that templates print.
+    """One C package as data for the templates.
 
-    robot     identifier that every symbol starts with
-    adapters  names of psdmc.backends.c.adapters
+    robot       identifier with which every C name starts
+    references  inputs and expected results for the self-test; None: no self-test
+    adapters    names of the other programs, such as CasADi, for which the package has files
     """
 
     robot: str
@@ -55,8 +57,9 @@ class PackageView:
 
     @property
     def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
-        """Adapters whose C file becomes a shared library of its own, lib<robot>_<name>, and the sources compiled into it
-        besides: files for CasADi include them, under other names."""
+        """Return the adapters (files for other programs) whose C file becomes a separate shared library,
+        lib<robot>_<name>. Each adapter has the C files that its library needs in addition. The files for CasADi already
+        include the code of the package, and need none."""
         sources = {"casadi": (), "casadi_theta": (), "fmu": self.sources}
         return {name: sources[name] for name in self.adapters if name in sources}
 
@@ -71,8 +74,9 @@ class PackageView:
 
     @property
     def size_macros(self) -> dict[str, int]:
-        """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of bodies;
-        of contacts; of sparse matrices' patterns."""
+        """Return the sizes that the C header defines in addition to the degrees of freedom, by name. They are joints,
+        entries of q, rates, bodies, contacts, and the nonzero entries of matrices. A size is left out if the package
+        does not need it."""
         wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
         wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
         if uses_contacts(function.signature for function in self.functions):
@@ -81,7 +85,8 @@ class PackageView:
 
     @property
     def patterns(self) -> tuple[Pattern, ...]:
-        """Of packed matrices, and of trees' sparse ones: a serial chain's zeros are few."""
+        """Return the sparsity patterns (positions of nonzero entries) that the package lists. Listed are matrices that
+        are stored without zeros. For a tree robot, all other matrices with zeros are listed, too."""
         found = patterns(self.functions)
         return tuple(each for each in found if each.is_packed or (self.info.is_tree and each.is_sparse))
 
@@ -103,7 +108,7 @@ class PackageView:
 
     @property
     def arithmetic_flags(self) -> str:
-        """Compiler flags that suit the C on every machine."""
+        """Return the compiler flags for the arithmetic of the C code, which are equal on every machine."""
         return " ".join(ARITHMETIC)
 
     @property
@@ -156,28 +161,32 @@ class PackageView:
 
     @property
     def friction(self) -> FrictionView | None:
-        """The calibrated friction, where the package has its function."""
+        """Return the data for the C function of the calibrated joint friction; None if the package has no such
+        function."""
         return FrictionView(self.info.friction, self.robot, self.real) if self.info.friction else None
 
     @property
     def payload(self) -> PayloadView | None:
-        """The functions that add a load to theta_b, where the package has them."""
+        """Return the data for the C functions that add a load to theta_b (the base parameters); None if the package has
+        no such functions."""
         return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
 
     @property
     def bodies(self) -> BodiesView | None:
-        """The function that computes theta_b from all bodies, where the package has it."""
+        """Return the data for the C function that computes theta_b (the base parameters) from all bodies; None if the
+        package has no such function."""
         return BodiesView(self.robot, self.real, self.info.bodies) if self.info.bodies else None
 
     @property
     def version(self) -> str:
-        """psdmc's version as the three numbers that CMake and pkg-config compare."""
+        """Return psdmc's version as three numbers, the form in which CMake and pkg-config compare versions."""
         found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
         return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
 
     @property
     def pivot_size(self) -> int:
-        """Number of entries that must be positive, where the outputs that become NaN are one vector of that length."""
+        """Return the number of pivots (of a factorised matrix) that must be positive, for functions with one output of
+        this length."""
         found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
         return next(found, self.n)
 
@@ -195,17 +204,20 @@ class PackageView:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some kernel writes one output's rows from registers and another's from a block."""
+        """Return whether a function of the package needs both kinds of storage. One output is then written straight
+        into the array of the caller, and another is first collected in a block on the stack."""
         return any(kernel.is_mixed for kernel in self.kernels)
 
     @property
     def fails_in_several(self) -> bool:
-        """Whether some kernel that fails sets more than one vector of all joints to NaN."""
+        """Return whether a failed function of the package sets several outputs to NaN, or an output that is no vector
+        with one entry per joint."""
         return any(k.positive and not (k.fails_alone and k.regions is None) for k in self.kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
-        """Of those that some kernel does behind its PROGRAM, each once."""
+        """Return the sizes of all matrix products that follow straight-line code in functions of the package, without
+        duplicates."""
         return tuple(sorted({p.shape for function in self.functions for p in function.products}))
 
     @property
@@ -232,7 +244,7 @@ class PackageView:
         return call_views(frozenset(found))
 
     def limb_calls(self, count: int) -> tuple[CallView, ...]:
-        """Those of some stage of so many limbs."""
+        """Return the operations that code for `count` equal limbs, such as four legs, writes as C macros."""
         views = [kernel.limbs for kernel in self.kernels if kernel.limbs]
         stages = [stage for view in views for stage in view.stages if stage.count == count]
         return call_views(frozenset(op for stage in stages for op in stage.body.calls))
@@ -244,13 +256,14 @@ class PackageView:
 
     @property
     def multiplies_lanes(self) -> bool:
-        """Whether such products are made of lanes, too."""
+        """Return whether batch functions of the package compute matrix products with one state per SIMD lane."""
         own = (kernel for kernel in self.kernels if kernel.single_body.products)
         return self.target.has_batches and any(not kernel.by_state for kernel in own)
 
     @property
     def leads_on(self) -> bool:
-        """Whether q is longer than the rates, and the package has what leads from one q to another."""
+        """Return whether q has more entries than qd (quaternions), and the package has the functions that integrate q
+        and compute differences of q."""
         names = {function.name for function in self.functions}
         return self.info.is_wide and all(recipe in names for recipe in ON_MANIFOLD)
 
@@ -261,7 +274,8 @@ class PackageView:
 
     @property
     def uses_frames(self) -> bool:
-        """Whether some function is about the named frames."""
+        """Return whether a function of the package needs the named frames of the robot. It may have an input or output
+        for frames, or add a load at a frame."""
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
@@ -272,7 +286,11 @@ def package_view(
     references: ReferenceStates | None = None,
     adapters: Sequence[str] = (),
 ) -> PackageView:
-    """The package with all decisions made. InputError where there is nothing to emit, or an adapter is not possible."""
+    """Return the C package as data for the templates.
+
+    Raises InputError if there are no functions, or if an adapter (files for another program) is not possible for this
+    package.
+    """
     if not kernels:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:

@@ -1,4 +1,4 @@
-"""The text of every file of the emitted package, from its view. This module writes nothing to disk."""
+"""The text of every file of the generated C package. This module writes nothing to disk."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from psdmc.target.target import Target
 
 
 def package_files(package: PackageView) -> dict[str, str]:
-    """Path -> text for every file, manifest.json (which hashes the others) last."""
+    """Return the text of every file, by path. The last one is manifest.json, which contains the hashes of the others."""
     files = library_files(package)
     files |= {path: render(template, package=package) for path, template in _build_files(package)}
     if package.references is not None:
@@ -67,7 +67,7 @@ LICENCE = f"/* {SPDX}: 0BSD */\n"
 
 
 def licensed(path: str, text: str) -> str:
-    """The text of a file with its licence, where it is C."""
+    """Return the text of a file, preceded by its licence if the file is C code."""
     return LICENCE + text if path.endswith(C_SUFFIXES) else text
 
 

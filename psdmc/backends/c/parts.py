@@ -1,4 +1,5 @@
-"""A long PROGRAM as several C functions, so that compile time grows nearly linearly with its length."""
+"""Divides a long PROGRAM (the list of operations to generate) into several C functions. The compile time then grows
+nearly linearly with the length."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ _UNIFORM = frozenset({"theta_b", KEPT_REALS})
 
 
 def is_long(program: Program, sizes: Mapping[str, int]) -> bool:
-    """Whether a PROGRAM is cut into parts: by its operations and the entries that it stores (`sizes` by vector)."""
+    """Return whether a PROGRAM (the list of operations to generate) is so long that it is divided into several C
+    functions. The length is the number of operations plus the number of output entries (`sizes` by vector)."""
     operations = sum(bool(instr.args) for instr in program)
     return operations + sum(sizes.values()) > LONG
 
@@ -38,7 +40,11 @@ def body_in_parts(
     in_groups: Collection[str] = (),
     products: Sequence[Product] = (),
 ) -> Body:
-    """The same as `make_body`, as functions; outputs that are zero at every state are stored in loops."""
+    """Return the body of a C function for a long PROGRAM (the list of operations to generate). The body calls several
+    functions, each of which computes a part. Loops set outputs to zero that are zero at every state.
+
+    The arguments have the meaning of those of make_body.
+    """
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
     stored = without_products(sizes, multiplied)
     whole, zeros = _without_zeros(program, stored)

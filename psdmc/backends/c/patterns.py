@@ -1,4 +1,5 @@
-"""Where matrices have entries that are not zero at every state: branches of a tree do not see each other."""
+"""The sparsity patterns of matrices, that is, which entries can differ from zero. In a tree robot, the entries of two
+joints on different branches are zero."""
 
 from __future__ import annotations
 
@@ -11,12 +12,12 @@ from psdmc.backends.c.tables import Table
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """The entries of a function's matrix that may differ from zero, row by row.
+    """The entries of a function's output matrix that may differ from zero at some state, row by row.
 
-    function   name of the function, whose one output is the matrix
-    places     (row, column) of each
-    is_packed  whether these entries are all that it puts out
-    is_sparse  whether the matrix has others
+    function   name of the function, which has no other output
+    places     (row, column) of each entry
+    is_packed  whether the function stores these entries only, one after the other
+    is_sparse  whether the matrix has further entries, which are zero at every state
     """
 
     function: str
@@ -26,11 +27,12 @@ class Pattern:
 
     @property
     def macro(self) -> str:
-        """Name of its length, without the robot's prefix."""
+        """Return the name of the C macro for the number of entries that may differ from zero, without the robot's
+        prefix."""
         return f"{self.function.upper()}_NONZEROS"
 
     def table(self, robot: str) -> Table:
-        """The places as a constant array of pairs."""
+        """Return the (row, column) pairs of the nonzero entries as a constant array."""
         name = f"{self.function}_pattern"
         return Table(
             name,
@@ -42,10 +44,11 @@ class Pattern:
 
 
 def patterns(functions: Sequence[FunctionView]) -> Iterator[Pattern]:
-    """Of every function that puts out one matrix, packed or not.
+    """Yield the sparsity pattern (positions of nonzero entries) of every function whose only output is a matrix. The
+    matrix may be stored with or without its zeros.
 
-    An entry of one that is not is left out where every kernel of the function, with parameters compiled in and given at
-    run time, has the constant zero in its place.
+    In a matrix that is stored with zeros, an entry counts as zero if it is zero at every state. This must hold in all
+    variants of the function, with compiled-in base parameters and with theta_b as an input.
     """
     for function in functions:
         if function.kernels[0].places:

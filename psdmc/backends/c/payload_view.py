@@ -1,4 +1,4 @@
-"""The functions that add a load to theta_b, as templates print them."""
+"""C text for the functions that add a load to theta_b (the vector of base parameters of the robot)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from psdmc.backends.c.tables import number
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PayloadView:
-    """Of one robot, printed for one real type.
+    """The functions of one robot that add a load to theta_b (the base parameters), as C text for float or double.
 
-    matrices  (l, 10) each: from a load's ten inertial parameters to what it adds to theta_b, at the tip and each frame
+    matrices  (l, 10) each: factors from the ten inertial parameters of a load to the change of the l base parameters.
+              The first is for a load at the tip, then there is one for each named frame
     """
 
     robot: str

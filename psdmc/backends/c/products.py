@@ -1,7 +1,8 @@
-"""Products of matrices behind a body: loops over small vectors for one state, line by line for one state per lane.
+"""Matrix products that follow the straight-line code of a function. For one state, a product is a loop; for a batch
+with one state per SIMD lane, each entry is one statement.
 
-Straight-line code for one state slows down beyond some 27 KB; lanes run out of registers either way and are as fast with
-each entry in a line, which needs no memory for the factors.
+For one state, straight-line code slows down if it is longer than some 27 KB. For a batch, loops and statements are
+equally fast, because both run out of registers. Statements then need no memory for the factors.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from psdmc.program.program import Program, Slot
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry of a factor: KEEP takes one of a right factor, NAME one of a left factor, an output that is stored beside."""
+    """C statement for one entry of a factor in a matrix product, as a call of the C macro KEEP or NAME. KEEP saves an
+    entry of the right factor. NAME gives a name to an entry of the left factor, which is also an output of the
+    function."""
 
     macro: Literal["KEEP", "NAME"]
     matrix: str
@@ -33,14 +36,16 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Shape:
-    """n x n, where the right factor's first `zero` columns are always zero and not kept."""
+    """The shape of a product of two n x n matrices. The first `zero` columns of the right factor are always zero and
+    are not saved."""
 
     n: int
     zero: int
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """C: entry by entry, in groups for the form that writes rows."""
+        """Return the C statements of the matrix product, one for each entry. Batch code that writes into the rows of
+        the output array has further statements, which store four entries at once."""
         groups, n = StoreGroups({"product": self.n**2}), self.n
         found = []
         for index in range(n * n):
@@ -70,6 +75,7 @@ class Multiplication:
 
 
 def multiplication(program: Program, product: Product, sizes: Mapping[str, int]) -> Multiplication:
-    """A product as C does it behind a PROGRAM; `sizes` are the outputs'."""
+    """Return the C code of a matrix product that follows a PROGRAM (the list of operations to generate). `sizes` are
+    the lengths of the output vectors."""
     shape = Shape(math.isqrt(sizes[product.output]), zero_columns(program, product))
     return Multiplication(product.output, product.left, product.right, shape)

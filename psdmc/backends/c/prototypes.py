@@ -1,4 +1,5 @@
-"""C signatures of the generated functions: the one source of header, definitions and cffi's cdef."""
+"""C signatures of the generated functions. The header and the definitions use these signatures, and so do the
+declarations for the Python package cffi."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from psdmc.program.signature import Signature
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One form of a function: for one state, for many, with parameters at run time."""
+    """One variant of a generated function: for one state or for many, with parameters compiled in or at run time."""
 
     suffix: str
     is_batch: bool
@@ -50,7 +51,8 @@ def prototype(function: Signature, variant: Variant, robot: str, real: str) -> P
 
 
 def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
-    """The functions that add a load to theta_b: at the tip, and at a frame by its number."""
+    """Return the signatures of the two functions that add a load to theta_b (the base parameters). One function is for
+    a load at the tip, the other for a load at a frame with a given number."""
     load = (f"{real} mass", f"const {real} *com", f"const {real} *inertia", f"{real} *theta_b")
     return (
         Prototype("void", f"{robot}_add_payload", load),
@@ -59,7 +61,8 @@ def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
 
 
 def bodies_prototype(robot: str, real: str) -> Prototype:
-    """The function that computes theta_b from all bodies."""
+    """Return the signature of the function that computes theta_b (the base parameters) from the masses, centres of mass
+    and inertias of all bodies."""
     given = tuple(f"const {real} *{name}" for name in ("masses", "coms", "inertias"))
     return Prototype("void", f"{robot}_theta_from_bodies", (*given, f"{real} *theta_b"))
 

@@ -1,5 +1,5 @@
-"""Numbers that the package's real type cannot hold: float32 rounds small ones as C would, without warnings, and large
-ones are refused."""
+"""Range checks for the package's real type. Numbers that are too small for float32 are rounded without a warning, as in
+C; numbers that are too large raise an error."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def c_real(options: EmitOptions) -> CReal:
 
 
 def rounded_out(value: float, real: str) -> float:
-    """The value where C's `real` has a number near it, else the infinity or the zero that it rounds to."""
+    """Return the value to which a number outside the range of the C type `real` is rounded: infinity, the largest
+    number, or zero. Any other number is returned unchanged."""
     if real == "double" or math.isnan(value):
         return value
     if abs(value) >= TOO_LARGE:
@@ -39,9 +40,10 @@ def rounded_out(value: float, real: str) -> float:
 
 
 def check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) -> None:
-    """InputError where a parameter, gravity or a constant of the code is too large for `real`.
+    """Raise InputError if a base parameter, gravity or a constant in the generated code is too large for the C type
+    `real`.
 
-    Limits are not checked: one beyond every float is no limit, and is written as infinite.
+    Joint limits are not checked. A limit that is too large for `real` is no limit, and is written as infinite.
     """
     numbers = [("gravity", value) for value in info.gravity]
     numbers += [

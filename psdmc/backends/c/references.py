@@ -1,4 +1,4 @@
-"""Reference states as C text, for the package's own test."""
+"""States and expected results as C text, for the package's self-test."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from psdmc.robot.inertia import six_of
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTable:
-    """One constant array: its name, entries per row, and its rows as C text."""
+    """One constant C array of the self-test: its name, the number of columns, and the C text of each row. A row belongs
+    to one state."""
 
     name: str
     columns: int
@@ -26,7 +27,8 @@ class ReferenceTable:
 
 @dataclass(frozen=True, slots=True)
 class LoadView:
-    """The same as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and the rows of `added`."""
+    """The example load of the self-test as C text: mass, com (centre of mass), inertia (Ixx Ixy Iyy Ixz Iyz Izz), and
+    rows `added`. Each row is what the load adds to theta_b (the base parameters) at the tip or at one named frame."""
 
     mass: str
     com: str
@@ -36,12 +38,14 @@ class LoadView:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceView:
-    """References as C text.
+    """The data of the self-test as C text.
 
-    tables    the states' vectors, then each output's expected values
-    expected  labels of the outputs that have such a table
-    theta_b   the run-time parameters, one constant each; empty where no kernel takes any
-    load      a load and what it adds to theta_b, where the package has functions that add loads
+    count     number of states
+    tables    the inputs at all states, then the expected values of each output
+    expected  names of the outputs that have a table of expected values
+    theta_b   the base parameters that the functions take as an input, one constant each; empty if no function takes
+              them
+    load      a load and what it adds to theta_b; None if the package has no functions that add loads
     """
 
     count: int
@@ -58,9 +62,14 @@ def reference_view(
     labels: Collection[str],
     takes_theta: bool,
 ) -> ReferenceView:
-    """The states as C constants: the vectors that the package's kernels take, and the expected outputs (by label).
+    """Return the data of the self-test as C text: the inputs of the package's functions at some states, and the
+    expected outputs.
 
-    ValueError where the states are of another robot.
+    vectors      inputs that the functions read
+    labels       names of the outputs that the self-test compares
+    takes_theta  whether a function takes the base parameters as an input
+
+    Raises ValueError if the states belong to another robot.
     """
     sizes = {vector.name: vector.size for vector in vectors}
     given = []

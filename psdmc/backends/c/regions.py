@@ -1,4 +1,5 @@
-"""The C of a function's regions, in the form that the template prints: loops and calls as text, straight lines as bodies."""
+"""C code of a function that consists of regions (straight-line code, loops, and calls of other functions), as data for
+the template. Loops and calls are C text; straight-line code is a list of statements."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from psdmc.program.theta_rows import THETAS
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Lines of C, or a straight line, behind so many spaces."""
+    """Part of a function's C code: some lines of C text, or the statements of straight-line code, indented by a number
+    of spaces."""
 
     spaces: int
     lines: tuple[str, ...]
@@ -24,7 +26,8 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class RegionsView:
-    """A function's body: declarations of its own arrays, then pieces in their order."""
+    """The body of a C function that contains loops or calls. First come declarations of the internal arrays and
+    constants, then the parts of the code in their order."""
 
     declarations: tuple[str, ...]
     pieces: tuple[Piece, ...]
@@ -36,10 +39,11 @@ class RegionsView:
 
 
 def regions_view(body: Regions, inputs: Sequence[str], robot: str, suffix: str) -> RegionsView:
-    """The view of regions that read these inputs.
+    """Return the C code of a function that consists of regions (straight-line code, loops, and calls of other
+    functions). `inputs` are the names of the function's inputs.
 
-    robot   what the called functions' names start with
-    suffix  of constants
+    robot   prefix of the names of the called functions
+    suffix  of C constants: '' for double, 'f' for float
     """
     constants = tuple(
         f"static const real {name}[{len(values)}] = {{{', '.join(literal(x, suffix).text for x in values)}}}"

@@ -1,4 +1,4 @@
-"""Templates of C: filters `comment` and `string` make untrusted text safe in it."""
+"""Fills the Jinja templates for C. The filters `comment` and `string` of the templates make untrusted text safe."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def environment() -> Environment:
 
 
 def render(template: str, **view: object) -> str:
-    """A template's text, filled from its view objects."""
+    """Fill a C template with the data that its variables name, and return the text."""
     return environment().get_template(template).render(**view)

@@ -1,4 +1,5 @@
-"""A PROGRAM of one value as a static C function of numbers, beside a vector p of parameters: friction of one joint."""
+"""Writes a PROGRAM (a list of scalar operations) with one output as a static C function. The arguments are numbers and
+a vector p of parameters. The friction law of one joint is such a function."""
 
 from __future__ import annotations
 
@@ -17,9 +18,10 @@ TYPE = "number"
 
 @dataclass(frozen=True, slots=True)
 class ScalarFunction:
-    """A function `name(const number *p, number x, ...)`, which has those of `arguments` that the PROGRAM reads.
+    """A C function `name(const number *p, number x, ...)`. p are the parameters; the numbers are those of `arguments`
+    that the PROGRAM (the list of operations) reads.
 
-    suffix  of C's functions and literals: f for float
+    suffix  of C library functions and constants: 'f' for float
     """
 
     name: str
@@ -39,7 +41,7 @@ class ScalarFunction:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Its statements, the last one of which returns the value."""
+        """Return the C statements of the function. The last statement returns the result."""
         named = Names.of(self.program).named
         values: list[Expr] = []
         found: list[str] = []

@@ -1,4 +1,5 @@
-"""The calls of the package's own test: every function in every layout, compared with the reference states."""
+"""The function calls of the package's self-test. Every function is called for single states and for batches in every
+memory layout, and the results are compared with reference values."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from psdmc.backends.self_test import compared_by_row, given_name, tolerance
 
 @dataclass(frozen=True, slots=True)
 class GivenVector:
-    """An input by the reference states' name, `size` reals per state; `of_joints`: one entry per joint."""
+    """One input of the self-test: its name in the reference states, and how many real numbers belong to one state
+    (`size`). `of_joints` states whether the input has one entry per joint."""
 
     name: str
     size: int
@@ -35,13 +37,17 @@ class GivenVector:
 
 @dataclass(frozen=True, slots=True)
 class SelfCheck:
-    """One output of a kernel that is called state by state, row by row and, where it has that form, lane by lane.
+    """The comparison of one output of a generated function with expected values, in the self-test. The function is
+    called for single states and, if it has batch variants, for many states.
 
-    rows, columns  of the output per state
-    single         C call for one state, `row` being its number
-    batch, lanes   C calls for `count` states, row by row and lane by lane; '' where there is no such form
-    status         whether the calls return one
-    expected       array of the expected values; '' where no reference state has any
+    rows, columns  shape of the output for one state
+    single         C call for the state with the number `row`
+    batch          C call for `count` states, stored one state after the other; '' if there is no batch variant
+    lanes          C call for `count` states, stored in blocks [entry][lane] with one state per lane; '' if there is no
+                   such variant
+    status         whether the calls return a status
+    expected       C name of the array of expected values; '' if there are no expected values
+    tolerance      largest permitted error, as C text
     """
 
     kernel: str
@@ -63,14 +69,16 @@ class SelfCheck:
 def self_checks(
     kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
 ) -> tuple[SelfCheck, ...]:
-    """One check per output of each kernel. `known` are the labels of outputs whose values the reference states hold."""
+    """Return one comparison for each output of each kernel (one variant of a generated function). `known` are the names
+    of outputs that have expected values."""
     return tuple(
         _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
     )
 
 
 def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
-    """Inputs of all these kernels, by the reference states' names, each once."""
+    """Return the inputs of all kernels (variants of generated functions), without duplicates, by their names in the
+    reference states."""
     return tuple(
         dict.fromkeys(
             GivenVector(given_name(v.name, kernel.variant), v.size, v.size == n)

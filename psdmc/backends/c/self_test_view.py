@@ -1,4 +1,4 @@
-"""The package's own test in the form that its templates print: calls, inputs, and the sizes of its buffers."""
+"""The self-test of a package as data for its templates: function calls, inputs, and the sizes of buffers."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from psdmc.backends.self_test import TOLERANCES
 class SelfTestView:
     """The self-test of one package.
 
-    kernels  of all its functions
+    kernels  variants of all functions of the package
     dof      length of rates and torques
-    known    labels of the outputs whose values the reference states hold
-    beside   number of further C functions that it compares: of loads, bodies and friction
+    known    names of the outputs that have expected values
+    beside   number of further C functions that the self-test compares: for loads, bodies and friction
     """
 
     kernels: tuple[KernelView, ...]
@@ -28,12 +28,14 @@ class SelfTestView:
 
     @property
     def checks(self) -> tuple[SelfCheck, ...]:
-        """Every kernel's calls; those without a reference value are marked."""
+        """Return the comparison of each output of each kernel (one variant of a generated function). Outputs without
+        expected values are marked."""
         return self_checks(self.kernels, self.dof, self.options, self.known)
 
     @property
     def functions(self) -> int:
-        """Number of C functions whose values are compared: kernels, loads, bodies and friction."""
+        """Return the number of C functions whose values the self-test compares: kernels (variants of generated
+        functions), and functions for loads, bodies and friction."""
         return len({check.kernel for check in self.checks if check.expected}) + self.beside
 
     @property
@@ -43,12 +45,12 @@ class SelfTestView:
 
     @property
     def given(self) -> tuple[GivenVector, ...]:
-        """Inputs of all kernels, by the reference states' names."""
+        """Return the inputs of all kernels (variants of generated functions), by their names in the reference states."""
         return given_vectors(self.kernels, self.dof)
 
     @property
     def given_otherwise(self) -> bool:
-        """Whether some input is not a vector with one entry per joint."""
+        """Return whether some input of the tested functions is not a vector with one entry per joint."""
         return not all(vector.of_joints for vector in self.given)
 
     @property

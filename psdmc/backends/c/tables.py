@@ -1,4 +1,4 @@
-"""Constant tables of the package: joint names and limits, gravity, base parameters."""
+"""Constant tables of the C package: joint names and limits, gravity, base parameters."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from psdmc.backends.info import PackageInfo
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One constant array in C and, as a constexpr member, in C++.
+    """One constant array in C that is also a constexpr member of the C++ class.
 
-    name          without the robot's prefix
-    declaration   in C, without `extern`
-    entries       as C text
-    cpp_type      element and length in C++: 'Real, dof'
-    cpp_entries   as C++ text
+    name         without the robot's prefix
+    declaration  in C, without `extern`
+    entries      values as C text
+    cpp_type     element type and length in C++, such as 'Real, dof'
+    cpp_entries  values as C++ text
+    is_text      whether the entries are strings
     """
 
     name: str
@@ -33,7 +34,8 @@ class Table:
 def tables(
     info: PackageInfo, robot: str, real: str, with_frames: bool = False, with_texts: bool = True
 ) -> tuple[Table, ...]:
-    """All tables of a package, in the header's order; texts only where the target has them."""
+    """Return all constant tables of a package, in the order of the C header. Tables of strings, such as joint names,
+    are left out if `with_texts` is false (small machines)."""
     lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
     lengths |= {"frames": f"{robot}_FRAMES", "joints": f"{robot}_JOINTS"}
 
@@ -80,8 +82,11 @@ def _cpp_number(value: float | None, real: str) -> str:
 
 
 def number(value: float | None, real: str) -> str:
-    """A real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the infinity or zero it
-    rounds to. tcc takes no minus before INFINITY in a constant, so that minus infinity is a product."""
+    """Return C text of a real constant. None (unknown) is written as NaN. A number outside the range of the C type
+    `real` is written as the infinity or zero to which it rounds.
+
+    Minus infinity is written as a product, because the compiler tcc does not accept a minus before INFINITY.
+    """
     if value is None or math.isnan(value):
         return f"({real})NAN"
     value = rounded_out(value, real)

@@ -1,17 +1,17 @@
-"""The numbers and names of the inline sincos in the generated C: views for `templates/trig/`.
+"""The numbers and names in the generated C code of sine and cosine: data for the templates in `templates/trig/`.
 
     q = k pi/2 + r,  k = round(2 q / pi),  |r| <= pi/4        pi/2 in parts whose products with k are exact
     sin r = r - r^3 P(r^2)        cos r = 1 - r^2/2 + r^4 Q(r^2)
 
-and k mod 4 says which of the two is sine, which cosine, and their signs. docs/trigonometry.md derives the
-error bounds; tests/trig/minimax.py is where the numbers come from, and a test holds them to it.
+k mod 4 decides which of the two polynomials gives the sine and which the cosine, and their signs. docs/trigonometry.md
+derives the error bounds. tests/trig/minimax.py computes the coefficients, and a test compares them with these.
 
-How a generated C file gets it, `templates/trig/` being rendered with `trig=` one of these views:
+A generated C file includes these templates of `templates/trig/`. Each gets the result of one function as `trig`:
 
     preamble.jinja         trig_preamble(prefix, real, far)       once per C file
     #if HAS_VECTORS                                               (psdmc/target/vectors.py)
     types.jinja            vector_trig(prefix, real, unit, far)   unless the file has such types itself
-    sincos_vector.jinja    the same view                          <symbol>(const vec *x, vec *s, vec *c)
+    sincos_vector.jinja    the same result                        <symbol>(const vec *x, vec *s, vec *c)
     #else
     sincos_scalar.jinja    scalar_trig(prefix, real, far)         <symbol>(const real *x, real *s, real *c)
     #endif
@@ -32,7 +32,8 @@ Far = Literal["libm", "nan"]
 
 
 def far_of(trig: Trig) -> Far:
-    """What becomes of angles beyond the inline sincos's range."""
+    """Return how the generated code computes the sine of an angle outside the range of its own sine function. 'libm'
+    stands for the C library; 'nan' means that the result is NaN."""
     return "nan" if trig == "freestanding" else "libm"
 
 
@@ -42,7 +43,8 @@ SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
 
 @dataclass(frozen=True, slots=True)
 class AnySign:
-    """C test whether any lane of `*bits` is negative: `c` where `guard` is defined, else `plain` < 0; no guard: always."""
+    """C test of whether one lane of the integer vector `*bits` is negative. If the C macro `guard` is defined, the test
+    is `c`, an instruction of the processor. Otherwise, it is `plain` < 0."""
 
     guard: str
     c: str
@@ -60,9 +62,10 @@ class TrigPreamble:
 
 @dataclass(frozen=True, slots=True)
 class ScalarTrig:
-    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size (vectors: signed).
+    """The data of the template sincos_scalar.jinja. The C type vec is the real type (float or double). ivec is an
+    unsigned integer type of the size of vec (in vectors: signed).
 
-    rounded  integer that k is converted to
+    rounded  integer type of k, the angle divided by pi/2 and rounded
     """
 
     macro: str
@@ -85,7 +88,8 @@ class ScalarTrig:
 
 @dataclass(frozen=True, slots=True)
 class VectorTrig(ScalarTrig):
-    """View of sincos_vector.jinja and types.jinja: vec is lanes x real, ivec lanes x integer (signed)."""
+    """The data of the templates sincos_vector.jinja and types.jinja. The C type vec is a vector of `lanes` real
+    numbers, and ivec is a vector of `lanes` signed integers."""
 
     near_symbol: str
     far_symbol: str
@@ -97,14 +101,17 @@ class VectorTrig(ScalarTrig):
 
 
 def trig_preamble(prefix: str, real: Real, far: Far = "libm") -> TrigPreamble:
-    """View of preamble.jinja; prefix is the robot's identifier, as in every view here."""
+    """Return the data of the template preamble.jinja. In this module, `prefix` is the robot's identifier, and `far`
+    says how angles outside the usual range are computed."""
     return TrigPreamble(_macro(prefix), real, far == "libm")
 
 
 def scalar_trig(prefix: str, real: Real, far: Far = "libm", short: bool = False) -> ScalarTrig:
-    """View of sincos_scalar.jinja: <prefix>_sincos_f64 or _f32, angle and results behind pointers.
+    """Return the data of the template sincos_scalar.jinja, for the C function <prefix>_sincos_f64 or _f32. This
+    function takes pointers to the angle and to the two results.
 
-    short  convert k to int, which it fits, for machines on which wider ones take a call
+    short  True: the rounded number of quarter revolutions has the C type int. This avoids a function call on machines
+           without wider integers
     """
     suffix = _suffix(real)
     return ScalarTrig(
@@ -135,9 +142,11 @@ def vector_trig(
     vec: str | None = None,
     ivec: str | None = None,
 ) -> VectorTrig:
-    """View of sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of one of a target's units.
+    """Return the data of the template sincos_vector.jinja, for a C function <prefix>_sincos_f64x8 and so on. `unit` is
+    the kind of SIMD registers that the function uses.
 
-    vec and ivec name types that the C file has; by default types.jinja's <prefix>_f64x8, <prefix>_i64x8.
+    vec, ivec  names of the vector types in the C file; None: <prefix>_f64x8, <prefix>_i64x8 and so on, as in
+               types.jinja
     """
     bits = NUMBERS[real].bits
     lanes = unit.bytes * 8 // bits

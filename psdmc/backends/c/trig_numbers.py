@@ -8,7 +8,7 @@ from psdmc.backends.trig_numbers import NUMBERS, Real
 
 
 def c_number(value: float, real: Real) -> str:
-    """A C99 literal that reads back exactly: hexadecimal, without trailing zeros."""
+    """Return a C99 constant that has exactly the given value when it is compiled: hexadecimal, without trailing zeros."""
     mantissa, _, exponent = value.hex().partition("p")
     head, _, digits = mantissa.partition(".")
     digits = digits.rstrip("0")
@@ -17,7 +17,11 @@ def c_number(value: float, real: Real) -> str:
 
 
 def polynomial(coefficients: tuple[float, ...], real: Real) -> str:
-    """C expression in z and z2 = z^2, constant term first: pairs (Estrin), half as deep as Horner's form."""
+    """Return a C expression of a polynomial in z. The expression uses C variables z and z2 = z^2. The coefficients
+    begin with the constant term.
+
+    Terms are evaluated in pairs (Estrin's scheme), which has a dependency chain half as long as that of Horner's form.
+    """
     c = [c_number(value, real) for value in coefficients]
     pairs = [f"({' + z * '.join(c[i : i + 2])})" for i in range(0, len(c), 2)]
     text = pairs[-1]
@@ -27,13 +31,14 @@ def polynomial(coefficients: tuple[float, ...], real: Real) -> str:
 
 
 def plain_number(value: float, real: Real) -> str:
-    """A decimal C literal, for the few short ones."""
+    """Return a decimal C literal, for the few constants that are short decimal numbers."""
     return repr(value) + ("f" if real == "float" else "")
 
 
 @dataclass(frozen=True, slots=True)
 class ReductionStep:
-    """C names of one subtraction `to = of - turn`, turn = k part; its rounding error is added to `lost`."""
+    """C names for one subtraction `to = of - turn` that reduces an angle. `turn` is k, the number of quarter
+    revolutions, times `part`, a part of pi/2. The rounding error of the subtraction is added to `lost`."""
 
     to: str
     of: str
@@ -44,7 +49,8 @@ class ReductionStep:
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """C text of one precision's numbers, for the templates; integers act on the bits of a real."""
+    """The constants of the sine and cosine code for float or double, as C text. The integers are positions of bits and
+    shifts in the binary form of a real number."""
 
     two_over_pi: str
     magic: str

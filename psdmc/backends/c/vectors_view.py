@@ -1,4 +1,4 @@
-"""A package's vectors and the sines taken on them, in the form that templates print."""
+"""The SIMD vectors of a package, and the code of sines and cosines on these vectors, as data for the templates."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 @dataclass(frozen=True, slots=True)
 class VectorsView:
-    """The vectors that the C computes with, and its inline sine and cosine.
+    """The SIMD vectors of a package, and its sine and cosine code for them.
 
-    robot   identifier that every symbol starts with
-    counts  numbers of limbs that share a vector, over all kernels
+    robot   identifier with which every C name starts
+    counts  numbers of limbs (such as 4 legs) that share a vector, over all functions
     """
 
     robot: str
@@ -34,7 +34,8 @@ class VectorsView:
 
     @property
     def condition(self) -> str:
-        """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
+        """Return the C preprocessor condition under which SIMD code is compiled. The compiler must have GCC's vector
+        extension. For float, it must not compute with more digits than float has."""
         is_double = c_real(self.options) == "double"
         return HAS_VECTORS if is_double else f"{HAS_VECTORS} && {FLOATS_STAY}"
 
@@ -45,7 +46,8 @@ class VectorsView:
 
     @property
     def block_bytes(self) -> int:
-        """Bytes of one variable in a block of lanes."""
+        """Return how many bytes one entry of q, or of another array, takes in a block of states with one state per
+        lane."""
         return LANE_BLOCK_BYTES
 
     @property
@@ -55,12 +57,13 @@ class VectorsView:
 
     @property
     def preamble(self) -> TrigPreamble:
-        """What the inline sines of all widths share."""
+        """The C code that the inline sines of all vector widths share."""
         return trig_preamble(self.robot, c_real(self.options), far_of(self.options.trig))
 
     @property
     def sines(self) -> tuple[VectorTrig, ...]:
-        """The inline sincos for each vector width that vectors.h may choose, for lanes or for one state's angles."""
+        """Return the sine and cosine code for each register size that the header vectors.h may choose. The registers
+        hold one state per lane, several angles of one state, or one limb per lane."""
         units = dict.fromkeys(width.unit for width in self.widths)
         units |= dict.fromkeys(width.angles.unit for width in self.widths)
         units |= dict.fromkeys(limb_units(self.of_limbs, self.options))
@@ -75,6 +78,6 @@ class VectorsView:
 
     @property
     def sincos_types(self) -> tuple[tuple[str, str], ...]:
-        """Vectors whose sines are taken: the macro of their width, and the type."""
+        """Return the vectors whose sines are computed, as pairs: the C macro with the vector's width, and the C type."""
         limbs = ((f"{vector.macro}_WIDTH", vector.name) for vector in self.of_limbs)
         return (("WIDTH", "lanes"), ("ANGLE_WIDTH", "angles"), *limbs)

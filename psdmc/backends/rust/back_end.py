@@ -1,4 +1,4 @@
-"""The back end that writes Rust crates: no dependencies, no allocation, no unsafe code."""
+"""The back end that writes Rust crates. The crates have no dependencies, and allocate no memory; no code is unsafe."""
 
 from __future__ import annotations
 

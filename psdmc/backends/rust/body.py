@@ -1,5 +1,8 @@
-"""PROGRAM -> statements of Rust. A value that is used once stands where it is used; a product that is only added is fused
-with its sums."""
+"""Translates a PROGRAM (the list of operations to generate) to Rust statements.
+
+A value that is used once is written at its use. A product that is used once, as a term of a sum, becomes a fused
+multiply-add.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ _SYMBOL = {Op.ADD: ("+", _SUM), Op.SUB: ("-", _SUM), Op.MUL: ("*", _PRODUCT), Op
 
 
 class Text(NamedTuple):
-    """An expression, how strongly its outermost operator binds, and its depth."""
+    """Rust text of an expression, with the precedence of its outermost operator and the depth of its nested brackets."""
 
     text: str
     binding: int = _ATOM
@@ -40,7 +43,7 @@ class Text(NamedTuple):
 
 
 def place(slot: Slot, shapes: Mapping[str, Sequence[int]]) -> str:
-    """An entry of a vector: `m[1][2]`; of a scalar, its name."""
+    """Return the Rust text of one entry of a vector or matrix, such as `m[1][2]`. For a scalar, return its name."""
     index, found = slot.index, ""
     for length in reversed(shapes[slot.vector]):
         index, own = divmod(index, length)
@@ -49,7 +52,7 @@ def place(slot: Slot, shapes: Mapping[str, Sequence[int]]) -> str:
 
 
 def number(value: float) -> str:
-    """A literal that reads back as the same number."""
+    """Return a Rust literal that reads back as the same number."""
     if math.isnan(value):
         return "f64::NAN"
     if math.isinf(value):
@@ -60,7 +63,11 @@ def number(value: float) -> str:
 def statements(
     program: Program, shapes: Mapping[str, Sequence[int]], stored: Sequence[Quantity]
 ) -> list[str]:
-    """The lines that compute a PROGRAM: outputs begin as zeros, and each entry is stored when it is known."""
+    """Return the Rust statements that compute a PROGRAM (the list of operations to generate). All outputs are first set
+    to zero, and each entry is stored when its value is known.
+
+    stored  the outputs
+    """
     return [*(_declared(q.name, program, shapes) for q in stored), *_Writer(program, shapes).lines()]
 
 
@@ -73,7 +80,7 @@ def _declared(name: str, program: Program, shapes: Mapping[str, Sequence[int]]) 
 
 
 def array(shape: Sequence[int], of: str = "f64") -> str:
-    """`[[f64; 3]; 2]` of the shape (2, 3), or zeros of it; of no axes, a number."""
+    """Rust type `[[f64; 3]; 2]` for the shape (2, 3), or an expression with zeros of this type; for no axes, a number."""
     for length in reversed(shape):
         of = f"[{of}; {length}]"
     return of

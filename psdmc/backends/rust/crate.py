@@ -1,4 +1,4 @@
-"""A crate in the form that templates print, from the emission."""
+"""A Rust crate as data for the templates."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ class Constant(NamedTuple):
 
 
 class Check(NamedTuple):
-    """One output's comparison in the self-test: its label, the rows that are compared by themselves, and the call for state
-    k; `values` are None where no reference state has any."""
+    """The comparison of one output of a function in the self-test. It has the name of the output, the number of rows
+    that are compared separately, the tolerance, and the call for state k. `values` are the expected values, or None if
+    there are none."""
 
     name: str
     rows: int
@@ -52,7 +53,8 @@ class Check(NamedTuple):
 
 
 class KernelText(NamedTuple):
-    """One Rust function; `pivots` are the numbers and values to look at, in their order."""
+    """One Rust function. `pivots` is Rust text with pairs (number, value) of the pivots of a factorised matrix. The
+    function tests in the order of the pairs that the pivots are positive."""
 
     name: str
     parameters: str
@@ -90,7 +92,8 @@ class CrateView:
 
 
 def crate_view(given: Emission) -> CrateView:
-    """The crate with all decisions made; InputError where there is nothing to emit, or Rust has no form for it."""
+    """Return the data of a Rust crate for the templates. Raises InputError if there are no functions, or if an option
+    is not supported for Rust."""
     info, robot, functions = given.info, identifier(given.info.name), given.functions
     if not functions or info.l == 0:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one, of links with inertia")
@@ -233,7 +236,11 @@ def _literal(value: Any) -> str:
 
 
 def polynomial(terms: Sequence[float]) -> str:
-    """In z and z2 = z^2, constant term first: pairs (Estrin), half as deep as Horner's form."""
+    """Return a Rust expression of a polynomial in z. The expression uses Rust variables z and z2 = z^2. The
+    coefficients begin with the constant term.
+
+    Terms are evaluated in pairs (Estrin's scheme), which has a dependency chain half as long as that of Horner's form.
+    """
     *pairs, found = (f"fma(z, {b!r}, {a!r})" for a, b in zip(terms[::2], terms[1::2], strict=True))
     for pair in reversed(pairs):
         found = f"fma(z2, {found}, {pair})"

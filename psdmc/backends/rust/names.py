@@ -1,4 +1,4 @@
-"""Untrusted text on its way into Rust, and names that Rust has taken."""
+"""Conversion of untrusted text to Rust, and names that Rust reserves."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ def _is_reserved(word: str) -> bool:
 
 
 def variable(name: str) -> str:
-    """The name of a quantity or function, followed by an underscore where Rust has it for something else."""
+    """Return the Rust name of a quantity or function. An underscore is added if the name is a Rust keyword or another
+    name that the Rust code uses."""
     return f"{name}_" if name in KEYWORDS or name == "fma" else name
 
 
 def text(untrusted: str) -> str:
-    """A Rust string literal: plain ASCII stays readable, half a surrogate becomes U+FFFD."""
+    """Return a Rust string literal: plain ASCII stays readable, and an unpaired surrogate becomes U+FFFD."""
     return f'"{"".join(map(_character, untrusted))}"'
 
 
@@ -42,5 +43,6 @@ def _character(one: str) -> str:
 
 
 def comment(untrusted: str) -> str:
-    """Text as it may stand in a line of documentation: ASCII, and no backtick, which could end a block of code."""
+    """Return text that is safe in a line of Rust documentation: ASCII without backticks, which could end a block of
+    code."""
     return "".join(chr(b) if 32 <= b < 127 and b != 96 else f"<{b:02x}>" for b in utf8(untrusted))

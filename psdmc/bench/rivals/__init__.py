@@ -1,4 +1,4 @@
-"""All contestants, in the order of the tables."""
+"""The libraries that the benchmark compares, including psdmc, in the order of the printed tables."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from psdmc.errors import PsdmcError
 
 
 class Builder(Protocol):
-    """Builds one rival's contestants for a case under given compiler flags."""
+    """A function that compiles the code of one library for a robot, with the given compiler flags. It returns the
+    compiled functions, ready to be compared, and those that are not available."""
 
     def __call__(self, case: Case, flags: tuple[str, ...]) -> Sequence[Contestant | Unavailable]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A rival. counted: whether its instructions are worth counting."""
+    """A library that takes part in the benchmark. `counted` states whether the instructions of its functions are
+    counted."""
 
     name: str
     build: Builder
@@ -30,7 +32,8 @@ class Entrant:
     def contestants(
         self, case: Case, flags: tuple[str, ...] | None = None
     ) -> Sequence[Contestant | Unavailable]:
-        """Its contestants for this machine, or under other flags; or why there are none."""
+        """Return the library's functions for this robot, ready to be compared; if the library cannot be built, return
+        the reason. The functions are compiled with `flags`; None: with the flags for this machine."""
         try:
             return self.build(case, flags or native_flags())
         except (PsdmcError, OSError) as error:

@@ -1,4 +1,5 @@
-"""CasADi's C from Pinocchio's algorithms on symbols: one state a call, and one state per SIMD lane."""
+"""C code that CasADi generates from Pinocchio's algorithms, in two variants. A call of the first computes one state; a
+call of the second computes several states, one per SIMD lane."""
 
 from __future__ import annotations
 
@@ -47,7 +48,7 @@ FOURTH = frozenset(WAYS["inverse_dynamics_vjp"] + WAYS["forward_dynamics_vjp"])
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
-    """CasADi's functions for one robot."""
+    """Return CasADi's functions for one robot, compiled."""
     generated, counts = written(case)
     found: list[Contestant | Unavailable] = []
     builds = {"state": _scalar} if case.named else {"state": _scalar, "lanes": _by_lane}
@@ -86,14 +87,16 @@ def _entered(
 
 
 def written(case: Case) -> tuple[str, dict[str, tuple[int, int]]]:
-    """CasADi's C for the case, and (multiplications, additions) of its functions."""
+    """Return the C code that CasADi generates for a robot, with the numbers of (multiplications, additions) of each
+    function."""
     product = _generated(case)
     lines = (line.split() for line in product.with_suffix(".txt").read_text().splitlines())
     return product.read_text(), {name: (int(mul), int(add)) for name, mul, add in lines}
 
 
 def symbolic(case: Case) -> Any:
-    """Pinocchio's articulated bodies on CasADi's symbols for the case: a casadi.Function (q, qd, tau) -> qdd."""
+    """Return Pinocchio's articulated-body algorithm as a casadi.Function (q, qd, tau) -> qdd. It was evaluated with
+    CasADi's symbols in place of numbers."""
     import casadi
 
     return casadi.Function.load(str(_generated(case).with_suffix(".casadi")))

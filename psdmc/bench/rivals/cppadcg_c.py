@@ -1,4 +1,5 @@
-"""CppADCodeGen's C from Pinocchio's algorithms recorded by CppAD: the way of Pinocchio's own code generation."""
+"""C code that CppADCodeGen generates. CppAD records the operations of Pinocchio's algorithms, as in Pinocchio's own
+code generation, and CppADCodeGen writes these operations as C."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ WAYS = {
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
-    """CppADCodeGen's functions for one robot; ToolchainError where its wheel is missing."""
+    """Return CppADCodeGen's functions for one robot, compiled. Raise ToolchainError if its wheel is missing."""
     ways_by_function = ways_of(case, WAYS)
     every = [way for ways in ways_by_function.values() for way in ways]
     library = _library(written(case), every, flags)

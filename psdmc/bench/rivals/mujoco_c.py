@@ -1,4 +1,4 @@
-"""MuJoCo's own inverse dynamics in C, from the wheel's library."""
+"""MuJoCo's inverse dynamics, called in C from the library in its wheel."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ OTHER_BIAS = "a free root's rates are along the world's axes there, which makes 
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
-    """MuJoCo's functions for one robot; armature is no part of its Newton-Euler, so drive inertia is refused."""
+    """Return MuJoCo's functions for one robot. A robot with drive inertia (motors and gears) is refused, because
+    MuJoCo's Newton-Euler recursion leaves drive inertia out. A robot with a link without mass is refused, too."""
     if case.has_drive_inertia:
         return [Unavailable(RIVAL, "its mj_rne leaves drive inertia out")]
     if np.any(case.chain.parameters[:, 0] <= 0.0):
@@ -70,9 +71,9 @@ def _mujoco() -> Path:
 
 
 def mjcf(chain: Mechanism) -> str:
-    """The chain as MuJoCo's XML: one body a joint, its frame psdmc's joint frame, its joint about z or free.
+    """Return the robot as MuJoCo's XML, with one body per joint. Each body's frame is psdmc's joint frame.
 
-    InputError where MuJoCo has no such joint, or a free one elsewhere than psdmc.
+    Raise InputError if MuJoCo has no such joint, or allows a free joint only at another place in the tree.
     """
     refuse_unlike(chain)
     _refuse_moved_root(chain)
@@ -115,7 +116,7 @@ def _add_inertia(body: ElementTree.Element, x: Array) -> None:
 
 
 def quaternion(rotation: Array) -> Array:
-    """(4,) unit quaternion w x y z of a rotation, from the largest of its four squares (Shepperd 1978)."""
+    """Return the (4,) unit quaternion w x y z of a rotation, from the largest of its four squares (Shepperd 1978)."""
     m = rotation
     squares = np.array([np.trace(m), m[0, 0], m[1, 1], m[2, 2]])
     k = int(np.argmax(squares))

@@ -1,4 +1,5 @@
-"""Pinocchio's C++: linked to the wheel's library as users get it, and header-only with this machine's instructions."""
+"""Pinocchio in C++ in two builds. One is linked to the library of the Python wheel, as users have it; the other is
+compiled from the headers alone for this processor."""
 
 from __future__ import annotations
 
@@ -51,12 +52,12 @@ INSTANTIATED = "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION"
 
 
 def library(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
-    """Pinocchio as its users have it: the wheel's own library."""
+    """Return Pinocchio's functions for one robot, linked to the library in the wheel, as most users have it."""
     return contestants(case, "Pinocchio", compiled("library", flags))
 
 
 def header_only(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
-    """Pinocchio compiled whole with this machine's instructions, as far as it goes."""
+    """Return Pinocchio's functions for one robot, compiled from its headers with all instructions of this processor."""
     return contestants(case, "Pinocchio header-only", compiled("header-only", flags))
 
 
@@ -82,10 +83,13 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
 
 
 def ways_of(case: Case, ways: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """By function those ways that compute what psdmc computes for this robot.
+    """Return, by function, the algorithms of a library that compute what psdmc computes for this robot.
 
-    Where joints have several coordinates, a derivative by q is by rates of change; a tool that differentiates C finds one
-    by coordinates.
+    ways  the algorithms of the library by function
+
+    Some tools differentiate C code by the entries of q, but psdmc differentiates by rates. Both derivatives differ for
+    joints with several coordinates, such as a floating base. For such a robot, the algorithms of these tools are left
+    out.
     """
     return {
         function: tuple(way for way in ways[function] if not (case.is_wide and way.endswith(BY_COORDINATES)))
@@ -99,30 +103,34 @@ BY_COORDINATES = ("_jacobian", "_vjp", "_vjp_aba", "_vjp_ldl")
 
 
 def variant_of(symbol: str, function: str) -> str:
-    """The way in which a symbol computes its function: what its name has beyond the function's."""
+    """Return the name of an algorithm for tables. It is the part of the C function's name that does not occur in the
+    name of psdmc's function."""
     return symbol.removeprefix(function).strip("_").upper()
 
 
 def outputs_of(case: Case, function: str) -> int:
-    """Numbers per state that a rival puts out: as many as psdmc, except with standard parameters in place of base
-    parameters."""
+    """Return the number of output values per state for a function of another library. It equals the number for psdmc
+    except for regressors, which have ten columns for each body instead of one for each base parameter."""
     return 10 * case.n * case.chain.nv if function == "regressor" else sum(output_sizes(function, case.sizes))
 
 
 def is_comparable(case: Case, function: str) -> bool:
-    """Whether a rival's function computes what psdmc's does for this robot."""
+    """Return whether another library's function computes the same result as psdmc's for this robot. A regressor does
+    not if the robot has drive inertia."""
     return function != "regressor" or not case.has_drive_inertia
 
 
 def incomparable(case: Case, rival: str) -> list[Unavailable]:
-    """The functions that are left out for this robot, with the reason."""
+    """Return the functions of a library that are left out for this robot because they compute something else, with the
+    reason."""
     if not case.has_drive_inertia:
         return []
     return [Unavailable(f"{rival}, regressor", "it has no columns for drive inertia, which this robot has")]
 
 
 def compiled(way: Way, flags: tuple[str, ...]) -> Path:
-    """The shared library around Pinocchio's algorithms; ToolchainError says what is missing."""
+    """Compile the C++ functions that call Pinocchio. Return the shared library, or raise ToolchainError with what is
+    missing."""
     prefix = pinocchio_prefix()
     link = _library_flags(prefix) if way == "library" else ()
     # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: they cannot be mixed.
@@ -139,8 +147,8 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
 
 @lru_cache
 def pinocchio_prefix() -> Path:
-    """The folder in which the pin wheel keeps headers and libraries; ToolchainError where they, or Eigen's, are not
-    installed."""
+    """Return the folder in which Pinocchio's wheel has its headers and libraries. Raise ToolchainError if they, or
+    Eigen's headers, are missing."""
     found = find_spec("pinocchio")
     if found is None or found.origin is None:
         raise ToolchainError("the wheel 'pin' is not installed", "pip install pin")
@@ -157,7 +165,7 @@ def pinocchio_prefix() -> Path:
 
 
 def includes(prefix: Path) -> tuple[str, ...]:
-    """Compiler options for the headers of the wheels installed at `prefix`."""
+    """Return the compiler options for the headers of the wheels that are installed at `prefix`."""
     return ("-isystem", str(prefix / "include"), "-isystem", str(prefix / "include/eigen3"))
 
 
@@ -173,6 +181,7 @@ def _library_flags(prefix: Path) -> tuple[str, ...]:
 
 
 def standard_parameters(case: Case) -> Array:
-    """(10 n,) about the joint frames: what Pinocchio's regressor multiplies to give torques."""
+    """Return the vector (10 n,) of standard parameters of the n bodies, each about its joint frame. Pinocchio's
+    regressor times this vector gives the torques."""
     pairs = zip(case.chain.joints, case.chain.parameters, strict=True)
     return np.concatenate([joint_frame_map(joint.link_frame) @ row[:DRIVE] for joint, row in pairs])

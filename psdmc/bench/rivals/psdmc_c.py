@@ -1,4 +1,4 @@
-"""psdmc's own libraries: the compiled package, called by the same loops as every rival."""
+"""psdmc's own C packages. The benchmark calls their functions in the loops that call the functions of other libraries."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailabl
 def contestants(
     case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...]
 ) -> list[Contestant]:
-    """psdmc's functions for one robot: one state a call, rows, and lane by lane."""
+    """Return psdmc's functions for one robot in three memory layouts. The layouts are one state per call, many states
+    one after the other (rows), and blocks with one state per SIMD lane."""
     kernels = kernels_of(case.model, lowering, tuple(functions))
     package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
     library = compiled(package, flags)
@@ -76,7 +77,8 @@ def contestants(
 
 @lru_cache(maxsize=2)
 def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
-    """Kernels, lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
+    """Return the kernels (variants of generated functions) of a robot. They are computed once for all compiler flags,
+    because this takes longer than compiling."""
     return lower(model, lowering, functions, theta_variants=False)
 
 
@@ -112,7 +114,7 @@ def _ways(
 
 
 def compiled(package: PackageView, flags: tuple[str, ...]) -> Path:
-    """The package as a shared library behind the loops; ToolchainError where it does not compile."""
+    """Compile the C package and the loops into a shared library. Raise ToolchainError if that fails."""
     files = library_files(package)
     robot = package.robot
     home = _library(files, package.sources, robot, flags)
@@ -145,7 +147,7 @@ def _library(files: dict[str, str], sources: tuple[str, ...], robot: str, flags:
 
 
 def glue(package: PackageView) -> str:
-    """C++ that connects the package's functions with the loops."""
+    """Return C++ code with one timing loop for each function of a package, in each memory layout."""
     lines = ['#include "loops.hpp"', '#include "library.h"']
     for view in package.functions:
         symbol, given = f"{package.robot}_{view.name}", _given(view.signature)

@@ -1,4 +1,5 @@
-"""The extra columns of a fit, from the tables of a description: [[springs]] and [friction]."""
+"""Springs and further friction of a fit, from the tables [[springs]] and [friction] of a log description. Each of their
+unknown values, such as a stiffness, adds one column to the linear least-squares problem."""
 
 from __future__ import annotations
 
@@ -29,10 +30,12 @@ HINT = "docs/how-to/springs-and-friction.md describes these tables"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """The effects of a fit beside rigid bodies and plain friction.
+    """The effects on torques, such as springs, that a fit has in addition to rigid bodies and plain joint friction.
 
-    content        the tables that they were read from, plain values
-    plain_offsets  whether plain friction has offsets where it would; False: some joints' are among the effects, or none's
+    effects        the effects, each with unknown values
+    content        the tables of the log description from which the effects were read, as plain values
+    plain_offsets  False: the plain friction of joints has no constant torques, because some joints have one among these
+                   effects, or no joint has one
     """
 
     effects: tuple[Effect, ...] = ()
@@ -48,12 +51,12 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """For messages."""
+        """Names of the values, for messages."""
         return tuple(f"{unknown.name} of {unknown.owner}" for unknown in self.unknowns)
 
     @property
     def of_springs(self) -> NDArray[np.bool_]:
-        """(m,) whether a value is a spring's; the others are joints'."""
+        """Return, for each of the m unknown values, whether it belongs to a spring. The other values belong to joints."""
         own = [[isinstance(effect, Spring)] * len(effect.unknowns) for effect in self.effects]
         return np.array([is_own for each in own for is_own in each], dtype=bool)
 
@@ -67,17 +70,19 @@ class Columns:
 
     @property
     def start(self) -> Array:
-        """(m,) values that are kept where the data do not show them."""
+        """Return the m values that the unknowns keep if the data do not determine them."""
         return np.array([unknown.start for unknown in self.unknowns])
 
     def values(self, motion: Motion) -> Array:
-        """(N, n, m) motor torque per unit of each unknown, before any filter."""
+        """Return the motor torques per unit of each unknown value, before any filter: an array (N samples, n joints, m
+        values)."""
         if not self.effects:
             return np.zeros((*motion.q.shape, 0))
         return np.concatenate([effect.columns(motion) for effect in self.effects], axis=2)
 
     def without_load(self) -> Columns:
-        """Those that do not depend on the rigid bodies' torque."""
+        """Return the effects that remain when those are left out whose friction depends on the torque of the rigid
+        bodies."""
         kept = tuple(effect for effect in self.effects if not effect.by_load)
         return replace(self, effects=kept)
 
@@ -89,13 +94,15 @@ def read_columns(
     offsets: bool = True,
     folder: Path | None = None,
 ) -> Columns:
-    """The columns of a description's tables `springs` and `friction`; other keys are not looked at.
+    """Return springs and further friction from the tables `springs` and `friction` of a log description. Other tables
+    are ignored.
 
-    where    the file, for messages
-    offsets  whether plain friction has offsets unless the tables say otherwise
-    folder   of the Python files of users' own friction laws; None: no file is run, as for a model file's content
+    where    name of the log description, for messages
+    offsets  whether plain friction has a constant torque for each joint, unless the tables say otherwise
+    folder   folder of the Python files with users' own friction laws; None: no such file is run, for example when the
+             tables come from a model file
 
-    InputError with the first faults.
+    Raises InputError with the first faults.
     """
     faults: list[str] = []
     springs = _springs(content.get("springs", []), chain, faults)

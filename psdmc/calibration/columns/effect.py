@@ -1,4 +1,5 @@
-"""An effect beside rigid bodies and plain friction: unknown values, and the torque that a unit of each takes."""
+"""An effect on motor torques that a fit has in addition to rigid bodies and plain friction, such as a spring. It
+consists of unknown values, and of the torque per unit of each value."""
 
 from __future__ import annotations
 
@@ -13,11 +14,12 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One value to be found, of a joint or of a spring, its owner.
+    """One unknown value of a joint or of a spring in a fit, such as a stiffness.
 
-    never_negative  whether only values from zero on are possible: friction takes energy, a gas spring pushes
-    within          name of another value of the same owner that its size may not exceed; "": none
-    start           where the data do not show it
+    owner           name of the joint or spring
+    never_negative  whether the value may not be negative, as for friction and for the force of a gas spring
+    within          name of another unknown of this owner, which the magnitude of this unknown may not exceed; "": none
+    start           the result if the data do not determine the value
     """
 
     owner: str
@@ -30,13 +32,16 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Rows of a motion. N rows, n joints.
+    """N samples of a motion of n joints, from which the torques of springs and friction are computed.
 
-    q, qd         (N, n)  rad, rad/s (m, m/s)
-    place, speed  (N, n)  of what rubs: the joints', or where motors drive several joints, the motors'
-    sign_speed    rad/s over which friction changes sign: tanh(speed / sign_speed)
-    load          (N, n)  torque of the rigid bodies on what rubs, N m (N); None where no effect asks for it
-    onto          (n, n)  torques of what rubs @ onto are the joints'; None: they are these themselves
+    q, qd       (N, n)  rad, rad/s (m, m/s) of the joints
+    place       (N, n)  positions of the parts that have friction: the joints, or the motors if several motors drive a
+                        joint
+    speed       (N, n)  speeds of the parts that have friction
+    sign_speed  rad/s over which friction changes sign: tanh(speed / sign_speed)
+    load        (N, n)  torque of the rigid bodies on the parts that have friction, N m (N); None if no friction depends
+                        on it
+    onto        (n, n)  joint torques are friction torques @ onto; None: friction torques are joint torques already
     """
 
     q: Array
@@ -49,28 +54,32 @@ class Motion:
 
 
 class Effect(Protocol):
-    """What one entry of a description adds to the torque of the motors: the sum over unknowns of value times column."""
+    """What one entry of a log description, such as a spring, adds to the motor torques. It is a sum of unknown values,
+    each times the torque per unit of the value."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]: ...
 
     @property
     def by_load(self) -> bool:
-        """Whether its columns depend on the torque of the rigid bodies."""
+        """Return whether the effect depends on the torque of the rigid bodies, as for friction that grows with the
+        load."""
         ...
 
     def columns(self, motion: Motion) -> Array:
-        """(N, n, unknowns) motor torque per unit of each, before any filter."""
+        """Return the motor torques per unit of each unknown value, before any filter: an array (N samples, n joints,
+        unknown values)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of spring: the file that it has in `kinds`.
+    """One kind of spring, which has a file in the folder `kinds`.
 
-    name  the `kind` of a [[springs]] entry
-    keys  of the entry, beside `kind` and `name`
-    read  the effects of an entry: from its table and the robot. Faults go to the table's
+    name  the `kind` in an entry [[springs]]
+    keys  keys that the entry may have in addition to `kind` and `name`
+    read  function that returns the effects on torques of an entry, from its table and the robot. The function adds a
+          text about each fault of the entry to the list `faults` of the table
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Keys of a description's effects that several kinds read: yes or no, one joint, some joints."""
+"""Reads keys that several effects of a log description have: true or false, the name of one joint, or several joints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from psdmc.robot.mechanism import Mechanism
 
 
 def flag(table: TomlTable, key: str) -> bool:
-    """true or false; false where it is missing."""
+    """Return the value of a key, true or false; false if the key is missing. If the value is something else, a text is
+    added to the list of faults, and false is returned."""
     value = table.content.get(key, False)
     if not isinstance(value, bool):
         table.faults.append(f"{table.where}: {key}: found {shown(value)}, expected true or false")
@@ -17,7 +18,8 @@ def flag(table: TomlTable, key: str) -> bool:
 
 
 def joint_of(table: TomlTable, chain: Mechanism) -> int:
-    """The joint that `joint` names; a fault where there is none."""
+    """Return the index of the joint that the key `joint` names. If the robot has no such joint, a text is added to the
+    list of faults, and 0 is returned."""
     name = table.text("joint")
     if name in chain.joint_names:
         return chain.joint_names.index(name)
@@ -29,7 +31,8 @@ def joint_of(table: TomlTable, chain: Mechanism) -> int:
 
 
 def joints_of(value: object, where: str, chain: Mechanism, faults: list[str]) -> tuple[int, ...]:
-    """The joints that a value means: true all, false none, a list of names those."""
+    """Return the indices of the joints that a value of a log description selects. The value true selects all joints,
+    false none, and a list selects joints by name. A text is added to `faults` if the value is wrong."""
     if isinstance(value, bool):
         return tuple(range(len(chain))) if value else ()
     if not isinstance(value, list) or any(not isinstance(name, str) for name in value):

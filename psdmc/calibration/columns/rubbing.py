@@ -1,4 +1,5 @@
-"""Friction of single joints by terms of friction laws."""
+"""Friction of single joints as effects of a fit. The friction torque is a sum of terms of friction laws, such as
+Coulomb and viscous friction."""
 
 from __future__ import annotations
 
@@ -15,7 +16,11 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbing:
-    """Terms, each of one joint, and all their values one after the other."""
+    """The friction of some joints as an effect of a fit.
+
+    terms     terms of friction laws, each with the index of its joint
+    unknowns  the unknown values of all terms, term after term
+    """
 
     terms: tuple[tuple[int, Term], ...]
     unknowns: tuple[Unknown, ...]
@@ -38,7 +43,8 @@ class Rubbing:
 
 
 def rubbing(terms: Sequence[tuple[int, Term]], chain: Mechanism) -> Rubbing:
-    """The effect of terms, each of one joint."""
+    """Return the friction of some joints as an effect of a fit. `terms` are terms of friction laws, each with the index
+    of its joint."""
     unknowns = [
         Unknown(chain.joint_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
         for joint, term in terms

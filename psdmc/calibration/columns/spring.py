@@ -1,4 +1,5 @@
-"""A spring along a way: a force at a reference length, a rate, and friction of its rod."""
+"""The torques of a spring in a fit. The unknown values are the tension at a reference length, the stiffness, and the
+friction of the spring's rod."""
 
 from __future__ import annotations
 
@@ -16,22 +17,23 @@ SLIDING = 0.01
 
 
 def pull(length: Array, rate: Array, reference: float) -> Array:
-    """A force that shortens the spring."""
+    """Return the tension per unit of an unknown constant force that shortens the spring: one at every sample."""
     return np.ones_like(length)
 
 
 def push(length: Array, rate: Array, reference: float) -> Array:
-    """A force that lengthens it."""
+    """Return the tension per unit of an unknown constant force that lengthens the spring: minus one at every sample."""
     return -np.ones_like(length)
 
 
 def stretch(length: Array, rate: Array, reference: float) -> Array:
-    """A force that grows with the length, shortening it; equally one that pushes and grows as it is shortened."""
+    """Return the tension per unit of stiffness: the length of the spring minus the reference length, at every sample."""
     return length - reference
 
 
 def rub(length: Array, rate: Array, reference: float) -> Array:
-    """Friction of the rod against its motion."""
+    """Return the tension per unit of rod friction, which acts against the motion of the rod. It is about one while the
+    spring becomes longer, minus one while it becomes shorter."""
     return np.asarray(np.tanh(rate / SLIDING))
 
 
@@ -41,10 +43,13 @@ Law = Callable[[Array, Array, float], Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spring:
-    """The tension is the sum over laws of value times law, and the motors hold against it: tau = tension * d length / dq.
+    """A spring in a fit. Its tension is a sum of unknown values, each times a law. The motors balance the spring with
+    the joint torques tau = tension * d length / dq.
 
-    laws       one for each unknown
-    reference  m (rad), where `force` is the whole tension
+    unknowns   the unknown values, such as the stiffness
+    laws       for each unknown value, the function that returns the tension per unit
+    way        function of the joint positions that returns the length of the spring
+    reference  m (rad), the length at which `force` is the whole tension
     """
 
     unknowns: tuple[Unknown, ...]

@@ -1,5 +1,5 @@
-"""What a spring's length is, as a function of the joints: a line between two points of two bodies, or a sum of joint
-coordinates."""
+"""Computes the length of a spring from the joint positions. The length is the distance between points of two links, or
+a sum of joint coordinates."""
 
 from __future__ import annotations
 
@@ -28,22 +28,26 @@ LEAST_CHANGE = 1e-6
 
 
 class Way(Protocol):
-    """A length s of the joints' positions, and its slopes.
+    """A length that depends on the joint positions, such as that of a spring, with its derivatives.
 
-    unit  of the length: m or rad
+    unit  unit of the length: m or rad
     """
 
     @property
     def unit(self) -> str: ...
 
     def length(self, q: Array) -> tuple[Array, Array]:
-        """(N,) length and (N, n) its slopes, of positions (N, n)."""
+        """Return the lengths (N,) at N vectors of positions q (N, n joints), and their derivatives by q (N, n)."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BetweenAnchors:
-    """The distance of two points, each fixed to a body; points (3,) in the body's joint frame, or the base frame."""
+    """The distance between two points, each of which is fixed to a body or to the base.
+
+    bodies  the two bodies
+    points  (3,) each, m: in the joint frame of the body, or in the base frame
+    """
 
     chain: Mechanism
     bodies: tuple[int, int]
@@ -74,7 +78,8 @@ class BetweenAnchors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlongJoints:
-    """The sum of joint positions times ratios (n,): a cable over pulleys, or one joint itself."""
+    """A length that is the sum of the joint positions times `ratios` (n,), one for each of n joints. It describes a
+    cable over pulleys, or a spring on one joint."""
 
     ratios: Array
     unit: str
@@ -84,8 +89,9 @@ class AlongJoints:
 
 
 def anchored_way(table: TomlTable, chain: Mechanism) -> Way:
-    """The way between `from` and `to`, each { link, point } with the point (m) in the link's frame as the robot's file has
-    it; faults where there is none."""
+    """Return the distance between the two points that the keys `from` and `to` of a table define. Both are { link,
+    point }, with the point (m) in the link's frame of the robot file. Faults are added to the list `faults` of the
+    table."""
     ends = [_anchor(table, key, chain) for key in ("from", "to")]
     way = BetweenAnchors(chain, (ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]))
     if not table.faults:
@@ -128,7 +134,8 @@ def _require_line(way: BetweenAnchors, table: TomlTable, chain: Mechanism) -> No
 
 
 def jointed_way(table: TomlTable, chain: Mechanism) -> Way:
-    """The way along `joints`, a table of joint names with the length that each gives per unit of its position."""
+    """Return the length that the key `joints` of a table defines. This key holds joint names, each with the change of
+    length per unit of the joint's position. Faults are added to the list `faults` of the table."""
     value = table.content.get("joints")
     given = value if isinstance(value, dict) else {}
     if not given:
@@ -147,7 +154,8 @@ def jointed_way(table: TomlTable, chain: Mechanism) -> Way:
 
 
 def poses(chain: Mechanism) -> Array:
-    """(STATES, n) random positions within the limits, half a turn or half a metre where there are none."""
+    """Return random joint positions (STATES, n joints) within the limits of the joints. Positions do not exceed plus or
+    minus half a revolution (half a metre)."""
     rng = np.random.default_rng(SEED)
     wide = np.array([np.pi if joint.type.position_unit == "rad" else 0.5 for joint in chain.joints])
     lower = np.maximum([joint.limits.lower for joint in chain.joints], -wide)

@@ -1,4 +1,4 @@
-"""Which column of a file is which joint's quantity, and the numbers that make SI units of it."""
+"""Finds the columns of a log file that contain the quantities of each joint, and the factors to SI units."""
 
 from __future__ import annotations
 
@@ -43,11 +43,14 @@ USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A column: SI value = factor * (number - zero).
+    """A column of a log file that holds one quantity of one joint. The SI value is factor * (number in the column -
+    zero).
 
-    table, place  of the column: name of the table, and place from 0
-    says          what its unit says of the joint
-    entry         what was said of it
+    table   name of the table that has the column
+    place   index of the column from 0
+    says    what the column's unit implies about the joint: that it rotates or slides, or nothing
+    delay   s by which the column lags behind the time column
+    entry   the entry of the log description about the column
     """
 
     table: str
@@ -62,7 +65,7 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class JointColumns:
-    """Columns of a joint; velocity is None where the log has none."""
+    """The columns of one joint; velocity is None if the log has none."""
 
     name: str
     position: Found
@@ -73,7 +76,8 @@ class JointColumns:
 def joint_columns(
     description: LogDescription, joint_names: Sequence[str], tables: Mapping[str, Columns]
 ) -> tuple[JointColumns, ...]:
-    """The columns of every joint of the model, in its order; InputError where one is missing or ambiguous."""
+    """Return the log columns of every joint, in the order of the model's joints. Raises InputError if a column is
+    missing or ambiguous."""
     said = {joint.name: joint for joint in description.part(JOINTS)}
     found = []
     for name in joint_names:
@@ -102,7 +106,8 @@ def _found(joint: JointEntry, what: What, entry: Entry, tables: Mapping[str, Col
 
 
 def replace_unit(entry: Entry, unit: str) -> Entry:
-    """The entry with this unit; without one where it is empty."""
+    """Return a copy of the entry with the unit `unit`. Fields about encoder ticks or currents that contradict this unit
+    are dropped. If `unit` is empty, the entry is returned unchanged."""
     return Entry(unit=unit or None).over(entry)
 
 
@@ -152,7 +157,7 @@ def _usual(
 def place_of(
     column: str | int, table: str | None, tables: Mapping[str, Columns], where: str
 ) -> tuple[str, int]:
-    """Table and place (from 0) of a column by its name or number."""
+    """Return the table of a log and the index (from 0) of a column, from the name or number of the column."""
     if table is not None and table not in tables:
         known = f"expected one of {listed([quoted(t) for t in tables])}"
         said = known if tuple(tables) != ("",) else "but its log is one file: expected none"

@@ -1,6 +1,7 @@
-"""A log description (log.toml): what the columns of a user's logs are, and how they are to be fitted.
+"""A log description (log.toml): the file says what the columns of a user's logs are, and how to fit them.
 
-Each top-level key is a Table with a file of its own; `tables.TABLES` lists them.
+Each top-level key of the file is described by an object of the class Table in a separate module; `tables.TABLES` lists
+these objects.
 """
 
 from __future__ import annotations
@@ -23,30 +24,31 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogDescription:
-    """A description's tables by key.
+    """The content of a log description (log.toml), by top-level key.
 
-    path   of its file, for messages
-    parts  by key, of the tables that the file has
+    path   path of the file, for messages
+    parts  the value of each key that the file has
     """
 
     path: Path
     parts: Mapping[str, object]
 
     def part(self, table: Table[T]) -> T:
-        """What the file says of a table; its default where it says nothing."""
+        """Return the value of a top-level key in the file, or the default of this key if the file does not have it."""
         return cast(T, self.parts.get(table.key, table.default))
 
     def options(self, options: LinearOptions) -> LinearOptions:
-        """The linear fit's options with what all tables say."""
+        """Return the options of the linear fit, changed by the entries of the log description."""
         for table in TABLES:
             options = table.options(options, self.part(table))
         return replace(options, tables_from=str(self.path))
 
 
 def read_description(path: str | Path, joint_names: tuple[str, ...] | None = None) -> LogDescription:
-    """A description from its file; InputError names the table and key that is wrong, and what is expected.
+    """Return the content of a log description. Raises InputError with the wrong table and key, and with what is
+    expected.
 
-    joint_names  of the model; None: names of joints are not checked
+    joint_names  joints of the model; None: names of joints are not checked
     """
     path = Path(path)
     return description_of(read_toml(path, WHAT), path, joint_names)
@@ -55,7 +57,7 @@ def read_description(path: str | Path, joint_names: tuple[str, ...] | None = Non
 def description_of(
     content: Mapping[str, Any], path: Path, joint_names: tuple[str, ...] | None = None
 ) -> LogDescription:
-    """A description from the content of its TOML file."""
+    """Return a log description from the content of its TOML file."""
     faults: list[str] = []
     TomlTable(content, "description", tuple(table.key for table in TABLES), faults)
     reading = Reading(path.parent, joint_names, faults)
@@ -67,7 +69,8 @@ def description_of(
 
 
 def is_description(path: Path) -> bool:
-    """Whether a path names a log description: a .toml file with [[log]] and no [[run]], as a campaign has."""
+    """Return whether a path names a log description: a .toml file with [[log]] but without [[run]], which campaigns
+    have."""
     if path.suffix.lower() != ".toml":
         return False
     content = read_toml(path, "a log description or a campaign (.toml)")

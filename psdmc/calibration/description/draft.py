@@ -1,4 +1,4 @@
-"""The first draft of a log description, from the logs themselves: `psdmc calibrate --describe`."""
+"""Drafts a log description from the logs themselves, for `psdmc calibrate --describe`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ KEYS = (
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """The text of a description, and joints with their quantities for which no column was found, in words."""
+    """The text of a log description, and the joints with quantities for which no column was found, in words."""
 
     text: str
     missing: tuple[str, ...]
@@ -49,11 +49,12 @@ class Draft:
 def drafted(
     paths: Sequence[Path], output: Path, joint_names: tuple[str, ...] | None, topic: str = ""
 ) -> Draft:
-    """The description of logs of one form, which `output` is to hold; columns are guessed from the first.
+    """Return the draft of a log description that will be written to `output`, for logs with equal columns. The meaning
+    of the columns is guessed from the first log.
 
-    joint_names  of the model; None: the log's own names
+    joint_names  joints of the model; None: the names in the log
 
-    InputError where a log cannot be read.
+    Raises InputError if a log cannot be read.
     """
     with format_of(paths[0]).columns(paths[0], Opening(topic=topic)) as columns:
         guess = guessed(columns.names, columns.width, joint_names)
@@ -82,12 +83,13 @@ def drafted(
 
 
 def toml_text(text: str) -> str:
-    """A TOML string: JSON's escapes are TOML's, except that TOML also requires one for DEL."""
+    """Return a text in TOML's quotes. TOML has the escapes of JSON, and also requires one for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def quoted_word(text: str) -> str:
-    """A file's name in a comment: as it is where it is printable."""
+    """Return the name of a file as text for a TOML comment. The name is unchanged if all its characters are printable,
+    else it is quoted and escaped."""
     return text if text.isprintable() else quoted(text)
 
 
@@ -252,8 +254,13 @@ TIMES = (
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """Places of columns (from 0). time: None where none looks like it; joints: by name, in the model's order where it is
-    known, else in the log's; `by_number` where nothing but the number of columns told."""
+    """A guess which columns of a log hold which quantities, as indices from 0.
+
+    time       column of time; None if no column resembles time
+    joints     columns by joint name, in the order of the model if it is known, else of the log
+    by_number  True: the names of the columns gave no hint, and the guess follows only from the number of columns
+    other      columns without a guess
+    """
 
     time: int | None
     joints: Mapping[str, Mapping[What, int]]
@@ -262,7 +269,7 @@ class Guess:
 
 
 def guessed(names: Sequence[str], width: int, joint_names: Sequence[str] | None) -> Guess:
-    """What the columns look like; joints that the model has and no column was found for have no places."""
+    """Return a guess which columns belong to which joints. Joints of the model without a column have no entries."""
     if not names:
         return _by_number(width, joint_names)
     time = next((k for word in TIMES for k, name in enumerate(names) if _plain(name) == word), None)
@@ -379,7 +386,12 @@ TIME_PERIODS = (("ns", 1e5), ("us", 100.0), ("ms", 0.9))
 
 
 def unit_of(what: What, names: Sequence[str], values: Array) -> str:
-    """A unit of a quantity's columns (N, n); positions beyond a turn are in degrees where their names say nothing."""
+    """Return a guessed unit for the columns `values` (N samples, n joints) of a position, velocity or effort. If the
+    names of the columns state a unit, it is returned.
+
+    Otherwise, efforts are taken for N m and velocities for rad/s. Positions are taken for rad if they stay within 1.1
+    revolutions, else for degrees.
+    """
     spelled = spelled_unit(what, names)
     if spelled:
         return spelled
@@ -392,7 +404,7 @@ def unit_of(what: What, names: Sequence[str], values: Array) -> str:
 
 
 def spelled_unit(what: What, names: Sequence[str]) -> str:
-    """The unit that the columns' names state; empty where they do not."""
+    """Return the unit that the names of the columns state; empty if they state none."""
     for name in names:
         prefix = name.partition(".")[0]
         if prefix in USUAL[what]:
@@ -405,7 +417,8 @@ def spelled_unit(what: What, names: Sequence[str]) -> str:
 
 
 def velocity_unit(time: Array, position: Array, velocity: Array) -> str:
-    """The unit in which velocities (N, n) are the slopes of positions (N, n) in rad; empty where none fits."""
+    """Return the unit in which the velocities (N, n) are the slopes of the positions (N, n) in rad; empty if no unit
+    fits."""
     if len(time) < 3 or not np.all(np.diff(time) > 0):
         return ""
     slope = np.gradient(position, time, axis=0)
@@ -420,7 +433,7 @@ def velocity_unit(time: Array, position: Array, velocity: Array) -> str:
 
 
 def time_unit(time: Array) -> str:
-    """s, ms, us or ns, from the median period."""
+    """Return the guessed unit of time, s, ms, us or ns, from the median period."""
     if len(time) < 2:
         return "s"
     period = float(np.median(np.diff(time)))

@@ -1,4 +1,4 @@
-"""What the effort columns of a description hold together: currents, or torques into which currents are turned."""
+"""Decides whether the effort columns of a log description give currents or torques."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ from psdmc.calibration.logs.wording import listed, quoted
 
 
 def held_quantity(efforts: Sequence[tuple[str, Found]], coupled: bool) -> Quantity:
-    """The quantity of a log whose joints have these efforts. Currents stay currents where all joints have them and no
-    coupling mixes them; InputError where torques of two kinds would mix, or a torque constant is missing for it."""
+    """Return the quantity (current, motor torque or joint torque) that a log holds in memory, from the effort columns
+    of its joints.
+
+    Currents remain currents if all joints have currents and no joint is driven by several motors. Otherwise, currents
+    are converted to torques. Raises InputError if torques of two kinds would mix, or if a torque constant is missing.
+    """
     _require_motor_torques(efforts)
     held = {found.quantity for _, found in efforts}
     if held == {"current"} and not coupled:
@@ -68,14 +72,15 @@ def _require_known_gears(efforts: Sequence[tuple[str, Found]]) -> None:
 
 
 def torque_factor(found: Found, quantity: Quantity) -> float:
-    """What turns a column into the log's quantity: torque per ampere at the joint where currents become torques."""
+    """Return the factor by which an effort column is multiplied. It is the torque per ampere at the joint if the column
+    holds currents and `quantity` is a torque; else 1."""
     if found.quantity != "current" or quantity == "current":
         return 1.0
     return (found.entry.torque_constant or 1.0) * (found.entry.gear_ratio or 1.0)
 
 
 def torque_constants(description: LogDescription, joint_names: Sequence[str]) -> dict[str, float]:
-    """N m/A at the joint, gear included, of the joints for which the description says one."""
+    """Return the torque constants, N m/A at the joint (after the gear), that the description gives, by joint."""
     said = {joint.name: joint.effort for joint in description.part(JOINTS)}
     usual = description.part(EFFORT)
     entries = {name: said[name].over(usual) if name in said else usual for name in joint_names}

@@ -1,4 +1,4 @@
-"""The logs that a description describes, in SI units and by the model's joints."""
+"""Reads the logs of a log description, in SI units and in the order of the model's joints."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def described_logs(
     progress: Progress = lambda step: None,
     held: int = HELD_BYTES,
 ) -> tuple[AnyLog, ...]:
-    """All logs of a description, their joints in the order of these names.
+    """Return all logs of a log description, with the joints in the order of `joint_names`.
 
-    held   bytes of a log's rows in memory; more go to a temporary file
+    held   largest number of bytes of one log's rows in memory; larger logs go to a temporary file
 
-    Raises InputError, with the description's name first, where a file is missing or is not what the description says.
+    Raises InputError, which begins with the description's name, if a file is missing or does not match the description.
     """
     found = []
     for entry in description.part(LOGS):
@@ -187,10 +187,15 @@ def _side_by_side(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """Columns of a store: position, velocity where all have one, effort; n each.
+    """The columns that are kept of a log file, in the order position, velocity (if all joints have one), effort. Each
+    of the three has one column for each joint.
 
-    factors, zeros  (columns,)  SI value = factor * (number - zero)
-    sliding         names of joints in m; None where a unit was not said
+    columns   the columns of the file
+    factors   (columns,) SI value = factor * (number - zero)
+    zeros     (columns,) number in each column at the SI value 0
+    quantity  what the effort columns hold: current, motor torque or joint torque
+    sliding   names of joints whose positions have the unit m; None if a unit is not known
+    notes     remarks for the user
     """
 
     columns: tuple[Found, ...]
@@ -205,9 +210,14 @@ class Layout:
 def in_si(
     time: Array, store: RowStore, layout: Layout, coupling: CouplingEntry, entry: LogEntry
 ) -> tuple[Array, RowStore]:
-    """The rows in SI units, delays taken out, of joints, between the entry's start and end.
+    """Return the time and the rows of a log in SI units, without delays of columns, between the start and end in
+    `entry`.
 
-    Numbers that are not finite stay what they are: the checks of a log name them.
+    time    (N,) s
+    store   the N rows as recorded
+    layout  the columns of the rows
+
+    Numbers that are not finite stay as they are; later checks of the log report them.
     """
     delays = np.array([found.delay for found in layout.columns])
     begin = time[0]
@@ -252,10 +262,13 @@ NEIGHBOURS = 4
 
 
 def without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tuple[Array, RowStore]:
-    """The rows whose columns are all there, column k being its value `delays[k]` (s) later; InputError where time does
-    not grow.
+    """Return the time and the rows of a log without the delays of its columns. Column k of the row at time t becomes
+    the value of the column at time t + delays[k], by interpolation.
 
-    time   (N,);  store  N rows of len(delays) columns
+    time    (N,) s
+    store   N rows of len(delays) columns
+
+    Only rows at which all columns have a value are returned. Raises InputError if time does not increase.
     """
     if not delays.any():
         return time, store

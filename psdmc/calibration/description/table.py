@@ -1,4 +1,4 @@
-"""A table of a log description: one top-level key of its TOML file, and how it is read."""
+"""The class Table, which describes how one top-level key of a log description (log.toml) is read."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What the readers of tables share.
+    """Data that are needed to read any table of a log description.
 
-    folder       of the description: its paths start there
-    joint_names  of the model; None where no model is known, and names cannot be checked
-    faults       found so far, each in one line: table, key, found, expected
+    folder       folder of the description: its paths are relative to it
+    joint_names  joints of the model; None if no model is known, so that names cannot be checked
+    faults       faults found so far, one line each: table, key, found, expected
     """
 
     folder: Path
@@ -27,18 +27,21 @@ class Reading:
 
 
 def unchanged(options: LinearOptions, value: object) -> LinearOptions:
-    """The options of the fit, of which a table says nothing."""
+    """Return the options of the linear fit unchanged. Tables of a log description that do not affect the options use
+    this function."""
     return options
 
 
 @dataclass(frozen=True, slots=True)
 class Table(Generic[T]):
-    """A top-level key. A new one is a file of this folder, with its entry in `tables.TABLES`.
+    """How one top-level key of a log description (log.toml) is read. Each key has a module in this folder and an entry
+    in `tables.TABLES`.
 
-    key      in the file
-    read     the value of TOML's; never raises, faults go to the reading's list
-    default  the value where the file has no such key
-    options  the linear fit's options with what the table says
+    key      its name in the file
+    read     function that returns the value of the key from TOML. It raises no error: it adds a text about each fault
+             to the list `faults` of the Reading
+    default  the value if the file does not have the key
+    options  function that returns the options of the linear fit, changed by the value of the key
     """
 
     key: str

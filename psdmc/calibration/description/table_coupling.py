@@ -1,4 +1,5 @@
-"""`[[coupling]]`: joints that several motors drive together, such as a wrist's, and which quantities are the motors'."""
+"""The table `[[coupling]]` of a log description: joints that several motors drive together, as in a wrist. It also
+lists the quantities that the log holds for motors instead of joints."""
 
 from __future__ import annotations
 
@@ -24,7 +25,11 @@ LARGEST_CONDITION = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Joints that as many motors drive: q_joint = matrix q_motor; quantities: those whose columns are the motors'."""
+    """Joints that several motors drive together, with as many motors as joints: q_joint = matrix q_motor.
+
+    joints      names of the joints
+    quantities  quantities (position, velocity, effort) whose columns in the log belong to the motors, not to the joints
+    """
 
     joints: tuple[str, ...]
     matrix: Matrix
@@ -33,7 +38,14 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class CouplingEntry:
-    """All groups, and by quantity the matrix of all the model's joints; empty where it has none."""
+    """All groups of joints that several motors drive together.
+
+    groups    the groups
+    whole     matrix of all joints of the robot in q_joint = matrix q_motor; empty if there are no groups
+    position  this matrix for groups whose logged positions are those of motors; empty if there are none
+    velocity  this matrix for groups whose logged velocities are those of motors; empty if there are none
+    effort    this matrix for groups whose logged efforts are those of motors; empty if there are none
+    """
 
     groups: tuple[Group, ...] = ()
     whole: Matrix = ()
@@ -102,7 +114,8 @@ def _matrix(table: TomlTable, n: int) -> Matrix:
 
 
 def whole_matrix(groups: list[Group] | tuple[Group, ...], joint_names: tuple[str, ...]) -> Matrix:
-    """C of all joints: one outside the groups; empty where there are no groups."""
+    """Return the matrix of all joints of the robot in q_joint = matrix q_motor. A joint outside the groups has 1 on the
+    diagonal and else zeros. The result is empty if there are no groups."""
     if not groups:
         return ()
     whole = np.eye(len(joint_names))

@@ -1,4 +1,5 @@
-"""`[fit]`: options of the linear fit that belong to the logs: cut-off, split, and each joint's friction."""
+"""The table `[fit]`: options of the linear fit, such as the filter's cut-off, the validation share and the friction
+terms."""
 
 from __future__ import annotations
 
@@ -22,12 +23,13 @@ SLOWEST, FASTEST = 1e-6, 10.0
 
 @dataclass(frozen=True, slots=True)
 class FitChoice:
-    """Choices of a description or of the command line; None: the default of LinearOptions.
+    """Options of the linear fit from a log description or the command line. None means the default of LinearOptions.
 
-    cutoff      Hz
-    split       share that is held out of each log for fitting, and blocks
-    exponents   of the terms that grow with speed;  offset  whether each joint's torque has a constant
-    sign_speed  rad/s (m/s)
+    cutoff      cut-off of the filter, Hz
+    split       share of each log that is held out for validation, and number of blocks into which it is divided
+    exponents   exponents d of the viscous friction terms |qd|^d sign(qd)
+    offset      whether each joint has a constant torque
+    sign_speed  speed over which Coulomb friction changes sign, rad/s (m/s)
     """
 
     cutoff: float | None = None
@@ -37,7 +39,7 @@ class FitChoice:
     sign_speed: float | None = None
 
     def by_flag(self) -> dict[str, object]:
-        """The choices by the option of the command line that makes them."""
+        """Return the values that the user chose, by the command-line option that sets each value, such as --cutoff."""
         return {"--cutoff": self.cutoff, "--split": self.split, "--friction": self.exponents}
 
 
@@ -60,7 +62,9 @@ def _given(table: TomlTable, key: str, low: float, high: float) -> float | None:
 
 
 def split_of(shares: Sequence[float]) -> SplitOptions | str:
-    """The split of a share, and of a number of blocks where there are two numbers; else what is wrong."""
+    """Return how a log is split for validation, from one number or two. The first is the share that is held out, the
+    second the number of blocks into which it is divided. If the numbers are wrong, return a text that says what is
+    expected."""
     share, blocks = shares[0], shares[1] if len(shares) > 1 else 0.0
     if len(shares) > 2 or not 0.0 <= share <= LARGEST_HELD_OUT:
         return f"{', '.join(f'{x:g}' for x in shares)}: expected a share from 0 to {LARGEST_HELD_OUT:g}"
@@ -89,7 +93,7 @@ def _friction(table: TomlTable, faults: list[str]) -> tuple[tuple[float, ...], b
 
 
 def with_choice(options: LinearOptions, choice: FitChoice) -> LinearOptions:
-    """The options with everything that is chosen."""
+    """Return the options of the linear fit, in which the values that the user chose replace the defaults."""
     if choice.cutoff is not None:
         options = replace(options, filter=replace(options.filter, cutoff=choice.cutoff))
     plain = {

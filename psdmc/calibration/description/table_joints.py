@@ -1,4 +1,5 @@
-"""`[[joint]]`: the columns of a joint, with what differs from `[position]`, `[velocity]` and `[effort]`."""
+"""The table `[[joint]]` of a log description: the columns of one joint. It may also change, for this joint alone, the
+entries `[position]`, `[velocity]` and `[effort]`, which apply to all joints."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ KEYS = ("name", "logged_as", *UNITS)
 
 @dataclass(frozen=True, slots=True)
 class JointEntry:
-    """A joint of the model.
+    """The entry of a log description about one joint of the model.
 
-    logged_as  its name in the log, where that names its columns itself
+    logged_as  name of the joint in the log, if the names of columns contain it
     """
 
     name: str
@@ -42,7 +43,10 @@ def _read(value: object, reading: Reading) -> tuple[JointEntry, ...]:
 
 
 def require_joints(names: list[str], where: str, reading: Reading) -> None:
-    """A fault where names are none of the model's joints."""
+    """Add a text to the list of faults of a Reading if one of the names is not a joint of the model.
+
+    where  the table with the names, for the text
+    """
     known = reading.joint_names
     unknown = [quoted(name) for name in names if known is not None and name not in known]
     if unknown and known is not None:

@@ -1,4 +1,4 @@
-"""`[[log]]`: the recordings, which of them are for fitting and which for validation, and the part that counts."""
+"""The table `[[log]]`: the recordings, whether they are for fitting or validation, and which part of each is used."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ DATE = "date"
 
 @dataclass(frozen=True, slots=True)
 class TimeEntry:
-    """The time of rows.
+    """How a log records the time of its rows.
 
-    column  name or number from 1
-    unit    s per number in it
-    rate    Hz, of rows without a column of time; 0: there is one
-    dates   whether the column holds dates, such as 2026-05-01T12:00:00.125, whose s count from 1970
+    column  name of the time column, or its number from 1
+    unit    seconds per unit of the column
+    rate    sampling rate in Hz, if there is no time column; 0: there is a time column
+    dates   whether the column holds dates, such as 2026-05-01T12:00:00.125; they are converted to seconds since 1970
     """
 
     column: str | int = "time_s"
@@ -82,12 +82,14 @@ KEYS = ("file", "tables", "use", "start", "end", "topic")
 
 @dataclass(frozen=True, slots=True)
 class LogEntry:
-    """One `[[log]]`.
+    """One entry `[[log]]` of a log description: one recording.
 
-    tables      files by name, relative to the working directory; one without a name, or several side by side
-    use         fit, or validate: held out as a whole
-    start, end  s from the log's first row; rows outside are left out
-    topic       of a bag; empty: its only one, or /joint_states
+    tables  files by name, relative to the working directory: one file without a name, or several files, each with other
+            columns of the recording
+    use     fit, or validate: the whole log is held out for validation
+    start   s from the log's first row; earlier rows are left out
+    end     s from the log's first row; later rows are left out
+    topic   topic in a ROS bag; empty: the only topic, or /joint_states
     """
 
     tables: Mapping[str, Path]
@@ -98,7 +100,7 @@ class LogEntry:
 
     @property
     def name(self) -> str:
-        """For messages and reports."""
+        """Name of the log for messages and reports."""
         return " + ".join(path.name for path in self.tables.values())
 
 

@@ -1,4 +1,5 @@
-"""`[position]`, `[velocity]`, `[effort]`: unit, sign, gear and delay of a quantity, where a joint says nothing else."""
+"""The tables `[position]`, `[velocity]` and `[effort]` of a log description: unit, sign, gear ratio and delay of a
+quantity. They apply to all joints; the entry of a joint may replace a value for this joint."""
 
 from __future__ import annotations
 
@@ -32,17 +33,19 @@ TORQUES: tuple[Quantity, ...] = ("motor_torque", "joint_torque")
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """How a column becomes a joint's quantity. None: not said.
+    """How a column is converted to a quantity of a joint. A field is None if the description does not give it.
 
-    SI value = sign * scale * unit * (number - offset), over gear_ratio for motion, times it for effort.
+    SI value = sign * scale * unit * (number - offset), divided by gear_ratio for motion, multiplied by it for effort.
 
-    column           name, or number from 1;  table  of a log with several
-    scale            of `unit` per number in the column
-    gear_ratio       turns of the motor, whose column it is, per turn of the joint (per m where it slides)
-    offset           the column's number where the joint is at zero
-    delay            s by which the column lags the time column
+    column           name of the column, or its number from 1
+    table            name of the table that has the column, if a log has several
+    scale            factor from the number in the column to the unit
+    gear_ratio       turns of the motor per turn of the joint (per m for a sliding joint), if the column is the motor's
+    offset           number in the column if the joint is at zero
+    ticks_per_rev    encoder counts per revolution
+    delay            s by which the column lags behind the time column
     torque_constant  N m/A of the motor, before the gear
-    quantity         of effort: motor_torque (friction included) or joint_torque
+    quantity         for effort: current, motor_torque (friction included) or joint_torque
     """
 
     column: str | int | None = None
@@ -58,8 +61,11 @@ class Entry:
     quantity: Quantity | None = None
 
     def over(self, other: Entry) -> Entry:
-        """This entry, with the other's where it says nothing: of ticks and of motors only where this one's unit is not
-        another."""
+        """Return this entry, with missing fields taken from another entry.
+
+        The fields ticks_per_rev and torque_constant are not taken if this entry has a unit other than encoder ticks or
+        amperes, respectively.
+        """
         said = {f.name: value for f in fields(self) if (value := getattr(self, f.name)) is not None}
         if self.unit is not None and self.unit not in TICKS:
             other = replace(other, ticks_per_rev=None)
@@ -80,7 +86,8 @@ NUMBERS: Mapping[str, tuple[float, float]] = {
 
 
 def entry_of(value: object, what: str, where: str, faults: list[str], *, with_column: bool) -> Entry:
-    """An entry from TOML's value: a table, or, `with_column`, a column's name or number alone."""
+    """Return the entry of a quantity, such as [position], from its TOML table. If `with_column` is true, the value may
+    also be only the name or number of a column. Faults are added to `faults`."""
     if with_column and _is_column(value):
         return Entry(column=cast("str | int", value))
     if with_column and not isinstance(value, dict):
@@ -116,7 +123,7 @@ def _words(table: TomlTable, what: str) -> dict[str, Any]:
 
 
 def column_of(table: TomlTable, key: str) -> str | int:
-    """A column's name, or its number from 1."""
+    """Return the value of a key that names a column: the name of the column, or its number from 1."""
     value = table.content[key]
     if not _is_column(value):
         expected = f"a column's name, or its number from 1 to {LARGEST_COLUMN}"
@@ -142,5 +149,6 @@ POSITION, VELOCITY, EFFORT = _table("position"), _table("velocity"), _table("eff
 
 
 def refused(text: str) -> InputError:
-    """A fault of a description that shows only with its logs."""
+    """Return the error for a fault in a log description that psdmc notices only when it reads the logs. The hint names
+    the documentation of all keys."""
     return InputError(text, "docs/log_description.md has every key")

@@ -1,4 +1,4 @@
-"""All tables that a log description may have, in the order of the documentation."""
+"""The list of all tables that a log description (log.toml) may have, in the order of the documentation."""
 
 from __future__ import annotations
 

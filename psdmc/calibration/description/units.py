@@ -1,4 +1,4 @@
-"""Units of logged columns: what one of each is in SI units, and what it says of its joint."""
+"""Units of logged columns: their size in SI units, and what they imply about the joint."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ TICKS = ("ticks", "ticks/s")
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit: `size` in SI units (s, rad, m, rad/s, m/s, N m, N, A)."""
+    """A unit of a logged column. `size` is the factor to the SI unit (s, rad, m, rad/s, m/s, N m, N, A). `says` is what
+    the unit implies about the joint: that it rotates or slides, or nothing."""
 
     size: float
     says: Says

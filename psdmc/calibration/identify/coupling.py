@@ -1,4 +1,4 @@
-"""Motors that drive several joints: q_joint = C q_motor and, by virtual work, tau_joint = C^-T tau_motor."""
+"""Motors that drive several joints together: q_joint = C q_motor and, by virtual work, tau_joint = C^-T tau_motor."""
 
 from __future__ import annotations
 
@@ -13,34 +13,35 @@ from psdmc.model.calibrated import Matrix
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coupling:
-    """The coupling matrix C of n motors and n joints; motor k is named like joint k. Rows of arrays are samples."""
+    """The matrix C in q_joint = C q_motor for n motors that drive n joints together, and its inverse. Motor k has the
+    name of joint k. In arrays of positions or torques, each row is one sample."""
 
     matrix: Array
     inverse: Array
 
     @staticmethod
     def of(matrix: Sequence[Sequence[float]]) -> Coupling:
-        """Of a square matrix that has an inverse."""
+        """Return the Coupling of a square, invertible matrix."""
         values = np.array(matrix, dtype=np.float64)
         return Coupling(values, np.asarray(np.linalg.inv(values), dtype=np.float64))
 
     def to_joints(self, motion: Array) -> Array:
-        """(..., n) of motors to joints: positions, speeds or accelerations."""
+        """Return the positions, speeds or accelerations (..., n) of the joints from those of the motors."""
         return np.asarray(motion @ self.matrix.T)
 
     def to_motors(self, motion: Array) -> Array:
-        """(..., n) of joints to motors."""
+        """Return the positions, speeds or accelerations (..., n) of the motors from those of the joints."""
         return np.asarray(motion @ self.inverse.T)
 
     def torque_of_joints(self, torque: Array) -> Array:
-        """(..., n) motor torques to joint torques."""
+        """Return the joint torques (..., n) that belong to motor torques."""
         return np.asarray(torque @ self.inverse)
 
     def torque_of_motors(self, torque: Array) -> Array:
-        """(..., n) joint torques to motor torques."""
+        """Return the motor torques (..., n) that belong to joint torques."""
         return np.asarray(torque @ self.matrix)
 
 
 def coupling_of(matrix: Matrix) -> Coupling | None:
-    """The coupling of a matrix; None where it is empty."""
+    """Return the Coupling of a matrix, or None if the matrix is empty."""
     return Coupling.of(matrix) if matrix else None

@@ -1,8 +1,9 @@
-"""Essential parameters: those that the data do not tell from the prior are left there, one after the other, as long as an
-F-test over all that were left does not object.
+"""Finds the essential parameters of a fit. Other parameters are dropped: they keep the values of the prior, from which
+the data do not differ significantly.
 
-The statistic is Wald's, with the covariance that is reported: residuals that are correlated count by what they are worth.
-Backward elimination of the largest relative standard deviation is that of Khalil and Dombre (2002, section 12.4).
+Parameters are dropped one after the other, the largest relative standard deviation first. An F-test over all dropped
+parameters decides when to stop (Khalil and Dombre 2002, section 12.4). The statistic is Wald's, with the reported
+covariance, which takes correlated residuals into account.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from psdmc.calibration.logs.log import Array
 
 @dataclass(frozen=True, slots=True)
 class EssentialOptions:
-    """How parameters are dropped.
+    """Options for dropping parameters that the data do not need.
 
-    relative      standard deviation, as a share of the value, above which a parameter is tried
-    significance  of the F-test: the chance of keeping parameters that all are the prior's
+    relative      relative standard deviation above which psdmc tries to drop a parameter
+    significance  significance level of the F-test: the probability that a parameter is kept although the prior is true
     """
 
     relative: float = 0.5
@@ -33,10 +34,11 @@ class EssentialOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Essential:
-    """An estimate with some entries at the prior, the others refitted.
+    """An estimate in which some of the m parameters keep the values of the prior, and the others are fitted again.
 
-    dropped  (m,)  those entries
-    f        the statistic over all of them;  limit  that it may not exceed, NaN where none was dropped
+    dropped  (m,) whether a parameter keeps the prior's value
+    f        F statistic over all dropped parameters
+    limit    largest value of f at which parameters are dropped; NaN if none was dropped
     """
 
     estimate: Estimate
@@ -48,11 +50,12 @@ class Essential:
 def essential(
     solved: Estimate, start: Array, samples: int, options: EssentialOptions, fit: FitOptions | None = None
 ) -> Essential:
-    """The estimate without what it does not need.
+    """Return the estimate in which parameters that the data do not need keep the values of the prior.
 
-    start    (m,)  the prior's values, which dropped entries take
-    samples  independent ones that were fitted, all joints together
-    fit      the options of the fit that found `solved`; None: the default ones
+    solved   the estimate of all m parameters
+    start    (m,) the prior's values, which dropped parameters get
+    samples  number of independent samples that were fitted, all joints together
+    fit      options of the fit that found `solved`; None: the default ones
     """
     problem = _Problem(solved, start, max(samples - solved.rank, 1))
     dropped, needed = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
@@ -83,7 +86,8 @@ class _Problem:
         self.information = whitening.T @ whitening
 
     def restricted(self, dropped: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """The least values with the dropped ones at the prior, and standard deviations of the others."""
+        """Return the best values of all parameters if the dropped ones keep the prior's values, and the standard
+        deviations. Those of dropped parameters are zero."""
         covariance = self.covariance(dropped)
         free = ~dropped
         moved = np.where(dropped, self.start - self.values, 0.0)
@@ -92,7 +96,8 @@ class _Problem:
         return values, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def covariance(self, dropped: NDArray[np.bool_]) -> Array:
-        """(m, m) of the others where the dropped ones are known; zero for these."""
+        """Return the covariance (m, m) of the m parameters if the dropped ones are known exactly. Rows and columns of
+        dropped parameters are zero."""
         free = np.flatnonzero(~dropped)
         covariance = np.zeros_like(self.information)
         own = self.information[np.ix_(free, free)]
@@ -101,7 +106,8 @@ class _Problem:
         return covariance
 
     def f(self, dropped: NDArray[np.bool_]) -> float:
-        """Growth of the cost per dropped entry."""
+        """Return the F statistic for the dropped parameters. It is the increase of the sum of squared residuals (in
+        variances) if they keep the prior's values, divided by their number."""
         if not dropped.any():
             return 0.0
         away = self.restricted(dropped)[0] - self.values

@@ -1,4 +1,9 @@
-"""What a linear fit is given and gives: its options, what is known before, and the estimate with its covariance."""
+"""Inputs and results of a linear least-squares fit: its options, values before the fit (the prior), and the estimate
+with its covariance.
+
+In this module, a direction is a linear combination of the unknowns. A direction is seen if the data determine it. In an
+unseen direction, the estimate keeps the value of the prior.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +20,22 @@ Method = Literal["ols", "wls", "irls"]
 
 @dataclass(frozen=True, slots=True)
 class FitOptions:
-    """How a linear problem is solved.
+    """How a linear least-squares problem is solved. A direction is a linear combination of the unknowns; it is seen if
+    the data determine it.
 
-    method          ols: all rows alike; wls: each joint by its own residual; irls: wls, and outliers count less (Huber)
-    rounds          of reweighting
-    huber           residual in standard deviations beyond which irls turns from squares to magnitudes: 1.345 keeps
-                    95 % of least squares' efficiency where errors are normal
-    rank_tolerance  share of its own size by which a column may be wrong, besides its noise: differentiation and filters
-                    leave about 1e-4
-    noise_ratio     how many times stronger than noise alone a direction must be: at ten, noise in the columns shrinks
-                    the result by a tenth at most
-    seen            standard deviation, in units of the prior's scale, from which the data no longer show a direction
-    unseen_share    share (squared, in the prior's units) of a parameter in unseen directions from which it is
-                    unidentifiable
-    clusters        contiguous stretches whose errors may be dependent, for the robust standard deviations
+    method          ols: equal weights; wls: each joint is weighted by its residual; irls: like wls, with less weight
+                    for outliers (Huber)
+    rounds          number of times that the weights are computed again
+    huber           residual in standard deviations above which irls uses magnitudes instead of squares: 1.345 keeps 95
+                    % of least squares' efficiency for normal errors
+    rank_tolerance  relative error of a column in addition to its noise: differentiation and filters cause about 1e-4
+    noise_ratio     how many times stronger than the noise of its columns a seen direction is at least. With ten, this
+                    noise reduces the result by a tenth at most
+    seen            standard deviation above which a direction is not seen, in units of a plausible size of the unknowns
+    unseen_share    share of an unknown that lies in unseen directions, above which the unknown is unidentifiable. The
+                    share is squared, in units of a plausible size
+    clusters        number of periods of time, within which errors may depend on one another, for the standard
+                    deviations
     """
 
     method: Method = "wls"
@@ -43,10 +50,11 @@ class FitOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consider:
-    """Quantities that an earlier step left uncertain and this one uses: their effect is counted, not estimated.
+    """k results of an earlier step, such as torque constants, that this step uses. Their uncertainty adds to that of
+    this step, but they are not estimated again.
 
-    columns     (N, n, k)  change of (prediction - target) per unit of each quantity
-    covariance  (k, k)
+    columns     (N samples, n joints, k) change of (prediction - target) per unit of each result
+    covariance  (k, k) of the results
     """
 
     columns: Array
@@ -55,11 +63,12 @@ class Consider:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """The values before the data are seen: kept in unseen directions, with the units that measure distances from them.
+    """The values of the l unknowns before a fit. They remain in directions (linear combinations of unknowns) that the
+    data do not determine.
 
-    values  (l,)       the file's parameters, or zero
-    scale   (l,)       positive: how far from them a parameter may believably lie
-    noise   (N, n, l)  columns that the sensors' noise alone would give; None where states are exact
+    values  (l,) the parameters of the robot file, or zero
+    scale   (l,) positive: a plausible difference between an unknown and its value here, the unit of distances
+    noise   (N samples, n joints, l) columns that the sensors' noise alone would give; None if the states are exact
     """
 
     values: Array
@@ -69,24 +78,26 @@ class Prior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """The solution of target = columns @ values. l unknowns, n joints, r directions seen.
+    """The solution of target = columns @ values, for l unknowns and n joints. A direction is a linear combination of
+    the unknowns; the data determine r directions, which are called seen. N is the number of samples.
 
-    values            (l,)      by the data in seen directions; the prior's in unseen ones
-    covariance        (l, l)    of the fit alone, widened where residuals are correlated; none in unseen directions
-    considered        (l, k)    change of `values` per unit of what was considered; k may be 0
-    total_covariance  (l, l)    with what was considered
-    unseen            (l, l - r)  orthonormal directions that the data do not show, in units of `scale`
-    scale             (l,)      the prior's, or the columns' where there is none
-    prior_std         of unseen directions, in units of `scale`; zero without a prior
-    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's in seen directions
-                                (its sum of squares over noise_factor^2), the prior's in others
-    identifiable      (l,)      whether the data see the parameter by itself
-    singular_values   (l,)      of the weighted, column-scaled problem, descending
-    rank              how many directions are seen
-    sigma             (n,)      residual RMS per joint, target's unit
-    weights           (N, n)    of the last round, one over unit; zero where a row did not count
+    values            (l,)      from the data in seen directions, from the prior in the others
+    covariance        (l, l)    of the fit alone, larger if residuals are correlated; zero in unseen directions
+    considered        (l, k)    change of `values` per unit of k results of earlier steps (Consider); k may be 0
+    total_covariance  (l, l)    includes the uncertainty of the results of earlier steps
+    unseen            (l, l - r)  orthonormal directions that the data do not determine, in units of `scale`
+    scale             (l,)      plausible size of each unknown, from the prior or, if there is none, from the columns
+    prior_std         standard deviation of unseen directions, in units of `scale`; zero without a prior
+    whitening         (l, l)    W with |W (v - values)|^2 the cost of any values v, in variances. In seen directions it
+                                comes from the data (their sum of squares over noise_factor^2), in the others from the
+                                prior
+    identifiable      (l,)      whether the data determine the unknown by itself
+    singular_values   (l,)      of the weighted problem with scaled columns, descending
+    rank              number r of seen directions
+    sigma             (n,)      residual RMS per joint, in the unit of the target
+    weights           (N, n)    of the last round, one over unit; zero for rows that were not used
     correlation       (n,)      of the residual from sample to sample: near zero for noise
-    noise_factor      largest factor by which correlated residuals widened a standard deviation; near one for noise
+    noise_factor      largest factor by which correlated residuals increased a standard deviation; near one for noise
     """
 
     values: Array
@@ -107,20 +118,23 @@ class Estimate:
 
     @property
     def prior_covariance(self) -> Array:
-        """(l, l) covariance of the prior in directions that the data do not show."""
+        """Return the covariance (l, l) of the l unknowns that comes from the prior, in directions (linear combinations)
+        that the data do not determine."""
         directions = self.scale[:, None] * self.unseen
         return np.asarray(self.prior_std**2 * directions @ directions.T)
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations with what was considered and the prior's in unseen directions; infinite where
-        unidentifiable."""
+        """Return the standard deviations (l,) of the l unknowns. They include the uncertainty of results of earlier
+        steps. In directions that the data do not determine, they include that of the prior. The standard deviation of
+        an unidentifiable unknown is infinite."""
         variance = np.diag(self.total_covariance) + np.diag(self.prior_covariance)
         return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
 
     @property
     def condition(self) -> float:
-        """Condition number of the seen part, columns scaled."""
+        """Return the condition number of the least-squares problem with scaled columns. It counts only directions
+        (linear combinations of unknowns) that the data determine."""
         return (
             float(self.singular_values[0] / self.singular_values[self.rank - 1])
             if self.rank

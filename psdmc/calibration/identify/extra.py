@@ -1,4 +1,4 @@
-"""What the linear fit must know of extra columns beside their rows: believable sizes, and limits between values."""
+"""Plausible sizes of the spring and friction values in a linear fit, and inequalities between these values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,12 @@ from psdmc.robot.mechanism import Mechanism
 def motion_of(
     q: Array, qd: Array, sign_speed: float, load: Array | None = None, coupling: Coupling | None = None
 ) -> Motion:
-    """The motion for columns, of joints' positions, speeds and rigid torques (N, n): with a coupling, motors rub."""
+    """Return the motion from which the torques of springs and friction are computed. If several motors drive a joint,
+    friction acts on the motors.
+
+    q, qd  (N samples, n joints) positions and speeds
+    load   (N, n) torques of the rigid bodies; None if no friction depends on them
+    """
     if coupling is None:
         return Motion(q, qd, q, qd, sign_speed, load)
     of_motors = None if load is None else coupling.torque_of_motors(load)
@@ -27,9 +32,10 @@ def motion_of(
 
 
 def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Array) -> Array:
-    """(m,) believable size of each value: the one that explains a joint's whole torque where its column is largest.
+    """Return a plausible size (m,) of each of the m unknown values of springs and friction. With this size, the largest
+    torque of the value at some joint equals the whole torque of that joint.
 
-    sizes  (n,) N m, of the joints' torques
+    sizes  (n,) N m, typical torques of the n joints
     """
     if not len(columns):
         return np.zeros(0)
@@ -44,9 +50,14 @@ def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Ar
 
 
 def limits_of(columns: Columns, plain: Sequence[tuple[str, str]], l: int) -> Array:
-    """(k, l + n f + m) rows whose products with the vector may not be negative: values within that of their owner.
+    """Return k rows of linear inequalities between the unknowns of a fit, an array (k, l + n f + m). The product of
+    each row with the vector of unknowns may not be negative. The rows keep the magnitude of a value below another value
+    of its joint.
 
-    plain  n f joints and names of plain friction
+    The unknowns are l base parameters, f friction values of each of n joints, and m values of springs and further
+    friction.
+
+    plain  joint and name of each of the n f friction values
     """
     rows: list[Array] = []
     width = l + len(plain) + len(columns)

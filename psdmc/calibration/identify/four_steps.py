@@ -1,4 +1,4 @@
-"""The paper's four steps one after the other: motors, gravity, friction, inertia."""
+"""The four steps of the calibration in Denso-2022: motors, gravity, friction, inertia."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """All logs of a calibration, step by step."""
+    """All logs of a campaign, sorted by the calibration step that uses them: motor, gravity, friction, inertial."""
 
     motor: Sequence[MotorRun]
     gravity: Sequence[GravityRun]
@@ -40,7 +40,7 @@ class Runs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourSteps:
-    """The result of the four steps; `motor` is None where the logs hold torques."""
+    """The results of the four steps motors, gravity, friction and inertia; `motor` is None if the logs hold torques."""
 
     motor: MotorResult | None
     motors: Motors
@@ -55,7 +55,8 @@ class FourSteps:
 
 
 def checked_runs(chain: Mechanism, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
-    """All logs of a campaign; InputError where there are too few runs or a log cannot be used, before anything is fitted."""
+    """Return all logs of a campaign after checking them. Raises InputError if there are too few runs (recorded motions)
+    or if a log cannot be used."""
     _require_runs(runs)
     logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]
     logs += [(run.log, options.gravity) for run in runs.gravity]
@@ -74,10 +75,13 @@ def calibrate_four_steps(
     torque_constants: Mapping[str, float] | None = None,
     file_theta: Array | None = None,
 ) -> FourSteps:
-    """Torque constants, gravity, friction, inertia; gravity to inertia are repeated as the options say.
+    """Return torque constants, gravity parameters, friction and inertial parameters from the runs of a campaign. The
+    last three are determined repeatedly, as often as the options say.
 
-    torque_constants  N m/A by joint name, for joints that no load can reach (an axis along gravity)
-    file_theta        (l,)  the file's values, kept in directions that no run shows; None: zero
+    torque_constants  N m/A by joint name, for joints on which the weight of the load does not act (an axis along
+                      gravity)
+    file_theta        (l,) the l base parameters of the robot file, which remain in directions (linear combinations)
+                      that no run determines; None: zero
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)

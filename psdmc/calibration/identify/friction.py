@@ -1,4 +1,5 @@
-"""Step three: LuGre friction of every joint, from runs of one joint at a time, (12) to (14), (19), (20)."""
+"""Step three: determines the LuGre friction of every joint from runs of one joint at a time. Source: Denso-2022, (12)
+to (14), (19), (20)."""
 
 from __future__ import annotations
 
@@ -22,24 +23,26 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionResult:
-    """Friction per joint name, in the chain's order; joints without a run have none."""
+    """The identified friction by joint name, in the order of the robot's joints, and warnings. A joint without a
+    friction run has no entry."""
 
     joints: dict[str, JointFriction]
     warnings: tuple[str, ...]
 
     @property
     def delay(self) -> float:
-        """s, between position and current: the joints' median."""
+        """Return the time in s by which the recorded position lags behind the recorded current: the median over the
+        joints."""
         return float(np.median([joint.delay for joint in self.joints.values()])) if self.joints else 0.0
 
 
 def calibrate_friction(
     runs: Mapping[str, JointRun], options: FrictionOptions, start: FrictionResult | None = None
 ) -> FrictionResult:
-    """Friction with a state of every joint that has a run.
+    """Return the LuGre friction of every joint that has a friction run (a recording in which this joint alone moves).
 
-    runs    by joint, as `prepared_runs` makes them
-    start   an earlier pass, to start from instead of searching
+    runs    runs by joint, from `prepared_runs`
+    start   friction from an earlier iteration, as start values; None: psdmc searches for start values
     """
     earlier = start.joints if start is not None else {}
     tasks = [(name, run, options, earlier.get(name)) for name, run in runs.items()]
@@ -69,8 +72,8 @@ def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:
-    """Quality of each joint's friction alone on its run, after the gravity by the base parameters that it was prepared
-    with is subtracted."""
+    """Return how well each joint's identified friction predicts the motor torque of its friction run, after the gravity
+    torque is subtracted."""
     qualities, samples = {}, []
     for name, data in runs.items():
         if name in joints:
@@ -87,7 +90,8 @@ def prepared_runs(
     runs: Sequence[FrictionRun],
     options: StepOptions,
 ) -> dict[str, JointRun]:
-    """The runs by joint, in the chain's order, each with its gravity torque by these base parameters."""
+    """Return the friction runs (recordings in which one joint moves) by joint, in the order of the robot's joints. Each
+    has its gravity torque, which is computed from the base parameters theta_b."""
     places = {name: k for k, name in enumerate(chain.joint_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
     return {

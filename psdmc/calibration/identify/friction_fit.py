@@ -1,9 +1,12 @@
-"""The seven LuGre parameters of one joint, in the paper's two steps and a final refinement.
+"""Fits the seven parameters of LuGre friction (a friction law with bristle deflection as its state) for one joint. The
+fit has the two steps of Denso-2022 and a final refinement.
 
-First the fast samples, where bristles do not matter: F_c, F_v, d_v by trust-region least squares. Then the rest by
-Nelder-Mead over a simulation of (12). Last, all of them together by trust region, which also gives the standard
-deviations. Besides the seven, a run has unknowns of its own: the joint's inertia in that pose (the paper neglects it),
-a constant torque, and the time between position and current.
+The first step fits F_c, F_v and d_v by trust-region least squares, to fast samples, for which bristles do not matter.
+The second step fits the other parameters by Nelder-Mead over a simulation of the LuGre equation (12). The refinement
+fits all parameters by trust region, which also gives the standard deviations.
+
+A run has three more unknowns: the joint's inertia in that pose (the paper neglects it), a constant torque, and the time
+between position and current.
 
 Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, inertia, offset, delay.
 """
@@ -40,16 +43,16 @@ UNSEEN_CURVATURE = 1e-13
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointFriction:
-    """One joint's identified friction.
+    """The identified friction of one joint.
 
-    friction     (7,)    the law's values, in the order of PARAMETERS
-    covariance   (7, 7)  of these, of the fit alone, widened where residuals are correlated
+    friction     (7,)    values of the LuGre law, in the order of PARAMETERS
+    covariance   (7, 7)  of these values from the fit alone, larger if residuals are correlated
     unseen       names of parameters that the data do not determine
     inertia      kg m^2, of the joint in the run's pose, not negative
-    offset       N m
-    delay        s
+    offset       constant torque, N m
+    delay        time between position and current, s
     correlation  of the residual from sample to sample
-    widened      factor by which standard deviations were widened
+    widened      factor by which correlated residuals increased the standard deviations
     """
 
     joint: str
@@ -64,12 +67,13 @@ class JointFriction:
 
     @property
     def std(self) -> Array:
-        """(7,) standard deviations."""
+        """Standard deviations (7,) of the LuGre values."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
 def unknowns_of(found: JointFriction) -> Array:
-    """(10,) the unknowns of a fit at its result: seven of LuGre as the fit has them, then inertia, offset and delay."""
+    """Return the ten unknowns of the friction fit at its result: seven of LuGre friction, then inertia, offset and
+    delay."""
     own = [found.inertia, found.offset, found.delay]
     return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 
@@ -77,7 +81,8 @@ def unknowns_of(found: JointFriction) -> Array:
 def fit_joint(
     name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
 ) -> JointFriction:
-    """The seven parameters of one joint: by the paper's two steps, or from an earlier pass, then refined."""
+    """Return the friction of one joint. The fit starts with the two steps of the paper, or from an earlier result, and
+    ends with the refinement."""
     if options.law == "coulomb_viscous":
         sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
         return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
@@ -230,7 +235,8 @@ def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
 
 
 def step_sizes(p: Array) -> Array:
-    """What counts as one step of each unknown."""
+    """Return, for each of the ten unknowns p, the size of a change that has a clear effect on the torque. The fit uses
+    these sizes as units."""
     viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
     return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
 
@@ -244,7 +250,8 @@ def _covariance(jac: Array, residual: Array) -> Array:
 
 
 def to_seven(friction: Array) -> Array:
-    """(7, 10) d values / d unknowns."""
+    """Return the derivatives (7, 10) of the seven LuGre values by the ten unknowns of the fit. The last three unknowns
+    (inertia, offset, delay) do not affect these values."""
     return np.hstack([STATE_LAW.slopes(friction), np.zeros((7, 3))])
 
 

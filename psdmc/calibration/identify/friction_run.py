@@ -1,4 +1,4 @@
-"""One joint's friction run, ready to be compared with predictions."""
+"""Prepares the friction run of one joint, a recording in which this joint alone moves, and predicts the motor torque."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ MOST_KEPT = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRun:
-    """One joint's run, ready to be compared with predictions.
+    """The recording of the friction run of one joint, filtered and with its gravity torque.
 
-    kept  friction torques simulated last, by the bytes of their seven unknowns
+    fit, out  samples that are fitted, and samples that are held out for validation
+    kept      the latest simulated friction torques, by the bytes of the seven unknowns with which they were simulated
     """
 
     time: Array
@@ -46,11 +47,15 @@ class JointRun:
         return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
 
     def torque(self, p: Array) -> Array:
-        """Motor torque for the unknowns (friction_fit.UNKNOWNS), before the low-pass."""
+        """Return the predicted motor torque at all samples of the run, before the low-pass filter.
+
+        p  (10,) the unknowns in the order of friction_fit.UNKNOWNS
+        """
         return self.delayed(self.friction(p) + self.gravity + p[7] * self.qdd + p[8], p[9])
 
     def friction(self, p: Array) -> Array:
-        """Friction torque alone, simulated once for equal parameters: the other unknowns leave it as it is."""
+        """Return the predicted friction torque at all samples of the run. It depends on the first seven of the unknowns
+        p only. The simulation is skipped if its result for equal values is stored."""
         key = p[:7].tobytes()
         if key not in self.kept:
             if len(self.kept) >= MOST_KEPT:
@@ -59,7 +64,8 @@ class JointRun:
         return self.kept[key]
 
     def delayed(self, torque: Array, delay: float) -> Array:
-        """What is written at t is what happened at t + delay."""
+        """Return a torque that is shifted in time: the result at time t is the given torque at time t + delay, by
+        interpolation."""
         return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
 
     def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
@@ -75,7 +81,8 @@ def prepared(
     k: int,
     options: StepOptions,
 ) -> JointRun:
-    """One joint's run against what gravity and tool take of its torque; InputError where other joints move too."""
+    """Return the friction run of joint k with the torques of gravity and of the known load. Raises InputError if other
+    joints move, too."""
     states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
     _require_alone(run, chain, k, states)
     gravity = (gravity_regressor(model, states.q) @ theta_gravity)[:, k]

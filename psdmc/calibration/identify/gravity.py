@@ -1,4 +1,4 @@
-"""Step two: the gravity parameters from slow motion forwards and backwards, (18)."""
+"""Step two: determines the gravity parameters from slow motion forwards and backwards. Source: Denso-2022, (18)."""
 
 from __future__ import annotations
 
@@ -34,12 +34,11 @@ DEPENDENT = 1e-8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravitySplit:
-    """Which combinations of theta_b gravity can see, in the model's own order.
+    """A split of theta_b (the l base parameters) into two groups. phi are r combinations that affect gravity torques;
+    psi are the l - r other entries of theta_b.
 
-    l base parameters, r gravity parameters phi.
-
-    pivots      (r,)    theta_b entries that phi stands for, beside others
-    rest        (l-r,)  the other entries, psi
+    pivots      (r,)     indices of the entries of theta_b that phi consists of, together with multiples of psi
+    rest        (l-r,)   indices of the other entries, psi
     dependence  (r, l-r) phi = theta_b[pivots] + dependence @ theta_b[rest]
     """
 
@@ -48,13 +47,15 @@ class GravitySplit:
     dependence: Array
 
     def from_phi(self) -> Array:
-        """(l, r) d theta_b / d phi with psi held."""
+        """Return the derivatives (l, r) of theta_b (the l base parameters) by phi at constant psi. phi are the r
+        combinations that affect gravity torques, psi the other entries."""
         matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.pivots)))
         matrix[self.pivots] = np.eye(len(self.pivots))
         return matrix
 
     def from_psi(self) -> Array:
-        """(l, l-r) d theta_b / d psi with phi held."""
+        """Return the derivatives (l, l-r) of theta_b (the l base parameters) by psi at constant phi. phi are the r
+        combinations that affect gravity torques, psi the other entries."""
         matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.rest)))
         matrix[self.rest] = np.eye(len(self.rest))
         matrix[self.pivots] = -self.dependence
@@ -66,7 +67,13 @@ class GravitySplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityResult:
-    """phi with its uncertainty; `considered` is d phi per relative change of each torque constant, (r, n)."""
+    """The gravity parameters phi (the combinations of base parameters that affect gravity torques), with their
+    uncertainty.
+
+    split     how the base parameters are split into phi and other entries
+    estimate  phi. Its field `considered` is d phi per relative change of each torque constant, (r values of phi, n
+              joints)
+    """
 
     split: GravitySplit
     estimate: Estimate
@@ -74,7 +81,9 @@ class GravityResult:
 
 
 def gravity_split(chain: Mechanism, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
-    """The observable subset: gravity columns in order, each a pivot where it is new."""
+    """Return the split of theta_b (the base parameters) into combinations that affect gravity torques and other
+    entries. Entry j is a pivot (part of a combination) if column j of the gravity regressor is linearly independent of
+    the earlier columns."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (max(4 * l, 40), len(chain)))
     columns = gravity_regressor(model, q).reshape(-1, l)
@@ -106,10 +115,13 @@ def calibrate_gravity(
     theta_b: Array | None = None,
     file_theta: Array | None = None,
 ) -> GravityResult:
-    """phi by linear least squares over samples averaged over both directions.
+    """Return the gravity parameters phi (combinations of base parameters that affect gravity torques) by linear least
+    squares. The torques are averaged over both directions of motion, which cancels friction.
 
-    theta_b     from an earlier pass: its velocity and acceleration torques are subtracted
-    file_theta  the file's values, kept where the runs show nothing; None: zero
+    theta_b     base parameters from an earlier iteration: their velocity and acceleration torques are subtracted; None:
+                none
+    file_theta  the base parameters of the robot file. They remain in directions (linear combinations) that no run
+                determines; None: zero
     """
     q, target, use, currents = _even_parts(chain, model, motors, runs, options, theta_b)
     columns = gravity_regressor(model, q)[:, :, split.pivots]
@@ -130,7 +142,8 @@ def judge_gravity(
     options: StepOptions,
     theta_b: Array,
 ) -> StepQuality:
-    """Torque averaged over both directions against the gravity of these base parameters."""
+    """Return how well the base parameters predict gravity torques. The measured torques are averaged over both
+    directions of motion, which cancels friction."""
     q, target, use, _ = _even_parts(chain, model, motors, runs, options, theta_b)
     out = held_out(len(q), options.split)
     predicted = gravity_regressor(model, q) @ theta_b

@@ -1,7 +1,7 @@
-"""Step four: the inertial parameters from fast motion, after the earlier steps' results are subtracted, (21).
+"""Step four of the calibration: determines the inertial parameters from fast motion, after the torques of gravity and
+friction are subtracted. Source: Denso-2022, (21).
 
-Every prediction passes through the same filter as the measurement, with the same delay: a current that is read late is
-compared with a prediction read late.
+Every predicted torque is filtered and delayed in time as the measured torque is.
 """
 
 from __future__ import annotations
@@ -35,14 +35,15 @@ FRICTION_STEP = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InertialResult:
-    """The complete theta_b.
+    """All l base parameters after step four, theta_b.
 
     theta_b       (l,)    gravity and inertial parameters together
     covariance    (l, l)  with the uncertainty of torque constants, gravity and friction
-    identifiable  (l,)
-    estimate      of psi, the parameters that gravity does not show
-    unseen        (l, k)  directions of theta_b that no run shows, SI, each as long as is believable
-    scale         (l,)    believable size of each base parameter
+    identifiable  (l,)    whether the data determine the parameter by itself
+    estimate      estimate of the parameters that do not affect gravity torques
+    unseen        (l, k)  k directions (combinations of parameters) that no run determines, in SI units. The length of
+                          each is a plausible change
+    scale         (l,)    plausible size of each base parameter
     """
 
     theta_b: Array
@@ -55,7 +56,8 @@ class InertialResult:
 
     @property
     def prior_covariance(self) -> Array:
-        """(l, l) covariance of the prior in the directions that no run shows."""
+        """Return the covariance (l, l) of the l base parameters that comes from the prior, in directions (linear
+        combinations) that no run determines."""
         return np.asarray(self.estimate.prior_std**2 * self.unseen @ self.unseen.T)
 
     @property
@@ -87,9 +89,11 @@ def calibrate_inertial(
     options: StepOptions,
     file_theta: Array | None = None,
 ) -> InertialResult:
-    """psi by linear least squares, combined with the gravity parameters to theta_b.
+    """Return the parameters that do not affect gravity torques, by linear least squares, and combine them with the
+    gravity parameters to all l base parameters.
 
-    file_theta  the file's values, kept where the runs show nothing; None: zero
+    file_theta  (l,) the base parameters of the robot file. They remain in directions (linear combinations) that no run
+                determines; None: zero
     """
     split = gravity.split
     rows = _stacked([_rows(chain, model, motors, friction, run, options) for run in runs])
@@ -129,8 +133,8 @@ def judge_inertial(
     runs: Sequence[InertialRun],
     options: StepOptions,
 ) -> tuple[StepQuality, StepQuality]:
-    """Two qualities on the fast motion: of inertia alone, after gravity and friction are subtracted; and of the whole
-    torque."""
+    """Return how well the base parameters predict the torques of the fast motion. The first result is for inertial
+    torques alone, after gravity and friction are subtracted; the second is for the whole torques."""
     split = gravity_split(chain, model, len(theta_b))
     rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
     still = split.from_phi() @ split.phi(theta_b)
@@ -196,7 +200,8 @@ def _late_columns(model: Regressor, late: Late, motion: tuple[Array, Array, Arra
 
 
 class Late:
-    """Turns a prediction into what a log would hold: delayed, filtered, one row per independent sample."""
+    """A function that converts predicted torques to what a log would contain. The torques are delayed and filtered, and
+    only the rows `at` are kept, which count as independent samples."""
 
     def __init__(self, states: States, delay: float, at: NDArray[np.intp]) -> None:
         self.states, self.delay, self.at = states, delay, at

@@ -1,4 +1,5 @@
-"""Blocks of a linear problem kept for several rounds: in memory while they are few, then in a temporary file."""
+"""Stores the rows of a linear least-squares problem, which the solver reads several times. Few rows are kept in memory,
+more rows in a temporary file."""
 
 from __future__ import annotations
 
@@ -15,9 +16,9 @@ BLOCK_SAMPLES = 2048
 
 
 class KeptRows:
-    """Rows of a problem: appended once, read repeatedly.
+    """Rows of a linear least-squares problem with n joints and l unknowns. They are appended once and read repeatedly.
 
-    n joints, l unknowns;  held  bytes in memory before a file is used
+    held  largest number of bytes in memory; more rows go to a temporary file
     """
 
     def __init__(self, n: int, l: int, held: int) -> None:
@@ -32,7 +33,8 @@ class KeptRows:
         return self._columns.on_disk
 
     def append(self, columns: Array, noise: Array) -> None:
-        """(k, n, l) each: the columns, and the columns that sensor noise alone would give."""
+        """Append k samples. `columns` (k, n joints, l unknowns) are torques per unit of each unknown. `noise` (k, n, l)
+        are the columns that sensor noise alone would give."""
         for store, values in ((self._columns, columns), (self._noise, noise)):
             store.append(np.ascontiguousarray(values.reshape(len(values), -1)))
 

@@ -1,5 +1,5 @@
-"""What a user knows of the bodies before the fit: confidence in the file's values, and bounds, from the tables `prior` and
-[[bodies]] of a description."""
+"""What a user knows of the links before the fit. It is the accuracy of the robot file's values, and bounds of masses
+and centres of mass. It comes from the tables `prior` and [[bodies]] of a log description."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ HINT = "docs/how-to/priors.md describes these tables"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Knowledge:
-    """What is known before the fit.
+    """What a user knows of the links before the fit.
 
-    confidence  by number of the link; empty: nothing is stated
-    bounds      of masses and centres of mass
-    essential   how parameters are dropped; None: all are kept
+    confidence  accuracy of the file's values for a link, by the index of the link; empty: none is stated
+    bounds      bounds of masses and centres of mass
+    essential   how parameters that the data do not need are dropped; None: all are kept
     """
 
     confidence: Mapping[int, Confidence] = field(default_factory=dict)
@@ -52,9 +52,13 @@ def knowledge_of(
     share: float | None = None,
     essential: EssentialOptions | None = None,
 ) -> Knowledge:
-    """What tables and options say; InputError where they are wrong, or state confidence in values that the file lacks.
+    """Return what the user knows of the links before the fit, from the tables of a log description and from options.
+    Raises InputError if the tables are wrong. Also raises InputError if they state an accuracy for values that the
+    robot file does not give.
 
-    share  relative standard deviation of every link's mass, radius of gyration and inertia; None: what `prior` says
+    where  name of the log description, for messages
+    share  relative standard deviation of every link's mass, radius of gyration and inertia; None: the value in the
+           table `prior`
     """
     faults: list[str] = []
     if share is not None and not SHARES[0] <= share <= SHARES[1]:

@@ -1,4 +1,5 @@
-"""A known load on a robot: its torques along a log, and which joints its weight does not reach."""
+"""A known load on a robot: the joint torques that it causes along a log, and the joints on which its weight has no
+effect."""
 
 from __future__ import annotations
 
@@ -29,11 +30,12 @@ truer."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownLoad:
-    """A body of known mass on a frame of a robot.
+    """A body of known mass that is fixed to a frame of a robot.
 
-    mass, com, inertia  kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz); zeros: a
-                        point
-    frame               its name; None: the tip
+    mass     kg
+    com      (3,) m, centre of mass in the frame
+    inertia  (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz); zeros: a point mass
+    frame    name of the frame; None: the tip
     """
 
     mass: float
@@ -46,7 +48,9 @@ class KnownLoad:
         return not np.any(self.inertia)
 
     def parameters(self, chain: Mechanism) -> Array:
-        """(11 n,) standard parameters of the chain if it had no body but the load; InputError where no body is like it."""
+        """Return the standard parameters (11 n,) of a robot with n joints whose only body is the load. Each joint has
+        eleven: mass, first moments, inertia, drive inertia. Raises InputError if no real body has the mass and inertia
+        of the load."""
         place = carrying_frame(chain, self.frame)
         alone = np.zeros(PARAMETERS_PER_LINK * len(chain))
         alone[body_parameters(place.joint)] = load_parameters(
@@ -57,7 +61,8 @@ class KnownLoad:
     def torques(
         self, chain: Mechanism, logs: Sequence[AnyLog], options: FilterOptions, check: CheckOptions, rows: int
     ) -> Array:
-        """(N, n) N m that the load takes at the independent samples of checked logs, filtered as what was measured."""
+        """Return the joint torques (N, n joints), N m, that the load causes at N samples of checked logs. The samples
+        are those that count as independent, and the torques are filtered as the measured torques are."""
         alone = self.parameters(chain)
         found = []
         for log in logs:
@@ -72,7 +77,8 @@ class KnownLoad:
 
 
 def unreached(chain: Mechanism, q: Array, load: KnownLoad) -> dict[str, str]:
-    """Why a load's weight is not felt by a joint in any of the poses q (N, n), by joint name; other joints are left out."""
+    """Return, by joint name, why the weight of a load has (nearly) no effect on the joint in all poses q (N poses, n
+    joints). An example is a joint axis along gravity. Joints on which the weight acts are left out."""
     down = chain.gravity / (np.linalg.norm(chain.gravity) or 1.0)
     weight = load.mass * float(np.linalg.norm(chain.gravity))
     still = np.zeros_like(q)

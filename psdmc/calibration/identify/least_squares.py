@@ -1,5 +1,5 @@
-"""Linear least squares, shared by the steps: weights, robustness, standard deviations, and directions that the data do
-not show."""
+"""Linear least squares for all steps of the calibration. It weights joints and outliers, computes standard deviations,
+and finds directions (combinations of unknowns) that the data do not determine."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ def estimate(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """The solution of target = columns @ values by the least squares that the options choose.
+    """Return the least-squares solution of target = columns @ values for l unknown values.
 
-    columns  (N, n, l), target (N, n): samples that may be taken as independent (filter.thinned)
-    use      (N, n)  entries that count; None: all
-    prior    None: zero, in units of the columns, without a bound on believable values
+    columns  (N, n, l) torques of n joints per unit of each unknown, at N samples that count as independent
+             (filter.thinned)
+    target   (N, n) measured torques
+    use      (N, n) whether an entry is used; None: all are
+    prior    values before the fit, with a plausible size of each; None: zero, and sizes follow from the columns
     """
     noise = None if prior is None else prior.noise
     rows = [Block(columns, noise, None if consider is None else consider.columns)]
@@ -40,10 +42,14 @@ def estimate_rows(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """The same solution for columns that come block by block and need not be held at once.
+    """Return the least-squares solution of target = columns @ values, for columns that are read in blocks of samples.
+    So not all blocks have to be in memory at once.
 
-    considered  (k, k)  covariance of the quantities of the blocks' `consider` columns
-    prior       whose noise is the blocks'
+    rows        the blocks, with their noise columns
+    target      (N samples, n joints) measured torques
+    considered  (k, k) covariance of k results of earlier steps, on which the blocks' `consider` columns depend
+    use         (N, n) whether an entry is used; None: all are
+    prior       values before the fit, with a plausible size of each; the noise columns are in the blocks
     """
     options = options or FitOptions()
     use = np.ones(target.shape, dtype=bool) if use is None else use
@@ -145,7 +151,10 @@ class _Solved:
         )
 
     def estimate(self, covariance: Array | None) -> Estimate:
-        """The solution with its covariance; `covariance` (k, k) is that of the quantities considered, None without any."""
+        """Return the solution of the least-squares problem with its covariance.
+
+        covariance  (k, k) of the k results of earlier steps (Consider); None if there are none
+        """
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
         sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))

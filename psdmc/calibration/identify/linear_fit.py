@@ -1,7 +1,8 @@
-"""One linear fit of one log: base parameters, Coulomb and viscous friction, offsets.
+"""One linear fit of plain logs: base parameters, Coulomb and viscous friction, and constant torques (offsets).
 
-The alternative to the four steps for a single exciting log with torques, or currents with known constants. Regressor
-and friction columns pass through the same filter as the measurement.
+The fit replaces the four calibration steps (motors, gravity, friction, inertia) for a log of an exciting motion. The
+log has torques, or currents with known torque constants. The columns of the regressor and of friction are filtered as
+the measured torques are.
 """
 
 from __future__ import annotations
@@ -29,14 +30,15 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearResult:
-    """One vector: theta_b, then each joint's friction and offset, then the values of the extra columns.
+    """The result of a linear fit, one vector of l + n f + m values. They are l base parameters, then f friction values
+    (with offset) of each of n joints, then m values of springs and further friction.
 
-    estimate   of the whole vector, without constraints
-    problem    the rows of the fit
-    prior      the values in unseen directions
-    motors     that made torques of what was logged
-    dropped    (l + n f + m,)  entries that are left at the prior, as the data do not need them; None: none
-    stated     whether a prior of theta_b was joined with the data
+    estimate   of the whole vector, without physical constraints
+    problem    the rows of the least-squares problem
+    prior      values before the fit, which remain in directions (combinations) that the data do not determine
+    motors     the motors that convert logged effort to torques
+    dropped    (l + n f + m,) entries that keep the prior's value because the data do not need them; None: none
+    stated     whether the user stated how accurate the base parameters of the robot file are
     """
 
     estimate: Estimate
@@ -49,7 +51,7 @@ class LinearResult:
 
     @property
     def samples(self) -> int:
-        """Independent samples that were fitted, all joints together."""
+        """Return the number of fitted samples that count as independent, summed over all joints."""
         return int((~self.problem.held_out).sum()) * len(self.problem.chain)
 
     @property
@@ -66,13 +68,13 @@ class LinearResult:
 
     @property
     def friction(self) -> Array:
-        """(n, f) in the order of problem.friction."""
+        """Return the friction values (n joints, f values of each joint), in the order of `problem.friction`."""
         start, n = self.problem.l, len(self.problem.chain)
         return self.estimate.values[start : self.problem.first_extra].reshape(n, -1)
 
     @property
     def extra(self) -> Array:
-        """(m,) in the order of problem.columns.unknowns."""
+        """Return the m values of springs and further friction, in the order of `problem.columns.unknowns`."""
         return self.estimate.values[self.problem.first_extra :]
 
 
@@ -86,10 +88,13 @@ def calibrate_linear(
     theta_b: Array | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> LinearResult:
-    """Base parameters and simple friction by linear least squares; InputError where a log cannot be used.
+    """Return base parameters and plain friction from logs by linear least squares. Raises InputError if a log cannot be
+    used.
 
-    theta_b   (l,)  the file's values, kept in directions that the logs do not show; None: zero
-    progress  is told how much of the logs has been read
+    l         number of base parameters
+    theta_b   (l,) base parameters of the robot file. They remain in directions (linear combinations) that the logs do
+              not determine; None: zero
+    progress  function that is called with the share of the logs that has been read
     """
     options = options or LinearOptions()
     motors = motors or Motors.torques(len(chain))
@@ -97,7 +102,8 @@ def calibrate_linear(
     remarks = tuple(note for log in checked_logs for note in log.notes)
 
     def fitted(chosen: LinearOptions, carried: Array | None) -> LinearResult:
-        """One fit; `carried` (l,) are the base parameters of the load that friction depends on."""
+        """Return the result of one fit. `carried` (l,) are base parameters from which the torque on the joints is
+        computed, if friction depends on this torque; None: friction does not."""
         problem, resting = linear_problem(chain, model, l, checked_logs, chosen, motors, progress, carried)
         progress("linear fit: solving")
         prior = linear_prior(chain, model, problem, chosen, theta_b)
@@ -131,8 +137,9 @@ def _solved(
 def linear_prior(
     chain: Mechanism, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
 ) -> Prior:
-    """The file's theta_b, no springs, and friction where its laws start, which for psdmc's is zero; friction may be as large
-    as its joint's torque at an ordinary speed."""
+    """Return the values of all unknowns before a linear fit, with a plausible size of each. The values are the file's
+    base parameters, no springs, and the start values of friction laws. psdmc's own friction laws start from zero. The
+    plausible size of friction is the joint's torque at an ordinary speed."""
     sizes = torque_sizes(problem.torque[~problem.held_out])
     rigid = base_parameter_scale(chain, model, sizes, theta_b)
     own = np.repeat(sizes, len(problem.friction))

@@ -1,4 +1,4 @@
-"""How one linear fit is made: filter, split, friction, and a description's tables."""
+"""Options of a linear fit: filter, split for validation, friction terms, and the tables of a log description."""
 
 from __future__ import annotations
 
@@ -22,17 +22,21 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class LinearOptions:
-    """Options of the linear fit of one log.
+    """Options of the linear fit of plain logs.
 
-    exponents   of the viscous terms |qd|^d sign(qd), each with a coefficient of its own
+    filter      low-pass filter of the logs
+    split       share of each log that is held out for validation
+    exponents   exponents d of the viscous terms |qd|^d sign(qd), each with its own coefficient
     sign_speed  rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
-    offset      whether each joint's torque has a constant of its own
-    stretch     rows of a log that are filtered at once
-    coupling    C of q_joint = C q_motor where motors drive several joints: friction acts on the motors; empty: none
-    held_bytes  of columns that are held in memory; more of them go to a temporary file
-    tables      of a log description, as TOML gives them: springs, friction (docs/how-to/springs-and-friction.md, priors.md)
-    tables_from  the file that they are of, for messages
-    columns     made of these for a robot: springs and further friction, each value of which is one more unknown
+    offset      whether each joint has a constant torque
+    coupling    matrix C of q_joint = C q_motor if several motors drive a joint; friction then acts on the motors.
+                Empty: none
+    stretch     number of rows of a log that are filtered at once
+    held_bytes  largest number of bytes of columns in memory; more of them go to a temporary file
+    tables      springs and friction of a log description, as TOML gives them (docs/how-to/springs-and-friction.md,
+                priors.md)
+    tables_from  name of the file with these tables, for messages
+    columns     springs and further friction of a robot, made from these tables; each value is one more unknown
     """
 
     filter: FilterOptions = field(default_factory=lambda: FilterOptions(cutoff=8.0))
@@ -51,11 +55,12 @@ class LinearOptions:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """Friction of every joint."""
+        """Friction terms of every joint."""
         return every_joint_s(self.exponents, self.offset)
 
     def for_robot(self, chain: Mechanism) -> LinearOptions:
-        """These with the columns that the tables mean; InputError names what is wrong in them."""
+        """Return the options with the springs and friction of one robot, which are made from `tables`. Raises
+        InputError if the tables are wrong."""
         folder = Path(self.tables_from).parent
         columns = read_columns(self.tables, chain, self.tables_from, self.offset, folder)
         return replace(self, columns=columns, offset=self.offset and columns.plain_offsets)

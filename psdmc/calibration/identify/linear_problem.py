@@ -1,4 +1,5 @@
-"""The rows of one linear fit: columns of base parameters, friction and springs, filtered like the measured torques."""
+"""The rows of a linear least-squares problem. The columns of base parameters, friction and springs are filtered as the
+measured torques are."""
 
 from __future__ import annotations
 
@@ -25,12 +26,15 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearProblem:
-    """The stacked rows of independent samples.
+    """The rows of the linear least-squares problem at N samples that count as independent. The unknowns are l base
+    parameters, f values of plain friction of each of n joints, and m values of springs and further friction.
 
-    terms     of every joint's friction, which have f values
-    rows      of the l + n f + m unknowns, N samples, with what the position sensors' noise alone would make of them
-    torque    (N, n)  N m;  held_out (N,)
-    columns   whose m values come last
+    rows      N samples of the columns of the l + n f + m unknowns, and of the columns that the position sensors' noise
+              alone would give
+    torque    (N, n) measured torques, N m
+    held_out  (N,) whether a sample is held out for validation
+    terms     plain friction terms of every joint, which have f values together
+    columns   springs and further friction
     """
 
     chain: Mechanism
@@ -43,17 +47,18 @@ class LinearProblem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the n f + m unknowns behind the base parameters, for messages."""
+        """Return the names, for messages, of the unknowns after the l base parameters. They are f values of plain
+        friction for each of n joints, then m values of springs and further friction."""
         return (*(f"{name} of {joint}" for joint, name in self.plain), *self.columns.names)
 
     @property
     def friction(self) -> tuple[str, ...]:
-        """f names of a joint's values, in order."""
+        """Return the names of the f friction values that every joint has, in order."""
         return names_of(self.terms)
 
     @property
     def plain(self) -> tuple[tuple[str, str], ...]:
-        """n f joints and names of plain friction, in order."""
+        """Return the joint and the name of each value of plain friction, joint by joint."""
         return tuple((joint, name) for joint in self.chain.joint_names for name in self.friction)
 
     @property
@@ -62,24 +67,31 @@ class LinearProblem:
 
     @property
     def never_negative(self) -> NDArray[np.bool_]:
-        """(l + n f + m,) true for friction that only takes energy and may not be negative, and for extra columns that say
-        so."""
+        """Return, for each unknown, whether it may not be negative. Friction coefficients may not, because friction
+        only dissipates energy. The order is base parameters, plain friction, springs and further friction."""
         own = [value.low >= 0.0 for term in self.terms for value in term.law.values] * len(self.chain)
         return np.concatenate([np.zeros(self.l, dtype=bool), np.array(own), self.columns.never_negative])
 
     @property
     def limits(self) -> Array:
-        """(k, l + n f + m) whose products with the vector may not be negative either."""
+        """Return k rows of linear inequalities, an array (k, number of unknowns). The product of each row with the
+        vector of unknowns may not be negative."""
         return limits_of(self.columns, self.plain, self.l)
 
 
 def names_of(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Names of a joint's values, in order."""
+    """Return the names of all values of the given friction terms, in order, such as the Coulomb and the viscous
+    coefficient."""
     return tuple(name for term in terms for name in term.names)
 
 
 def friction_columns(terms: Sequence[Term], qd: Array, sign_speed: float) -> list[Array]:
-    """(N, n) each: torque per unit of each value, before the filter."""
+    """Return one array (N samples, n joints) for each friction value: the friction torque per unit of the value, before
+    any filter.
+
+    qd          (N, n) joint speeds
+    sign_speed  rad/s over which Coulomb friction changes sign
+    """
     at = At(v=qd, sign=np.tanh(qd / sign_speed))
     return [np.broadcast_to(column, qd.shape) for term in terms for column in term.columns(at)]
 
@@ -94,9 +106,10 @@ def linear_problem(
     progress: Callable[[str], None],
     carried: Array | None = None,
 ) -> tuple[LinearProblem, tuple[str, ...]]:
-    """The stacked independent samples of all logs, each log split separately; and remarks on joints that rest.
+    """Return the rows of the linear least-squares problem at the samples of all logs that count as independent. Also
+    returns remarks on logs of joints at rest. Each log is split for validation separately.
 
-    carried  (l,)  base parameters of the load that friction depends on, where a column asks for it
+    carried  (l,) base parameters from which the torque on the joints is computed, if friction depends on this torque
     """
     terms = options.terms
     width = l + len(chain) * len(names_of(terms)) + len(options.columns)
@@ -154,7 +167,8 @@ def _filtered_columns(
     carried: Array | None,
 ) -> Array:
     def whole(rows: slice) -> Array:
-        """Rigid columns and extra ones."""
+        """Return the torque columns of rigid bodies and of springs and further friction in one array, at some rows of
+        the log."""
         q, qd, qdd = (part[rows] for part in motion)
         rigid = model.regressor(q, qd, qdd)
         if not len(options.columns):

@@ -1,5 +1,5 @@
-"""Rows of a linear problem block by block, and the sums that a fit needs of them, so that no fit holds all rows at
-once."""
+"""Rows of a linear least-squares problem in blocks of samples, and sums over these rows that a fit needs. So no fit
+needs all rows in memory."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from psdmc.calibration.logs.log import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Some samples of a linear problem. N samples, n joints, l unknowns.
+    """Some of the samples of a linear least-squares problem, with N samples, n joints and l unknowns.
 
-    columns   (N, n, l)
-    noise     (N, n, l)  the columns that the sensors' noise alone would give; None: none
-    consider  (N, n, k)  columns of what is uncertain and not estimated (least_squares.Consider); None: nothing
+    columns   (N, n, l) torques per unit of each unknown
+    noise     (N, n, l) columns that the sensors' noise alone would give; None: none
+    consider  (N, n, k) columns of k quantities that are uncertain but not estimated (estimate.Consider); None: none
     """
 
     columns: Array
@@ -30,18 +30,20 @@ class Block:
 
 
 class Rows(Protocol):
-    """Blocks of a problem, in the order of its samples; may be iterated repeatedly."""
+    """The blocks of samples of a linear least-squares problem, in the order of the samples. They can be read
+    repeatedly."""
 
     def __iter__(self) -> Iterator[Block]: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """Weighted rows A and targets y in triangular form: R'R = A'A.
+    """A weighted linear least-squares problem in triangular form. A (rows, l) are the weighted columns of l unknowns, y
+    are the weighted targets, and `start` are values of the unknowns. R is triangular, with R'R = A'A.
 
-    factor  (l, l)  R
-    onto    (l,)    R^-T A'(y - A start)
-    noise   (l, l)  N'N of the weighted noise columns; None where there are none
+    factor  (l, l) R
+    onto    (l,)   R^-T A'(y - A start)
+    noise   (l, l) N'N of the weighted noise columns N; None if there are none
     """
 
     factor: Array
@@ -50,9 +52,12 @@ class Reduced:
 
 
 def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> Reduced:
-    """The triangular form of all blocks; only one block's rows and the triangle are held at a time.
+    """Return a linear least-squares problem in triangular form. Only the rows of one block of samples and the
+    triangular matrix are in memory at a time.
 
-    target, weights (N, n);  start (l,) from which targets are counted; None: zero
+    target   (N samples, n joints) measured torques
+    weights  (N, n) factors of the rows
+    start    (l,) values of the unknowns, whose torques are subtracted from `target` first; None: zero
     """
     triangle, noise, l = np.zeros((0, 0)), None, 0
     for block, own in _with_rows(rows):
@@ -71,7 +76,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
 
 
 def residual_of(rows: Rows, target: Array, values: Array) -> Array:
-    """(N, n) target less columns @ values."""
+    """Return the residual at all samples, an array (N samples, n joints): target minus columns @ values."""
     residual = np.empty_like(target)
     for block, own in _with_rows(rows):
         residual[own] = target[own] - block.columns @ values
@@ -80,11 +85,12 @@ def residual_of(rows: Rows, target: Array, values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collected:
-    """Sums over weighted rows for standard deviations.
+    """Sums over the weighted rows of a least-squares problem, from which standard deviations are computed. A are the
+    weighted columns of l unknowns.
 
-    squares   (n, l, l)  A'A of each joint's rows
-    scores    (c, l)     A' of the weighted residual, per stretch of time
-    consider  (l, k)     A' of the weighted columns of what is considered
+    squares   (n, l, l) A'A of the rows of each of n joints
+    scores    (c, l)    A' times the weighted residual, for each of c periods of time
+    consider  (l, k)    A' times the weighted columns of k results of earlier steps (Consider)
     """
 
     squares: Array
@@ -93,7 +99,12 @@ class Collected:
 
 
 def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Collected:
-    """The sums. `weighted` (N, n) is the residual; `clusters` the number of stretches of time, 0: none."""
+    """Return the sums over all rows of a least-squares problem from which standard deviations are computed.
+
+    weights   (N samples, n joints) factors of the rows
+    weighted  (N, n) residual times weights
+    clusters  number of periods of time for which `scores` are summed; 0: none
+    """
     count, n = weighted.shape
     squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
     for block, own in _with_rows(rows):

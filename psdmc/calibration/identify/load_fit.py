@@ -1,4 +1,5 @@
-"""A load's ten parameters from logs with it, by a model that is known without it: one linear fit, friction refitted."""
+"""Fits the ten inertial parameters of a load to logs of a robot that carries the load. The model of the robot without
+the load is known. Friction is fitted again."""
 
 from __future__ import annotations
 
@@ -30,7 +31,11 @@ LOAD_NAMES = ("mass", "m x", "m y", "m z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "I
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadRegressor:
-    """Torque per load parameter: Y map, (..., n, 10)."""
+    """The torque of each joint per unit of the ten parameters of a load, an array (..., n joints, 10). It is the
+    regressor of the model times the map from the load to base parameters.
+
+    map  (l, 10) change of the l base parameters per unit of each parameter of the load
+    """
 
     model: Regressor
     map: Array
@@ -41,12 +46,13 @@ class LoadRegressor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadFit:
-    """One vector: the load's ten parameters, then each joint's friction and offset.
+    """The result of the fit of a load, one vector: ten inertial parameters of the load, then each joint's friction and
+    constant torque (offset).
 
-    estimate   without constraints; its standard deviations include those of the model's theta_b
-    problem    the columns; its torque is the measured one
-    rigid      (N, n) what the model takes without the load and without friction
-    prior      no load, and the model's friction
+    estimate   without physical constraints; its standard deviations include those of the model's base parameters
+    problem    the rows of the least-squares problem
+    rigid      (N samples, n joints) torque of the model without the load and without friction
+    prior      values before the fit: no load, and the model's friction
     """
 
     estimate: Estimate
@@ -63,7 +69,8 @@ class LoadFit:
         return self.problem.never_negative
 
     def predicted(self, values: Array) -> Array:
-        """(N, n) torques of the whole vector."""
+        """Return the predicted torques (N samples, n joints) for a vector with the load's parameters and each joint's
+        friction and offset."""
         return np.concatenate([block.columns @ values for block in self.problem.rows]) + self.rigid
 
 
@@ -79,12 +86,13 @@ def fit_load(
     progress: Progress,
     beside: Callable[[States, NDArray[np.intp]], Array] | None = None,
 ) -> LoadFit:
-    """The load and the friction that explain what the model without the load leaves of checked logs' torques.
+    """Return the load and the friction that explain the difference between measured torques and the torques of the
+    model without the load.
 
-    onto_theta  (l, 10) theta_b that a load adds (psdmc.model.payload.load_map)
-    friction    (n, f) the model's own, in the order of friction_names; None: unknown
-    theta_std   (l,) standard deviations of the model's theta_b, taken as independent; zero where it has none
-    beside      (rows, n) torque at rows of states that the model has beside rigid bodies and plain friction; None: none
+    onto_theta  (l, 10) change of the l base parameters per unit of each load parameter (psdmc.model.payload.load_map)
+    friction    (n joints, f values) the model's own friction, in the order of friction_names; None: unknown
+    theta_std   (l,) standard deviations of the model's base parameters, taken as independent; zero if unknown
+    beside      function that returns the torques (rows, n) of springs and further friction at some rows; None: none
     """
     chain = model.mechanism
     load = LoadRegressor(regressor, onto_theta)

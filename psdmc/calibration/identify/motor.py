@@ -1,4 +1,4 @@
-"""Step one: torque constants from the current that a known load adds, (16) and (17)."""
+"""Step one: determines torque constants from the current that a known load adds. Source: Denso-2022, (16) and (17)."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ SMALLEST_SHARE = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorResult:
-    """Torque constants, joint by joint; NaN where the load cannot reach the joint, or no run was given.
+    """Torque constants of n joints. A value is NaN if the weight of the known load does not act on the joint. It is
+    also NaN if there is no recording for the joint.
 
-    torque_constant, std  (n,)  N m/A (N/A for sliding joints)
+    torque_constant, std  (n,) value and standard deviation, N m/A (N/A for sliding joints)
     """
 
     torque_constant: Array
@@ -43,9 +44,11 @@ class MotorResult:
 
 
 def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
-    """Torque constants from pairs of sweeps; InputError where a run is no sweep of its joint.
+    """Return torque constants from pairs of slow sweeps of one joint, without and with a known load. Raises InputError
+    if a recording is no sweep of its joint.
 
-    The current is fitted on the load's torque, which is known exactly, so that noise does not bias the slope.
+    The added current is fitted as a linear function of the load's torque, and the torque constant is the inverse of the
+    slope. The load's torque is known exactly, so noise in the current does not bias the slope.
     """
     n = len(chain)
     constant, std = np.full(n, np.nan), np.full(n, np.nan)
@@ -68,7 +71,7 @@ def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOp
 
 
 def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str, ...]:
-    """A warning for each torque constant (N m/A, NaN: none) that is negative."""
+    """Return a warning for each joint whose torque constant is negative. A constant (N m/A) is NaN if it is unknown."""
     return tuple(
         Remark(
             f"joint {name}: torque constant is negative: the current's sign is against the joint's",
@@ -82,7 +85,11 @@ def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str
 def judge_motors(
     chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
 ) -> StepQuality:
-    """Quality of the known load's torque against these constants (N m/A, by joint name) times the current that it adds."""
+    """Return, for each joint, how well the added current times the torque constant agrees with the torque of the known
+    load.
+
+    constants  N m/A by joint name
+    """
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []
     for k, joint in enumerate(chain.joints):

@@ -1,5 +1,4 @@
-"""Torque constants that turn logs into torques: given ones are checked against the joints and the quantities of the
-logs."""
+"""Checks given torque constants against the joints and against the quantities of the logs."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ LARGEST_CONSTANT = 1e6
 
 
 def require_constants(constants: Mapping[str, float], joint_names: Sequence[str]) -> None:
-    """InputError where a given torque constant is for no joint, or is no positive number."""
+    """Raise InputError if a given torque constant belongs to no joint, or is not a positive number."""
     unknown = [quoted(name) for name in constants if name not in joint_names]
     if unknown:
         raise InputError(
@@ -35,7 +34,8 @@ def require_constants(constants: Mapping[str, float], joint_names: Sequence[str]
 
 
 def one_quantity(logs: Sequence[AnyLog]) -> Quantity:
-    """The quantity that all logs hold; InputError names those that hold another."""
+    """Return the quantity that all logs record as effort: current or torque. Raises InputError with the names of the
+    logs if they record different quantities."""
     by_quantity: dict[Quantity, list[str]] = {}
     for log in logs:
         by_quantity.setdefault(log.quantity, []).append(log.name)
@@ -51,11 +51,12 @@ def one_quantity(logs: Sequence[AnyLog]) -> Quantity:
 def motors_of_logs(
     joint_names: Sequence[str], logs: Sequence[AnyLog], constants: Mapping[str, float] | None
 ) -> Motors:
-    """Torque per logged unit for plain logs.
+    """Return the motors that convert the effort in plain logs to torques.
 
-    constants   N m/A by joint name, for logs that hold currents
+    constants   N m/A by joint name, for logs of currents; None for logs of torques
 
-    Raises InputError where they are given for torques, are missing for currents, or the logs hold different quantities.
+    Raises InputError if constants are given for torques or missing for currents, or if the logs have different
+    quantities.
     """
     require_constants(constants or {}, joint_names)
     quantity = one_quantity(logs)
@@ -76,7 +77,7 @@ def motors_of_logs(
 
 
 def refuse_constants(constants: Mapping[str, float] | None, log: AnyLog) -> None:
-    """InputError where torque constants are given although a log holds torques."""
+    """Raise InputError if torque constants are given although a log holds torques."""
     if constants:
         raise InputError(
             f"{log.name}: holds {log.quantity}, which torque constants are not for",

@@ -1,18 +1,23 @@
-"""Torque constants from ordinary exciting logs, without and with a known load.
+"""Determines torque constants from ordinary exciting logs, recorded without and with a known load.
 
-What current i_k of joint k measures is
+The current i_k of joint k fulfils
 
     K_k i_k = Y_k theta_b + F_k phi + s w_k        s = 1 with the load, 0 without
 
-where w, the torque of the known load, sets the scale: without it K, theta_b and friction phi would have any common
-factor. All joints are one problem, because theta_b ties them: a joint that hardly feels the load's weight is found through
-the inertias that it shares with others. Noise is the current's, so that the residual, in torque, is
+K_k is the torque constant, and F_k phi is the friction. Y_k theta_b is the torque of the rigid bodies (regressor times
+base parameters). w_k is the torque of the known load, which sets the scale. Without it, K, theta_b and phi would have
+an arbitrary common factor.
+
+All joints form one problem, because they share theta_b. So a joint on which the load's weight hardly acts is determined
+through shared inertias. The noise is in the current, so the residual, in torque, is
 
     r_k = K_k i_k - (Y_k theta_b + F_k phi + s w_k) (1 - kappa_k)
 
-linear in kappa, the relative error of K_k, about the last torque: Gauss-Newton steps of a fit of currents, which noise does
-not bias. Gautier and Briot (Global identification of joint drive gains and dynamic parameters of robots, 2014) use total
-least squares for the same. Friction and offset have columns of their own with the load: bearings press harder then.
+kappa_k is the relative error of K_k. The residual is linearised in kappa about the torque of the last iteration. So the
+fit takes Gauss-Newton steps of a fit of currents, which noise does not bias. Gautier and Briot (Global identification
+of joint drive gains and dynamic parameters of robots, 2014) use total least squares instead.
+
+Friction and offset have separate columns with the load, because bearings are pressed harder then.
 """
 
 from __future__ import annotations
@@ -58,11 +63,12 @@ MOST_POSES = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRows:
-    """The problem's rows with friction apart for logs with the load, and a column for each torque constant.
+    """The rows of the fit of torque constants, with separate friction for logs with the load and a column for each
+    constant.
 
-    problem    of all logs; theta_b, friction and what else counts as such
-    with_load  (N,)    samples that were taken with it
-    torque     (N, n)  N m, of the last step
+    problem    rows of all logs, without the additional columns
+    with_load  (N samples,) whether a sample was recorded with the load
+    torque     (N, n joints) N m, current times torque constant of the last iteration
     """
 
     problem: LinearProblem
@@ -70,8 +76,12 @@ class LoadedRows:
     torque: Array
 
     def prior(self, plain: Prior) -> Prior:
-        """Of theta_b, friction without and with the load, and relative errors of torque constants, of which nothing is
-        known; `plain` is that of the problem's own unknowns."""
+        """Return the values of all unknowns before the fit, with a plausible size of each. The unknowns are base
+        parameters, friction without the load, friction with the load, and relative errors of torque constants. The
+        errors start from zero.
+
+        plain  values before the fit of base parameters and friction
+        """
         l, n = self.problem.l, self.torque.shape[1]
         values, scale = plain.values, plain.scale
         return Prior(
@@ -104,11 +114,13 @@ def motors_by_load(
     theta_b: Array | None,
     progress: Progress,
 ) -> MotorResult:
-    """Torque constants from checked logs of currents; NaN where the logs do not show one, with a warning that says why.
+    """Return torque constants from checked logs of currents, without and with a known load. A constant that the logs do
+    not determine is NaN, with a warning.
 
-    theta_b  (l,) the file's values, kept in directions that the logs do not show; None: zero
+    theta_b  (l,) the l base parameters of the robot file. They remain in directions (linear combinations) that the logs
+             do not determine; None: zero
 
-    Raises InputError where no joint shows the load, or all constants are negative.
+    Raises InputError if the load acts on no joint, or if all constants are negative.
     """
     logs = [*empty, *loaded]
     options = replace(

@@ -1,4 +1,4 @@
-"""Motor torque from logged effort, and what its uncertainty does to a fit of it."""
+"""Converts logged effort to motor torque, and gives the effect of uncertain torque constants on a fit."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from psdmc.calibration.logs.log import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motors:
-    """Torque per logged unit: K_t for currents, one for torques.
+    """The torque per logged unit of each motor: the torque constant for currents, one for torques.
 
-    torque_constant  (n,)  N m/A; one where torque is logged
+    torque_constant  (n,)  N m/A; one if torque is logged
     relative_std     (n,)  relative standard deviation
     """
 
@@ -24,24 +24,24 @@ class Motors:
 
     @staticmethod
     def torques(n: int) -> Motors:
-        """The motors of logs that hold torques: constants of one."""
+        """Return the motors for logs of torques: all constants are one."""
         return Motors(np.ones(n), np.zeros(n))
 
     def torque(self, effort: Array) -> Array:
-        """(..., n) motor torque of logged effort."""
+        """Return the motor torque (..., n) for logged effort."""
         return np.asarray(effort * self.torque_constant)
 
     @property
     def relative_covariance(self) -> Array | None:
-        """(n, n) of the constants' relative errors; None where all are exact."""
+        """Covariance (n, n) of the relative errors of the torque constants; None if all are exact."""
         return np.diag(self.relative_std**2) if self.relative_std.any() else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsByMotors:
-    """A problem's rows with the change of the torque per relative error of each torque constant.
+    """The rows of a problem, with the change of the torque per relative error of each torque constant.
 
-    torque  (N, n) N m, the problem's
+    torque  (N, n) N m, of the problem
     """
 
     rows: Rows

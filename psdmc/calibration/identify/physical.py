@@ -1,7 +1,9 @@
-"""Physically consistent parameters: every link's pseudo-inertia positive definite, every drive inertia positive.
+"""Finds physically consistent parameters: every link's pseudo-inertia is positive definite, and every drive inertia is
+positive.
 
-Wensing, Kim, Slotine 2018: parameters belong to a distribution of mass exactly where the 4 x 4 matrix of its integrals
-of 1, r and r r^T is positive. Then the mass matrix is positive definite everywhere, and forward dynamics exist.
+Parameters belong to a distribution of mass if and only if the 4 x 4 matrix of its integrals of 1, r and r r^T is
+positive (Wensing, Kim, Slotine 2018). Then the mass matrix is positive definite everywhere, and forward dynamics
+exist.
 """
 
 from __future__ import annotations
@@ -27,9 +29,9 @@ it determines what theta_b leaves open and changes nothing that theta_b fixes.""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounds:
-    """Rows R (k, 11 n) and sides r (k,) of standard parameters x: R x >= r.
+    """Linear bounds R x >= r of standard parameters x, with rows R (k, 11 n) and right sides r (k,).
 
-    names  k of them, for messages
+    names  names of the k bounds, for messages
     """
 
     rows: Array
@@ -40,7 +42,7 @@ class Bounds:
         return len(self.names)
 
     def reached(self, x: Array) -> tuple[str, ...]:
-        """Names of those that x (11 n,) does no more than fulfil."""
+        """Return the names of the bounds that x (11 n,) fulfils without margin."""
         if not self.names:
             return ()
         room = self.rows @ x - self.sides
@@ -54,14 +56,14 @@ NO_BOUNDS = Bounds(np.zeros((0, 0)), np.zeros(0), ())
 
 
 class NotPhysical(InputError):
-    """No parameters that a real robot could have were found near an estimate."""
+    """This error says that no physically possible parameters were found near an estimate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Physical:
-    """All values of the fit, theta_b first; theta_b = B x of physical standard parameters x (11 n,).
+    """All values of a fit, theta_b first, with theta_b = B x for physically possible standard parameters x (11 n,).
 
-    distance  from the unconstrained values, in standard deviations
+    distance  distance from the unconstrained values, in standard deviations
     """
 
     x: Array
@@ -79,17 +81,17 @@ def nearest_physical(
     fixed: NDArray[np.bool_] | None = None,
     bounds: Bounds = NO_BOUNDS,
 ) -> Physical:
-    """The parameters that a real robot could have, nearest to an estimate of the whole vector.
+    """Return the physically possible parameters that are nearest to an estimate of the whole vector.
 
-    values          (l + k,)  theta_b and whatever was estimated with it, friction and offsets
+    values          (l + k,)  theta_b and the friction and offsets that were estimated with it
     whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
     never_negative  (l + k,)  entries that may not be negative
-    limits          (m, l + k)  whose products with the vector may not be negative either
+    limits          (m, l + k)  rows whose products with the vector may not be negative either
     fixed           (l + k,)  entries that stay as they are
-    bounds          of standard parameters
+    bounds          bounds of standard parameters
 
-    For a linear fit that cost is what v adds to its sum of squares: one problem with its weights, and the prior where
-    the data show nothing. Raises InputError where cvxpy is missing, NotPhysical where no solution is found.
+    For a linear fit the cost is what v adds to the sum of squares, plus the prior in directions that the data do not
+    show. Raises InputError if cvxpy is missing, NotPhysical if no solution is found.
     """
     cp: Any = require_cvxpy()
     bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
@@ -181,15 +183,15 @@ def _nearest(
 
 
 def whitening_of(covariance: Array) -> Array:
-    """(m, m) W with W^T W the inverse of a covariance, by way of its correlations."""
+    """Return W (m, m) with W^T W the inverse of a covariance, computed from its correlations."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
     correlation = covariance / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
 
 
 def require_physical(model: DynamicsModel, x: Array) -> None:
-    """NotPhysical unless the solution's pseudo-inertias have no negative eigenvalue beyond rounding, whatever the
-    solver reports."""
+    """Raise NotPhysical if a pseudo-inertia of the solution has a negative eigenvalue beyond rounding. The solver's
+    own status is not relied on."""
     for joint, link in zip(model.mechanism.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
         matrix = np.zeros((4, 4))
         matrix[:3, :3] = second_moments(inertia_matrix(link))

@@ -1,4 +1,4 @@
-"""The load that a body can be, nearest to an estimate."""
+"""Finds the physically possible load that is nearest to an estimate."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ LOAD = 10
 
 
 def nearest_load(values: Array, whitening: Array, never_negative: NDArray[np.bool_]) -> Array:
-    """The whole vector whose first ten are the parameters of a body (points and rods included), nearest to `values`.
+    """Return the vector nearest to `values` whose first ten entries are the parameters of a real body, which may be a
+    point or rod.
 
-    The cost of v is |W (v - values)|^2, as of nearest_physical; entries that are never negative are friction's.
-    NotPhysical where the solver fails.
+    The cost of v is |W (v - values)|^2, as in nearest_physical; entries that may not be negative are friction. Raises
+    NotPhysical if the solver fails.
     """
     cp = require_cvxpy()
     size = 1.0 / np.linalg.norm(whitening, axis=0)
@@ -44,8 +45,8 @@ def nearest_load(values: Array, whitening: Array, never_negative: NDArray[np.boo
 
 
 def about_centre(load: Array) -> tuple[float, Array, Array]:
-    """Mass (kg), centre of mass (3,) and inertia about it (3, 3) of ten parameters; moments of second order that rounding
-    made negative are zero. Without mass: no centre, no inertia."""
+    """Return mass (kg), centre of mass (3,) and inertia about it (3, 3) from ten parameters. Second moments that
+    rounding made negative become zero. A load without mass has no centre and no inertia."""
     mass = float(load[0])
     if not mass > 0.0:
         return 0.0, np.zeros(3), np.zeros((3, 3))

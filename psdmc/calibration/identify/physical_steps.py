@@ -1,5 +1,5 @@
-"""Physical consistency of the four steps: theta_b and LuGre friction as one vector and one problem, with each step's
-own cost."""
+"""Makes the result of the four steps physically consistent. theta_b and LuGre friction form one vector, and each step
+contributes its own cost."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ SMALLEST = np.where(NEVER_NEGATIVE, STATE_LAW.bounds[0], -np.inf)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicalSteps:
-    """The four steps' result, moved to values that a robot can have.
+    """The result of the four steps, moved to physically possible values.
 
     theta_b   (l,)
-    found     the steps' result with friction moved along
-    distance  from the unconstrained vector, in standard deviations
+    found     the result of the four steps with adapted friction
+    distance  distance from the unconstrained vector, in standard deviations
     """
 
     theta_b: Array
@@ -46,11 +46,12 @@ class PhysicalSteps:
 def physical_steps(
     model: DynamicsModel, found: FourSteps, options: PhysicalOptions | None = None
 ) -> PhysicalSteps:
-    """The vector of theta_b and every joint's seven LuGre parameters that a robot can have, nearest to the four steps'.
+    """Return the physically possible vector of theta_b and all LuGre parameters that is nearest to the result of the
+    four steps.
 
-    The cost of a change is the sum of the steps' own: gravity's of phi, friction's of each joint's seven, and the
-    inertial step's of psi, whose estimate changes with phi and friction. So friction follows where theta_b has to
-    change, as far as its own run allows. Torque constants stay those of the known load.
+    The cost of a change is the sum of three costs: gravity's of phi, friction's of each joint's seven parameters, and
+    the inertial step's of psi, whose estimate depends on phi and friction. So friction adapts to a change of theta_b,
+    as far as the friction runs allow. Torque constants do not change.
     """
     joints = found.friction.joints
     unknowns = {name: unknowns_of(joint)[:SEVEN] for name, joint in joints.items()}

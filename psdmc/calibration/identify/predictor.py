@@ -1,4 +1,5 @@
-"""The regressor that calibration needs of a model. Compiled robots have it; here is one from the recursion."""
+"""The regressor that a calibration needs. Compiled robots have one; this module computes it in NumPy without a
+compiler."""
 
 from __future__ import annotations
 
@@ -15,13 +16,14 @@ from psdmc.robot.mechanism import Mechanism
 
 
 class Regressor(Protocol):
-    """Y with tau = Y theta_b: q, qd, qdd (..., n) -> (..., n, l). psdmc.compile(model) is one, fast."""
+    """An object that computes Y with tau = Y theta_b: q, qd, qdd (..., n) -> (..., n, l). psdmc.compile(model) is a
+    fast one."""
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array: ...
 
 
 class ChainRegressor:
-    """The regressor of a model by Newton-Euler on arrays of states; needs no compiler."""
+    """The regressor of a model, computed in NumPy by the Newton-Euler recursion. It needs no compiler."""
 
     def __init__(self, model: DynamicsModel) -> None:
         chain = model.mechanism
@@ -46,9 +48,10 @@ class ChainRegressor:
 
 
 def expansion(model: DynamicsModel) -> Array:
-    """(11 n, l) standard parameters, within the chain's span, from theta_b: B @ expansion = identity.
+    """Return the matrix (11 n, l) from theta_b to standard parameters that the assumptions allow: B @ expansion =
+    identity.
 
-    Where B is in echelon form, its unit columns give sparse ones.
+    If B is in echelon form, its unit columns give sparse standard parameters.
     """
     span = model.mechanism.parameter_span
     reduced = model.B @ span
@@ -63,13 +66,14 @@ def expansion(model: DynamicsModel) -> Array:
 
 
 def gravity_regressor(model: Regressor, q: Array) -> Array:
-    """Y_grav(q), (..., n, l): the regressor of gravity alone."""
+    """Return Y_grav(q), (..., n, l): the regressor of gravity alone."""
     still = np.zeros_like(q)
     return model.regressor(q, still, still)
 
 
 def payload_torque(chain: Mechanism, q: Array, mass: float, com: tuple[float, float, float]) -> Array:
-    """(N, n) N m that hold a mass (kg) at `com` (m, tip frame) against gravity: -J^T f with f of (17)."""
+    """Return the torques (N, n), N m, that hold a mass (kg) at `com` (m, tip frame) against gravity: -J^T f with f of
+    (17) in Denso-2022."""
     frames = frames_of(chain)
     states = [q[:, k] for k in range(len(chain))]
     rotation, _ = frame_placement(frames, chain.tip_body, chain.tip, states)

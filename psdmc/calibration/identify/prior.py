@@ -1,4 +1,4 @@
-"""Believable values of parameters before any fit: the file's, and how far from them the truth may lie."""
+"""Plausible values of parameters before a fit: the file's values, and a plausible distance of the truth from them."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ NO_EFFECT = 1e-9
 
 
 def torque_sizes(torque: Array) -> Array:
-    """(n,) RMS of each joint's torque (N, n), N m; none below QUIET_JOINT of the largest."""
+    """Return the RMS (n,) of each joint's torque (N, n), N m, but at least QUIET_JOINT times the largest."""
     size = np.sqrt(np.mean(torque**2, axis=0))
     return np.asarray(np.maximum(size, QUIET_JOINT * float(size.max(initial=0.0)) or 1.0))
 
 
 def base_parameter_scale(chain: Mechanism, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
-    """(l,) believable size of each base parameter: the value that would explain a joint's whole torque in an ordinary
-    motion.
+    """Return a plausible size (l,) of each base parameter: the value that explains a joint's whole torque in an
+    ordinary motion.
 
-    sizes    (n,) N m, of the joints' torques
-    theta_b  the file's values, which are believable themselves; None where it has none
+    sizes    (n,) N m, typical torques of the joints
+    theta_b  the file's values, which are plausible, too; None if it has none
     """
     rng = np.random.default_rng(SEED)
     n = len(chain)

@@ -1,4 +1,4 @@
-"""The quality of a prediction: RMSE and R^2."""
+"""The quality of predicted torques: root mean square error (RMSE) and R^2."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from psdmc.model.calibrated import Quality
 
 
 def quality(measured: Array, predicted: Array) -> Quality:
-    """The quality of one joint, (N,) each: R^2 = 1 - sum of squared errors over that about the mean."""
+    """Return the quality for one joint, from arrays (N,). R^2 is one minus the sum of squared errors over that about
+    the mean."""
     if len(measured) == 0:
         return Quality(float("nan"), float("nan"))
     error = float(np.mean((measured - predicted) ** 2))
@@ -18,5 +19,5 @@ def quality(measured: Array, predicted: Array) -> Quality:
 
 
 def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
-    """The quality of every joint, (N, n) each."""
+    """Return the quality for every joint, from arrays (N, n)."""
     return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))

@@ -1,4 +1,5 @@
-"""Statistics of a fit's residuals: their size, whether they are noise, and how many independent samples they count as."""
+"""Statistics of a fit's residuals: their size, whether they are noise, and to how many independent samples they
+correspond."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from psdmc.model.calibrated import Remark
 
 
 class Judged(Protocol):
-    """A solution with the correlation of its residuals: least_squares.Estimate."""
+    """A solution with the correlation of its residuals, such as least_squares.Estimate."""
 
     @property
     def correlation(self) -> Array: ...
@@ -23,13 +24,13 @@ class Judged(Protocol):
 
 
 def spread(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """(n,) RMS of each joint's usable residuals; zero where it has none."""
+    """Return the RMS (n,) of each joint's usable residuals; zero for a joint without any."""
     count = np.maximum(use.sum(axis=0), 1)
     return np.asarray(np.sqrt(np.sum(np.where(use, residual, 0.0) ** 2, axis=0) / count))
 
 
 def sample_correlation(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """(n,) lag-one autocorrelation of each joint's usable residuals about zero."""
+    """Return the lag-one autocorrelation (n,) of each joint's usable residuals about zero."""
     both = use[1:] & use[:-1]
     product = np.sum(np.where(both, residual[1:] * residual[:-1], 0.0), axis=0)
     power = np.sum(np.where(both, 0.5 * (residual[1:] ** 2 + residual[:-1] ** 2), 0.0), axis=0)
@@ -43,12 +44,12 @@ FEWEST_PAIRS = 20
 
 
 def widening(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """(n,) factor by which correlated residuals widen standard deviations: the root of samples per effective sample, >=
-    1.
+    """Return the factor (n,) by which correlated residuals increase standard deviations. It is at least 1.
 
-    The larger of two estimates. An autoregressive process with the lag-one correlation r has (1 + r) / (1 - r) samples
-    per effective one; any stationary process has 1 + 2 sum of its correlations, summed in pairs until the first that is
-    not positive (Geyer 1992). The former is right for short logs, the latter for noise of several time scales.
+    The factor is the root of the number of samples per independent sample, the larger of two estimates. An
+    autoregressive process with lag-one correlation r has (1 + r) / (1 - r). Any stationary process has 1 + 2 sum of
+    its correlations, summed in pairs up to the first pair that is not positive (Geyer 1992). The first estimate is
+    better for short logs, the second for noise with several time scales.
     """
     first = np.clip(sample_correlation(residual, use), 0.0, SURELY)
     each = [_samples_per_effective(residual[:, k], use[:, k]) for k in range(residual.shape[1])]
@@ -78,7 +79,8 @@ NOISY = 1.7
 
 
 def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tuple[str, ...]:
-    """Warnings where residuals are not noise: the model lacks an effect, and standard deviations were widened for it."""
+    """Return warnings if residuals are not noise: the model lacks an effect, and standard deviations were increased
+    for it."""
     found = [
         (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
     ]

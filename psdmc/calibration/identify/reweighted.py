@@ -1,9 +1,9 @@
-"""What Huber's weights do to the standard deviations of a reweighted fit.
+"""Standard deviations of a fit with Huber's weights, which reduce the effect of outliers.
 
-Such a fit solves sum of psi(u) x = 0 with u the residual in standard deviations, psi(u) = u up to a bound and the bound
-beyond. Its covariance is B^-1 C B^-1 with B the sum of mean(psi') x x' and C the sum of mean(psi^2) x x' (Huber 1981,
-chapter 7). Weighted least squares with w = psi(u) / u would put mean(w) for the one and mean(w) mean(w u^2) for the
-other: 10 % too little for normal errors and a bound of 1.345.
+The fit solves sum of psi(u) x = 0, where u is the residual in standard deviations, and psi(u) = u limited to plus or
+minus a bound. Its covariance is B^-1 C B^-1 with B the sum of mean(psi') x x' and C the sum of mean(psi^2) x x' (Huber
+1981, chapter 7). The formula of weighted least squares with w = psi(u) / u would use mean(w) and mean(w) mean(w u^2)
+instead. Its standard deviations are 10 % too small for normal errors and a bound of 1.345.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ below the bound. Less is left from a round whose residual was another one."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sandwich:
-    """Factors of the rows' own squares w x x', joint by joint.
+    """Factors for the squares w x x' of the rows, joint by joint.
 
-    slope  (n,)  B's: mean(psi') / mean(w)
-    level  (n,)  C's: mean(psi^2) / mean(w), in the weighted residual's unit, squared
-    unit   what the fit's weighted sum of squares is worth in variances, all joints together: level / slope^2
+    slope  (n,)  factor for B: mean(psi') / mean(w)
+    level  (n,)  factor for C: mean(psi^2) / mean(w), in the weighted residual's unit, squared
+    unit   variance per unit of the fit's weighted sum of squares, for all joints together: level / slope^2
     """
 
     slope: Array
@@ -35,16 +35,16 @@ class Sandwich:
 
 
 def squares(n: int, variance: float) -> Sandwich:
-    """Of a fit without reweighting, whose weighted residual has this variance."""
+    """Return the factors for a fit without reweighting, whose weighted residual has this variance."""
     return Sandwich(np.ones(n), np.full(n, variance), variance)
 
 
 def huber_sandwich(weighted: Array, use: NDArray[np.bool_], bound: float, share: float) -> Sandwich:
-    """Of Huber's weights.
+    """Return the factors for Huber's weights.
 
     weighted  (N, n)  sqrt(w) u
-    use       (N, n)  entries that count
-    share     of the samples that are left beside the unknowns: small samples are enlarged by as much
+    use       (N, n)  entries that are used
+    share     degrees of freedom as a share of the samples; for small samples the result is larger
     """
     each = [_factors(weighted[use[:, k], k], bound, share) for k in range(weighted.shape[1])]
     slope, level = np.array(each).T

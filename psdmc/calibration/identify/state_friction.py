@@ -1,4 +1,4 @@
-"""Torque of a friction law with a state along a motion: its PROGRAMs, compiled."""
+"""Computes the torque of a friction law with a state (LuGre) along a motion, with compiled code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PARAMETERS = STATE_LAW.parameters
 
 @dataclass(frozen=True, slots=True)
 class StateLawView:
-    """The law's C functions, as templates print them."""
+    """The C functions of the friction law, for templates."""
 
     real: str = "double"
 
@@ -44,9 +44,11 @@ class StateLawView:
 
 
 def friction_torque(values: Array, qd: Array, period: float, z: float = 0.0) -> Array:
-    """(N,) N m along speeds (N,) at even samples, linear between them; the state starts at z.
+    """Return the friction torque (N,), N m, along speeds (N,) at equal time steps, with linear interpolation between
+    them.
 
-    values  (m,) the law's, in the order of PARAMETERS
+    values  (m,) values of the law, in the order of PARAMETERS
+    z       state of the law at the start
     """
     speeds = np.ascontiguousarray(qd, dtype=np.float64)
     if speeds.ndim != 1:

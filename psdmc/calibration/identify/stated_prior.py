@@ -1,5 +1,5 @@
-"""The file's bodies as knowledge with a stated confidence: a normal prior of theta_b, and the estimate that joins it with
-the data."""
+"""Uses the bodies in the robot file as a prior with a stated confidence: a normal prior of theta_b, combined with the
+data."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ VAGUE = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Confidence:
-    """How well a link's body is known: standard deviations.
+    """How well a link's body is known: standard deviations of its values.
 
-    mass     share of the file's
+    mass     as a share of the file's mass
     com      m
-    inertia  share of the file's moments about the centre of mass, and of the drive inertia
+    inertia  as a share of the file's moments about the centre of mass, and of the drive inertia
     """
 
     mass: float
@@ -34,15 +34,17 @@ class Confidence:
 
 
 def body_confidence(link: Array, share: float) -> Confidence:
-    """The same share of mass, radius of gyration and inertia, of a link's standard parameters (11,)."""
+    """Return the confidence for a link's standard parameters (11,) if mass, radius of gyration and inertia have the
+    same relative standard deviation."""
     mass, inertia = max(float(link[0]), np.finfo(float).tiny), _about_centre(link)
     return Confidence(share, share * float(np.sqrt(max(np.trace(inertia), 0.0) / (2.0 * mass))), share)
 
 
 def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence], scale: Array) -> Array:
-    """(l, l) of theta_b, from what is stated of links by number; the others are vaguely known.
+    """Return the prior covariance (l, l) of theta_b from the confidence in links, by index; other links are nearly
+    unknown.
 
-    scale  (l, ...)  how large a base parameter may believably be: all that is known of one that contains unknowns or is zero
+    scale  (l, ...)  plausible size of a base parameter: its standard deviation if it contains unknowns or is zero
     """
     covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
     for k, link in enumerate(model.mechanism.known_parameters):
@@ -87,12 +89,13 @@ def _about_centre(link: Array) -> Array:
 
 
 def with_prior(solved: Estimate, theta_b: Array, covariance: Array, unknown: Sequence[int] = ()) -> Estimate:
-    """The estimate that is likeliest by data and prior together (maximum a posteriori; both normal).
+    """Return the most likely estimate for data and prior together (maximum a posteriori; both normal).
 
-    theta_b, covariance   (l,), (l, l)  of the prior of the vector's first l entries
-    unknown               those of them that it does not make known
+    theta_b, covariance   (l,), (l, l)  prior of the first l entries of the vector
+    unknown               those of these entries that the prior does not determine
 
-    Hidden directions are kept for what is said of visibility; standard deviations are those of both together.
+    The result keeps the directions that the data do not show, for messages. Its standard deviations are those of data
+    and prior together.
     """
     l, m = len(theta_b), len(solved.values)
     by_data = whitening_of(solved.total_covariance + solved.prior_covariance)

@@ -1,4 +1,4 @@
-"""Inputs and results that the four steps share: runs, options, qualities."""
+"""Data classes that the four steps of the calibration share: runs, options, and the quality of predictions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from psdmc.model.calibrated import JointQuality, Sample, StepQuality, StepUsed
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A known mass (kg) at the tip; com (m) in the tip frame."""
+    """A known mass (kg) at the tip; com is its centre of mass (m) in the tip frame."""
 
     mass: float
     com: tuple[float, float, float]
@@ -27,7 +27,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorRun:
-    """One joint swept to and fro at constant speed, without and with a known load."""
+    """A run that sweeps one joint forwards and backwards at constant speed, without and with a known load."""
 
     joint: str
     unloaded: Log
@@ -37,7 +37,8 @@ class MotorRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityRun:
-    """All joints at constant speeds, then the same path backwards; `tool` is the known load at the tip, if any."""
+    """A run of all joints at constant speeds, then along the same path backwards; `tool` is the known load at the tip,
+    if any."""
 
     log: Log
     tool: Load | None = None
@@ -45,7 +46,7 @@ class GravityRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionRun:
-    """One joint through sines of growing amplitude, the others at rest."""
+    """A run of one joint along sines of growing amplitude, while the other joints rest."""
 
     joint: str
     log: Log
@@ -54,7 +55,7 @@ class FrictionRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InertialRun:
-    """A fast, exciting motion of all joints."""
+    """A run with a fast, exciting motion of all joints."""
 
     log: Log
     tool: Load | None = None
@@ -62,7 +63,7 @@ class InertialRun:
 
 @dataclass(frozen=True, slots=True)
 class StepOptions:
-    """Filter, split and solution of one step."""
+    """Options of one step: filter, validation split, and solution of the linear problem."""
 
     filter: FilterOptions
     split: SplitOptions = field(default_factory=SplitOptions)
@@ -70,13 +71,13 @@ class StepOptions:
 
     @property
     def used(self) -> StepUsed:
-        """What a calibrated model keeps of it."""
+        """The options that a calibrated model stores."""
         low_pass, split = self.filter, self.split
         return StepUsed(low_pass.cutoff, low_pass.order, low_pass.settle, split.held_out, split.blocks)
 
 
 def step_of(used: StepUsed) -> StepOptions:
-    """The options of a step that a calibrated model keeps; InputError where they cannot be."""
+    """Return the options of a step that a calibrated model stores. Raises InputError if they are not possible."""
     return StepOptions(
         FilterOptions(used.cutoff, used.order, used.settle), SplitOptions(used.held_out, used.blocks)
     )
@@ -84,16 +85,16 @@ def step_of(used: StepUsed) -> StepOptions:
 
 @dataclass(frozen=True, slots=True)
 class FrictionOptions:
-    """How the seven LuGre parameters are found.
+    """How the seven LuGre parameters are determined.
 
     law             lugre: all seven; coulomb_viscous: F_c and a linear F_v only
-    fast            speed above which pre-sliding is ignored in the first step, share of the run's largest
-    sliding         speed above which plain friction is fitted, share of the run's largest
+    fast            speed above which pre-sliding is ignored in the first step, as a share of the run's largest speed
+    sliding         speed above which plain friction is fitted, as a share of the run's largest speed
     simplex_steps   largest number of Nelder-Mead evaluations
-    estimate_delay  whether the time between position and current is estimated with them
+    estimate_delay  whether the time between position and current is estimated, too
     largest_delay   s
-    unseen          relative standard deviation from which a parameter is marked unseen
-    workers         processes; joints are independent
+    unseen          relative standard deviation above which a parameter counts as not determined
+    workers         number of processes; joints are independent
     """
 
     law: Literal["lugre", "coulomb_viscous"] = "lugre"
@@ -108,10 +109,10 @@ class FrictionOptions:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
-    """All four steps, with the cut-offs of Denso-2022.
+    """Options of all four steps, with the cut-off frequencies of Denso-2022.
 
-    passes   how often gravity, friction and inertia are repeated: from the second pass on, the inertial torque of the
-             first is subtracted in the gravity step (the paper's single pass neglects it)
+    passes   how often gravity, friction and inertia are repeated. From the second pass on, the gravity step subtracts the
+             inertial torque of the previous pass; the paper has one pass and neglects it
     """
 
     motor: StepOptions = field(default_factory=lambda: StepOptions(FilterOptions(cutoff=4.0)))
@@ -132,9 +133,9 @@ def judged(
     use: NDArray[np.bool_] | None = None,
     abscissa: str = "time [s]",
 ) -> StepQuality:
-    """Quality and samples of every joint.
+    """Return the quality for every joint, and samples to plot.
 
-    x (N,), measured and predicted (N, n), out (N,) held-out rows; use (N, n) entries that count, None: all
+    x (N,), measured and predicted (N, n), out (N,) held-out rows; use (N, n) entries that are used, None: all
     """
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []

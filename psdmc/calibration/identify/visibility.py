@@ -1,4 +1,4 @@
-"""Which unknowns the data show: alone, weakly, only in combination with others, or not at all."""
+"""Determines which unknowns the data show: alone, weakly, only in combination with others, or not at all."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Visibility:
     """What the data show of each unknown.
 
     words       (m)  Remarks: "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
-    determined  (m,) whether the data fix the unknown by itself, however weakly: then it has a standard deviation
+    determined  (m,) whether the data determine the unknown by itself, however weakly; if so, it has a standard deviation
     """
 
     words: tuple[Remark, ...]
@@ -45,11 +45,11 @@ def visibility(
     kept_at: Sequence[str],
     options: FitOptions | None = None,
 ) -> Visibility:
-    """Words for every unknown.
+    """Return the words for every unknown.
 
-    values, std   (m,)    delivered
-    unseen        (m, k)  directions in units of what is believable
-    kept_at       (m)     where each is kept if it is unseen, in words
+    values, std   (m,)    final values
+    unseen        (m, k)  directions that the data do not show, in units of plausible sizes
+    kept_at       (m)     in words, the value at which an unknown stays if the data do not show it
     """
     limit = (options or FitOptions()).unseen_share
     share = np.minimum(np.sum(unseen**2, axis=1), 1.0)
@@ -72,7 +72,8 @@ BY_PRIOR = Remark("by the stated prior more than by the data", "stated")
 def as_fitted(
     seen: Visibility, kept_at: Sequence[str], dropped: NDArray[np.bool_], stated: NDArray[np.bool_]
 ) -> Visibility:
-    """The words of unknowns of which some were dropped, and those that are `stated` have a prior of stated confidence."""
+    """Return the words of unknowns after some were dropped. Unknowns that are `stated` have a prior with a stated
+    confidence."""
     words = [
         Remark(f"not essential: kept at {kept_at[k]}", "dropped")
         if dropped[k]
@@ -99,7 +100,7 @@ def _unseen(
 
 
 def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
-    """One sentence for each way in which the data do not show unknowns, friction and offsets like base parameters."""
+    """Return a sentence for each way in which the data do not show unknowns, friction and offsets included."""
     together = [
         f"{name} (with {words.removeprefix(TOGETHER_WORDS)})"
         for name, words in zip(names, found.words, strict=True)
@@ -119,7 +120,7 @@ def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> t
 
 
 def weak_notes(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
-    """Notes that name the unknowns that the data fix hardly better than to their own size."""
+    """Return notes with the names of unknowns whose standard deviation is almost as large as their value."""
     weak = [name for name, words in zip(names, found.words, strict=True) if words.code == WEAK.code]
     if not weak:
         return ()

@@ -1,7 +1,7 @@
-"""Sizes of packed bags, bounded before a reader allocates memory for what they unpack to.
+"""Limits the size of compressed bags before a reader allocates memory for their content.
 
-rosbag2 packs files as a whole, messages one by one, or chunks of an MCAP file. The unpacked size that a packed file
-states is a claim, and readers that allocate memory for whatever comes out would trust it.
+rosbag2 compresses whole files, single messages, or chunks of an MCAP file. A damaged file can state a wrong unpacked
+size, on which readers would rely.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ PIECE = 2**20
 
 
 def require_packed_file(file: Path) -> None:
-    """InputError where a file that is compressed as a whole unpacks to more than its size makes plausible, or to an
-    MCAP file whose chunks do. It is unpacked into a temporary file to check the latter."""
+    """Raise InputError if a compressed file unpacks to more than is plausible for its size, or to an MCAP file whose
+    chunks do. For the second check it is unpacked into a temporary file."""
     allowed = _allowed(file)
     with opened(file) as packed, tempfile.TemporaryDirectory() as folder:
         inside = Path(folder) / "inside"
@@ -57,7 +57,8 @@ def require_packed_file(file: Path) -> None:
 
 
 def require_packed_messages(file: Path) -> None:
-    """InputError where messages that are compressed one by one unpack to more than the file's size makes plausible."""
+    """Raise InputError if messages that are compressed one by one unpack to more than is plausible for the size of the
+    file."""
     if file.suffix.lower() != ".db3":
         raise InputError(
             f"{file}: messages packed one by one in a file that is not SQLite's are not read",
@@ -89,8 +90,8 @@ def _require(size: int, allowed: int, file: Path) -> None:
 
 
 def require_mcap_size(path: Path) -> None:
-    """InputError where a record is longer than the file, or chunks or their index unpack to more than its size allows,
-    or than their heads say."""
+    """Raise InputError if a record of an MCAP file is longer than the file. The same applies if its chunks or their
+    index unpack to more than is plausible for its size, or to more than their headers say."""
     with opened(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")
@@ -205,9 +206,9 @@ def _indexed(file: BinaryIO, place: int, length: int) -> tuple[int, str, int, in
 
 
 def unpacked_size(file: BinaryIO, packed: int, packing: str, most: int, keep: BinaryIO | None = None) -> int:
-    """Bytes that the next `packed` bytes of a file unpack to; counting stops beyond `most`.
+    """Return the number of bytes to which the next `packed` bytes of a file unpack. Counting stops above `most`.
 
-    keep     where they are written, if anywhere
+    keep     file into which the unpacked bytes are written; None: they are only counted
     packing  'bz2', 'lz4' or 'zstd'; for any other, 0
     """
     start = _unpackers().get(packing)
@@ -255,7 +256,7 @@ ROS1_CHUNK = b"op=\x05"
 
 
 def require_ros1_sizes(file: BinaryIO, path: Path) -> None:
-    """InputError if a file is no ROS 1 bag, or its chunks unpack to more than its size makes plausible.
+    """Raise InputError if a file is no ROS 1 bag, or if its chunks unpack to more than is plausible for its size.
 
     A bag is a list of records: the length of a header, its fields (each a length and NAME=VALUE), the length of the
     data, the data (https://wiki.ros.org/Bags/Format/2.0).

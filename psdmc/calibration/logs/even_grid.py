@@ -1,4 +1,4 @@
-"""A log's rows on an even grid of times: unchanged where they lie on it, resampled where they do not."""
+"""Puts the rows of a log on equal time steps. Rows that are there already stay unchanged; others are resampled."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from psdmc.calibration.logs.stored_log import AnyLog
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvenGrid:
-    """Times of a log's median period from its first row to its last, from zero.
+    """Equal time steps of a log's median period, from its first row to its last, beginning at zero.
 
-    same  whether the log's rows lie on them already
+    same  whether the log's rows already have these times
     """
 
     time: Array
@@ -31,7 +31,7 @@ class EvenGrid:
 
 
 def even_grid(log: AnyLog) -> EvenGrid:
-    """The even grid of a log."""
+    """Return the times with equal steps for a log."""
     count = round(log.duration / log.period) + 1
     even = np.linspace(0.0, log.duration, count)
     same = count == len(log) and bool(np.abs(even - (log.time - log.time[0])).max() < 1e-6 * log.period)
@@ -43,7 +43,8 @@ NEIGHBOURS = 4
 
 
 def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[Array, Array]:
-    """Position and effort at rows first to last of the grid; rows that are evenly spaced stay as they are."""
+    """Return position and effort at rows `first` to `last` of the grid. Rows that have equal steps already stay
+    unchanged."""
     if grid.same:
         part = log.rows(first, last)
         return part.position, part.effort

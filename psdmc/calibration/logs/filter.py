@@ -1,4 +1,5 @@
-"""Evenly spaced, smooth states from a log's rows: resampling, zero-phase low-pass, central differences, split."""
+"""Computes smooth states from a log: resampling to equal time steps, zero-phase low-pass filter, central differences,
+and the split for validation."""
 
 from __future__ import annotations
 
@@ -28,8 +29,8 @@ from psdmc.errors import InputError
 class SplitOptions:
     """Which samples are held out for validation.
 
-    held_out   share of the samples; the paper's 85/15
-    blocks     0: the last part of the log; else the log is cut into this many blocks, and a share of them, evenly
+    held_out   share of the samples; the paper (Denso-2022) holds out 15 %
+    blocks     0: the last part of the log; else the log is divided into this many blocks, and a share of them, evenly
                spread, is held out
     """
 
@@ -39,18 +40,18 @@ class SplitOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class States:
-    """A filtered log on an even time grid. N samples, n joints.
+    """A filtered log at equal time steps, with N samples and n joints.
 
     time, period      s
     q, qd, qdd        (N, n)  rad, rad/s, rad/s^2 (m for sliding joints)
     effort            (N, n)  as logged, filtered like q
-    use               (N,)    False where the filter starts up
-    low_pass          the filter, for predictions to be compared with `effort`
+    use               (N,)    False at the ends of the log, where the filter has not settled
+    low_pass          the filter, for predictions that are compared with `effort`
     cutoff            Hz, of that filter
-    noise             (n,)    standard deviation of a raw position sample, rad (m); zero for joints that rest
-    still             (n,)    joints whose motion is no more than noise: their rates are exactly zero
+    noise             (n,)    standard deviation of an unfiltered position sample, rad (m); zero for joints that rest
+    still             (n,)    whether a joint's motion is no more than noise: its rates are exactly zero then
     motion            (n,)    of the whole log, peak to peak, rad (m)
-    first             row of the log's even grid that is the first one here
+    first             row of the log's time grid that is the first row of these states
     raw               (N, n)  effort before the filter
     """
 
@@ -70,15 +71,15 @@ class States:
     raw: Array
 
     def jittered(self) -> tuple[Array, Array, Array]:
-        """q, qd, qdd (N, n) with another draw of the position noise."""
+        """Return q, qd, qdd (N, n) with another random sample of the position noise."""
         draw = self.low_pass(noise_like(self.noise, self.first, self.first + len(self.time)))
         rate, acceleration = central_differences(draw, self.period)
         return self.q + draw, self.qd + rate, self.qdd + acceleration
 
 
 def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
-    """States of a checked log, held as a whole. A joint that moves by no more than its sensor's noise gets rates of
-    exactly zero, so that it excites nothing."""
+    """Return the states of a checked log, which is held in memory as a whole. A joint that moves by no more than its
+    sensor's noise gets rates of exactly zero, so it adds nothing to a fit."""
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
     return _states(log, grid, low_pass, noticed(log, grid, low_pass, options, check), options, 0, grid.count)
@@ -86,9 +87,9 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """A part of a log: its states, with what the filter needs before and after it, and the rows that it stands for.
+    """A part of a log: its states, with the rows before and after it that the filter needs.
 
-    at  rows of `states` that are usable and independent (one cut-off's time apart), each in one stretch only
+    at  rows of `states` that are usable and independent (one period of the cut-off apart); each is in one part only
     """
 
     states: States
@@ -98,9 +99,11 @@ class Stretch:
 def stretches(
     log: AnyLog, options: FilterOptions, check: CheckOptions | None = None, rows: int = STRETCH_ROWS
 ) -> Iterator[Stretch]:
-    """The states of a log, `rows` at a time, as if the whole log had been filtered at once.
+    """Yield the states of a log in parts of `rows` rows. They are the same as if the whole log had been filtered at
+    once.
 
-    Neighbours overlap by twice the filter's memory: once for the states and once for what is computed from them.
+    Neighbouring parts overlap by twice the memory of the filter: once for the states, and once for what is computed
+    from them.
     """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
@@ -162,13 +165,13 @@ def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
 
 
 def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDArray[np.intp]:
-    """Rows of the whole log that are usable and independent (one cut-off's time apart)."""
+    """Return the rows of the whole log that are usable and independent (one period of the cut-off apart)."""
     usable = _usable(grid, options, log)
     return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
 
 
 def central_differences(q: Array, period: float) -> tuple[Array, Array]:
-    """Speed and acceleration without phase error: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
+    """Return speed and acceleration without phase error: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
     qd[1:-1] = (q[2:] - q[:-2]) / (2.0 * period)
     qdd[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / period**2
@@ -177,7 +180,7 @@ def central_differences(q: Array, period: float) -> tuple[Array, Array]:
 
 
 def held_out(count: int, options: SplitOptions) -> NDArray[np.bool_]:
-    """(count,) True where a sample is kept for validation."""
+    """Return for each of `count` samples whether it is held out for validation."""
     if options.blocks == 0:
         return np.arange(count) >= round((1.0 - options.held_out) * count)
     block = np.arange(count) * options.blocks // max(count, 1)
@@ -188,15 +191,15 @@ def held_out(count: int, options: SplitOptions) -> NDArray[np.bool_]:
 
 
 def held_out_of(log: AnyLog, count: int, options: SplitOptions) -> NDArray[np.bool_]:
-    """(count,) held_out of a log's samples; all of them where the log is for validation."""
+    """Return for each sample of a log whether it is held out; all are if the log is for validation."""
     return np.ones(count, dtype=bool) if log.use == "validate" else held_out(count, options)
 
 
 def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
-    """Indices of usable samples that are independent: 1/(2 f_c) apart.
+    """Return the indices of usable samples that are independent, 1/(2 f_c) apart for the cut-off f_c.
 
-    Neighbouring filtered samples share their noise; counting each as new information would reduce standard deviations
-    by the square root of the oversampling.
+    Neighbouring filtered samples share their noise. If each counted as new information, standard deviations would be
+    too small by the square root of the oversampling.
     """
     return np.flatnonzero(states.use)[:: _independent(options, states.period)]
 
@@ -211,12 +214,12 @@ BLOCK_ROWS = 16384
 
 
 def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
-    """(len(at), ...) low-passed values at rows `at`, computed block by block, so that a long log's values need not be
-    held at once.
+    """Return the low-pass filtered values at rows `at`, (len(at), ...). They are computed in blocks, so that the
+    values of a long log need not be in memory at once.
 
-    values   of a slice of the log's rows, (rows, ...)
+    values   function that returns the values (rows, ...) for a slice of the log's rows
 
-    The same as filtering all rows at once, except for the filter's memory beyond MEMORY_CYCLES.
+    The result is that of filtering all rows at once, except for effects that are older than MEMORY_CYCLES.
     """
     count = len(states.time)
     margin = memory(states.cutoff, states.period)
@@ -241,7 +244,8 @@ def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Arra
 
 
 def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:
-    """Samples that the filter does not mix with any reversal: two periods of its cut-off away."""
+    """Return for each sample whether it is at least two periods of the cut-off away from any reversal of motion, so
+    that the filter does not mix both directions."""
     reach = int(np.ceil(2.0 / options.cutoff / period))
     before = np.concatenate([[0], np.cumsum(turning)])
     index = np.arange(len(turning))
@@ -251,8 +255,8 @@ def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noticed:
-    """(n,) each, rad or m: sensor noise of a raw sample, zero for a joint at rest; whether it rests, and where; and its
-    motion, peak to peak."""
+    """The noise and motion of all joints, (n,) each, rad or m: sensor noise of an unfiltered sample (zero for a joint
+    at rest), whether and where the joint rests, and its motion, peak to peak."""
 
     noise: Array
     still: NDArray[np.bool_]
@@ -268,7 +272,8 @@ def noticed(
     check: CheckOptions | None = None,
     rows: int = STRETCH_ROWS,
 ) -> Noticed:
-    """Noise and rest of every joint, from one pass over the log; noise of long logs from evenly spread rows."""
+    """Return noise and rest of every joint from one pass over the log. For long logs the noise comes from evenly
+    spread rows."""
     reach, every = memory(options.cutoff, grid.period), -(-grid.count // NOISE_ROWS)
     raw, smooth = [], []
     n = len(log.joint_names)

@@ -1,4 +1,4 @@
-"""Untrusted files: opened with a bound on their size, and decoded so that every fault is an InputError."""
+"""Opens files from other programs with a limit of their size, and converts every error of a decoder to an InputError."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WRITE_AGAIN = "record, export or copy it again; the format goes by the file's en
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether there is a folder of this name; names that no file can have are none."""
+    """Return whether a folder with this name exists. A name that no file can have counts as missing."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -33,7 +33,8 @@ def is_folder(path: Path) -> bool:
 
 @contextmanager
 def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
-    """The file, for reading bytes; InputError where it is missing, unreadable, empty, no file or larger than `largest`."""
+    """Return the file, open for reading bytes. Raises InputError if it is missing, unreadable, empty, no regular file
+    or larger than `largest`."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -53,10 +54,10 @@ def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
 
 @contextmanager
 def decoding(name: str, what: str, hint: str = WRITE_AGAIN) -> Iterator[None]:
-    """Turn whatever a decoder of untrusted bytes raises inside into "NAME: not WHAT, or damaged: why".
+    """Within the block, convert all errors of a decoder to an InputError "NAME: not WHAT, or damaged: why".
 
-    Decoders of damaged bytes fail in many ways (struct.error, KeyError, AssertionError, MemoryError, ...). None of them
-    is a fault of psdmc; the file is at fault.
+    Decoders of damaged bytes raise many kinds of errors (struct.error, KeyError, AssertionError, MemoryError, ...).
+    The cause is the file and not psdmc.
     """
     try:
         with warnings.catch_warnings():

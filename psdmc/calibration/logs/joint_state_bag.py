@@ -1,4 +1,4 @@
-"""Bags of ROS: logs of sensor_msgs/JointState messages on one topic, whatever holds them."""
+"""Reads ROS bags: messages of the type sensor_msgs/JointState on one topic, from any bag format."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ PIECE_MESSAGES = 4096
 
 
 class BagFormat(LogFormat):
-    """A kind of bag: a subclass says which topics hold joint states, and reads their serialised messages."""
+    """The base class of bag formats. A subclass finds the topics with joint states and reads their serialised
+    messages."""
 
     has_topics = True
     what: str
@@ -40,14 +41,14 @@ class BagFormat(LogFormat):
 
     @abstractmethod
     def require_sizes(self, path: Path, held: int | None) -> None:
-        """InputError if a file is missing or too large, or unpacks to more than its size makes plausible.
+        """Raise InputError if a file is missing or too large, or unpacks to more than is plausible for its size.
 
-        held  bytes of rows in memory; None: all
+        held  most bytes of rows in memory; None: all
         """
 
     @abstractmethod
     def topics(self, path: Path) -> tuple[str, ...]:
-        """Return the topics of joint states."""
+        """Return the topics of the bag that contain joint states."""
 
     @abstractmethod
     def raw_messages(self, path: Path, topic: str) -> Iterator[bytes]:
@@ -58,12 +59,13 @@ class BagFormat(LogFormat):
         """Return a joint state with the fields of its message type."""
 
     def read(self, path: Path, topic: str = "", held: int | None = None) -> AnyLog:
-        """Return the joint states of one topic as a log; effort is read as motor torque, time from each message's header.
+        """Return the joint states of one topic as a log. Effort is read as motor torque, and time from the header of
+        each message.
 
-        topic  empty: /joint_states, or the only one of joint states
-        held   bytes of rows in memory; more rows go to a temporary file, and a StoredLog is returned. None: all
+        topic  name of the topic; empty: /joint_states, or the only topic with joint states
+        held   most bytes of rows in memory; a larger log goes to a temporary file and becomes a StoredLog. None: no limit
 
-        InputError if the bag is damaged, the topic is missing, or its messages disagree on joints.
+        Raises InputError if the bag is damaged, the topic is missing, or its messages disagree on joints.
         """
         self.require_sizes(path, held)
         with decoding(str(path), self.what):
@@ -87,7 +89,8 @@ class BagFormat(LogFormat):
 
     @contextmanager
     def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
-        """Of joint states: time_s, then position.<joint>, velocity.<joint> if all have one, effort.<joint>."""
+        """Return the columns of joint states: time_s, then position.<joint>, velocity.<joint> if all joints have one,
+        and effort.<joint>."""
         log = self.read(path, opening.topic, opening.held)
         parts = ("position", "velocity", "effort") if log.has_velocity else ("position", "effort")
         names = ("time_s", *(f"{part}.{joint}" for part in parts for joint in log.joint_names))
@@ -182,7 +185,7 @@ def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> 
 
 
 def require_rosbags() -> None:
-    """InputError if rosbags is not installed."""
+    """Raise InputError if the package rosbags is not installed."""
     try:
         import rosbags.typesys  # noqa: F401
     except ImportError as error:
@@ -190,7 +193,7 @@ def require_rosbags() -> None:
 
 
 def any_reader_topics(path: Path) -> tuple[str, ...]:
-    """Return the topics of joint states of what rosbags' AnyReader opens."""
+    """Return the topics with joint states in a bag that rosbags' AnyReader opens."""
     require_rosbags()
     from rosbags.highlevel import AnyReader
 
@@ -199,7 +202,7 @@ def any_reader_topics(path: Path) -> tuple[str, ...]:
 
 
 def any_reader_messages(path: Path, topic: str) -> Iterator[bytes]:
-    """Yield the serialised joint states of a topic of what rosbags' AnyReader opens."""
+    """Yield the serialised joint states of a topic in a bag that rosbags' AnyReader opens."""
     require_rosbags()
     from rosbags.highlevel import AnyReader
 

@@ -1,4 +1,4 @@
-"""A robot's log: motion of the joints and effort of the motors, row by row."""
+"""The class Log: motion of the joints and effort of the motors, row by row."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LARGEST_NUMBER = 1e20
 
 
 class Timed:
-    """The properties of rows with a time: their number, duration and period."""
+    """Properties of rows with a time: their number, duration and period."""
 
     __slots__ = ()
     time: Array
@@ -35,30 +35,30 @@ class Timed:
 
     @property
     def duration(self) -> float:
-        """s from the first row to the last."""
+        """Time from the first row to the last, s."""
         return float(self.time[-1] - self.time[0]) if len(self) else 0.0
 
     @property
     def period(self) -> float:
-        """s between rows: the median."""
+        """Median time between rows, s."""
         return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Log(Timed):
-    """Samples of one run. N rows, n joints.
+    """Samples of one run, with N rows and n joints.
 
-    name         for messages
+    name         name for messages
     joint_names  n, in the order of the columns
     time         (N,)    s
     position     (N, n)  rad; m for sliding joints
-    velocity     (N, n)  per s, or None where the log has none
+    velocity     (N, n)  per s, or None if the log has none
     effort       (N, n)  A, N m or N, by `quantity`; motor torque is positive in the joint's positive direction
-    quantity     current: of the motor; motor_torque: with friction; joint_torque: without
-    notes        assumptions made when it was read
-    sliding      names of joints whose position is in m, the others' being in rad; None: the log does not say
-    date         of the data, if the file tells; else empty
-    use          fit, or validate: held out as a whole
+    quantity     current: of the motor; motor_torque: with friction; joint_torque: without friction
+    notes        assumptions that psdmc made when it read the log
+    sliding      names of joints whose position is in m, while the others are in rad; None: the log does not say
+    date         date of the data if the file tells, else empty
+    use          fit, or validate: the whole log is held out for validation
     """
 
     name: str
@@ -85,7 +85,8 @@ class Log(Timed):
             raise InputError(f"{self.name}: quantity {self.quantity!r}", f"known are {', '.join(QUANTITIES)}")
 
     def ordered(self, joint_names: tuple[str, ...]) -> Log:
-        """The same log with its columns in the order of these joints; InputError names every joint that is missing."""
+        """Return the same log with its columns in the order of these joints. Raises InputError with all joints that
+        are missing."""
         columns = places_of(self.name, self.joint_names, joint_names)
         velocity = None if self.velocity is None else self.velocity[:, columns]
         return replace(
@@ -101,11 +102,11 @@ class Log(Timed):
         return self.velocity is not None
 
     def rows(self, start: int, stop: int) -> Log:
-        """Some rows as a log of their own."""
+        """Return the rows from `start` to `stop` as a log."""
         return self.at(slice(start, stop))
 
     def at(self, rows: slice | NDArray[np.bool_]) -> Log:
-        """The rows of a slice or a mask, as a log."""
+        """Return the rows of a slice or a mask as a log."""
         velocity = None if self.velocity is None else self.velocity[rows]
         return replace(
             self,
@@ -116,12 +117,12 @@ class Log(Timed):
         )
 
     def between(self, start: float, end: float) -> Log:
-        """The rows with start <= time < end, s."""
+        """Return the rows with start <= time < end (s) as a log."""
         return self.at((self.time >= start) & (self.time < end))
 
 
 def places_of(log: str, found: tuple[str, ...], wanted: tuple[str, ...]) -> list[int]:
-    """Index among a log's joints of each that is wanted; InputError names every joint that is missing."""
+    """Return the index in a log of each wanted joint. Raises InputError with all joints that are missing."""
     missing = [name for name in wanted if name not in found]
     if missing:
         raise InputError(
@@ -146,8 +147,11 @@ EARLIEST, LATEST = 9.0e8, 4.0e9
 
 
 def date_of(first_time: float) -> str:
-    """The date (UTC) of a first row whose time (s) counts from 1970, else empty. The file's own date is not used: it
-    changes with copying, and the same log must give the same calibrated file."""
+    """Return the date (UTC) of a first row whose time counts in s since 1970, else an empty text.
+
+    The date of the file itself is not used: it changes with copying, and the same log must give the same calibrated
+    file.
+    """
     if not EARLIEST < first_time < LATEST:
         return ""
     return datetime.fromtimestamp(first_time, UTC).date().isoformat()

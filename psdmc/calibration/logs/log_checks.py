@@ -1,4 +1,4 @@
-"""Faults of a log, found and named before anything is fitted."""
+"""Checks a log before a fit, and reports its faults with a remedy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ FaultAndRemedy = tuple[str, str]
 
 
 def time_faults(log: AnyLog, survey: Survey, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
-    """Faults of the time of a log whose numbers are finite, each with its remedy; at most one of a kind."""
+    """Return the faults of the time of a log whose numbers are finite, each with its remedy and at most one of each
+    kind."""
     steps = np.diff(log.time)
     order = _order(log, steps)
     if order:
@@ -50,8 +51,8 @@ def time_faults(log: AnyLog, survey: Survey, cutoff: float, options: CheckOption
 
 
 def suspected_unit(log: AnyLog, survey: Survey) -> str:
-    """Name of the unit that time seems to have, where it is not seconds: from velocity over slope, else from the
-    period."""
+    """Return the likely unit of time if it is not seconds. It follows from the ratio of velocity to slope of the
+    position, or else from the period."""
     ratios = list(survey.velocity_ratios.values())
     if ratios:
         middle = float(np.median(ratios))
@@ -113,20 +114,20 @@ def _too_slow(log: AnyLog, cutoff: float, options: CheckOptions) -> list[FaultAn
 
 @dataclass(frozen=True, slots=True)
 class CheckOptions:
-    """Limits by which a log is refused or gets a remark.
+    """Limits above or below which a log is rejected or gets a remark.
 
-    largest_gap        sample periods; a longer pause is a gap, and refused
-    largest_jitter     share of the sample period; above it the log is resampled, and a note says so
-    limit_slack        share by which position and speed may exceed the chain's limits
-    free_position      rad, largest believable position of a joint without limits
-    free_speed         rad/s, largest believable speed of a joint without a limit
+    largest_gap        sample periods; a log with a longer pause is rejected
+    largest_jitter     share of the sample period; with more jitter the log is resampled, and a note says so
+    limit_slack        share by which position and speed may exceed the limits of the robot's joints
+    free_position      rad, largest plausible position of a joint without limits
+    free_speed         rad/s, largest plausible speed of a joint without a limit
     rate_disagreement  share by which the logged velocity may differ from the position's slope
-    saturated_share    share of a moving joint's samples at one extreme effort from which it may be saturated
-    shortest           s, shortest log that is read
+    saturated_share    share of a moving joint's samples at one extreme effort above which it may be saturated
+    shortest           s, shortest log that is accepted
     samples_per_cycle  smallest sampling rate in units of the filter's cut-off
-    smallest_motion    rad or m, peak to peak; below it a joint is at rest
-    longest            s, longest log that is read
-    fastest            Hz, largest believable sampling rate
+    smallest_motion    rad or m, peak to peak; a joint with less motion is at rest
+    longest            s, longest log that is accepted
+    fastest            Hz, largest plausible sampling rate
     """
 
     largest_gap: float = 10.0
@@ -147,18 +148,18 @@ LogKind = TypeVar("LogKind", Log, StoredLog, AnyLog)
 
 
 class Fault(NamedTuple):
-    """A fault that forbids a log's use, and the remedy."""
+    """A fault because of which a log cannot be used, and the remedy."""
 
     text: str
     remedy: str
 
 
 def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions | None = None) -> LogKind:
-    """The log with its joints in the chain's order, and remarks in its notes.
+    """Return the log with its joints in the order of the robot's, and remarks in its notes.
 
-    cutoff   Hz, of the filter that the log is meant for
+    cutoff   Hz, of the filter that will be applied to the log
 
-    InputError names the faults that forbid its use: first values that are no numbers, then faults of time, then others.
+    Raises InputError with the faults: first values that are not numbers, then faults of time, then others.
     """
     options = options or CheckOptions()
     if len(log) < 2:

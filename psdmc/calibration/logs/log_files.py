@@ -1,8 +1,8 @@
-"""Logs as files: read whole or piece by piece, and written. Tables share their column names; bags have none.
+"""Reads log files, as a whole or in pieces, and writes them. All tables have the same column names; bags have none.
 
-`time_s`, then per joint `position_rad.<joint>` (`position_m.` if it slides), optional `velocity_rad_s.<joint>`
-(`velocity_m_s.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if it slides);
-`effort_nm.` is read as motor torque, and the log's notes say so.
+The columns are `time_s`, then for each joint `position_rad.<joint>` (`position_m.` if it slides), optionally
+`velocity_rad_s.<joint>` (`velocity_m_s.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if
+it slides). `effort_nm.` is read as motor torque, and the log's notes say so.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
 def read_log(path: str | Path) -> Log:
     """Return a log in memory from a table (.csv, .parquet, .npz) or a ROS bag (.bag, .db3, .mcap or its folder).
 
-    InputError if the file is missing, no log, damaged, or lacks a column.
+    Raises InputError if the file is missing, no log, damaged, or lacks a column.
     """
     path = Path(path)
     kind = format_of(path)
@@ -67,11 +67,11 @@ def open_log(
 ) -> AnyLog:
     """Return a log of any size from a file that read_log takes.
 
-    held      bytes of rows in memory; more rows go to a temporary file, and a StoredLog is returned
-    progress  called with how much of a large file has been read
-    topic     of a bag's joint states; empty: its only one, or /joint_states
+    held      most bytes of rows in memory; a larger log goes to a temporary file and becomes a StoredLog
+    progress  function that is called with the share of a large file that has been read
+    topic     topic of a bag with joint states; empty: its only one, or /joint_states
 
-    InputError as of read_log.
+    Raises InputError under the same conditions as read_log.
     """
     path = Path(path)
     kind = format_of(path)
@@ -116,7 +116,7 @@ def _counted(
 
 
 def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> AnyLog:
-    """The log whose positions, velocities and efforts are in a store; in memory where the store is."""
+    """Return the log whose positions, velocities and efforts are in a RowStore. It is in memory if the store is."""
     log = StoredLog(
         name=layout.name,
         joint_names=layout.joint_names,
@@ -136,7 +136,7 @@ def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> Any
 def read_columns(path: Path) -> dict[str, Array]:
     """Return named columns of equal length of a table.
 
-    InputError if the file is missing, unreadable, too large, damaged, or holds anything but numbers.
+    Raises InputError if the file is missing, unreadable, too large, damaged, or holds anything but numbers.
     """
     kind = table_of(path)
     with opened(path) as file:
@@ -159,7 +159,7 @@ def _no_rows(path: Path) -> InputError:
 
 
 def column_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a table's columns, without reading it all."""
+    """Return the names of a table's columns. The rows are not read."""
     kind = table_of(path)
     with opened(path) as file:
         return tuple(kind.pieces(file, str(path))[0])
@@ -167,7 +167,7 @@ def column_names(path: Path) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The columns of a table that a log consists of, and their quantities. n joints."""
+    """The columns of a table that contain a log of n joints, and their quantities."""
 
     name: str
     joint_names: tuple[str, ...]
@@ -180,7 +180,7 @@ class Layout:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns that are read, beside time."""
+        """Names of the columns that are read, without time."""
         return (*self.positions, *(self.velocities or ()), *self.efforts)
 
 
@@ -193,7 +193,7 @@ def _of_other_names(columns: Sequence[str]) -> str:
 
 
 def layout_of(name: str, columns: Sequence[str]) -> Layout:
-    """The layout of a table with these columns; InputError names a missing column and the names that would be accepted."""
+    """Return the layout of a table with these columns. Raises InputError with a missing column and the accepted names."""
     if "time_s" not in columns:
         raise InputError(f"{name}: no column 'time_s'", _of_other_names(columns))
     joints = _joints(name, columns, POSITIONS)
@@ -218,7 +218,7 @@ def layout_of(name: str, columns: Sequence[str]) -> Layout:
 
 
 def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
-    """A log from named columns of equal length; InputError names a missing column and the names that would be accepted."""
+    """Return a log from named columns of equal length. Raises InputError with a missing column and the accepted names."""
     found = layout_of(name, tuple(columns))
 
     def stacked(names: tuple[str, ...]) -> Array:
@@ -309,7 +309,7 @@ def _slides(column: str) -> bool:
 
 
 def columns_of(log: Log) -> dict[str, Array]:
-    """Named columns, as files hold them."""
+    """Return the named columns of a log, as files hold them."""
     metres = [joint in (log.sliding or ()) for joint in log.joint_names]
     columns: dict[str, Array] = {"time_s": log.time}
     parts = (
@@ -325,12 +325,12 @@ def columns_of(log: Log) -> dict[str, Array]:
 
 
 def write_log(log: Log, path: str | Path) -> None:
-    """Write a log as .csv, .parquet or .npz; a reader never sees a part of the file."""
+    """Write a log as .csv, .parquet or .npz. The file is written as a whole or not at all."""
     write_columns(columns_of(log), Path(path))
 
 
 def write_columns(columns: Mapping[str, Array], path: Path) -> None:
-    """Write named columns of equal length as a table; a reader never sees a part of the file."""
+    """Write named columns of equal length as a table. The file is written as a whole or not at all."""
     kind = table_of(path)
     make_folder(path.parent)
     with whole_file(path) as own:

@@ -1,4 +1,4 @@
-"""What a kind of log file can do: recognise its files, list their columns, and read their rows in pieces."""
+"""Base classes of log file formats: they recognise files, list columns, and read rows in pieces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ Pieces = tuple[list[str], Iterator[Array]]
 
 @dataclass(frozen=True, slots=True)
 class TextForm:
-    """What is known of a text table's form. None: psdmc finds out from the first lines. skip: lines before the table."""
+    """What is known about the form of a text table. None: psdmc determines it from the first lines. skip: lines before
+    the table."""
 
     separator: str | None = None
     header: bool | None = None
@@ -35,11 +36,11 @@ class TextForm:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """What a log description says about a file, and how much memory its rows may take.
+    """What a log description says about a file, and how many bytes of its rows may be in memory.
 
-    form   of a text table
-    topic  of a bag; empty: its only one
-    held   bytes of a bag's rows in memory; more rows go to a temporary file
+    form   form of a text table
+    topic  topic of a bag; empty: its only one
+    held   most bytes of a bag's rows in memory; more rows go to a temporary file
     """
 
     form: TextForm = field(default_factory=TextForm)
@@ -49,13 +50,13 @@ class Opening:
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The columns of an open log file, whatever they are called or hold.
+    """The columns of an open log file, with any names and contents.
 
-    name   of the file, for messages
-    names  of its columns; empty if a text table has no header
+    name   name of the file, for messages
+    names  names of its columns; empty if a text table has no header
     width  number of columns
-    rows   called once: (k, len(places)) of columns by place (from 0), in pieces. If its second argument is true, the
-           first of these columns holds dates, which become s since 1970
+    rows   function, to be called once, that yields numbers (k, len(places)) in columns by index (from 0), in pieces. If its
+           second argument is true, the first of these columns holds dates, which become s since 1970
     """
 
     name: str
@@ -65,10 +66,10 @@ class Columns:
 
 
 class LogFormat(ABC):
-    """A kind of log file: one module of the folder `formats`, with one object called FORMAT.
+    """A format of log files: one module of the folder `formats`, with one object called FORMAT.
 
-    endings     of its files, in lower case, with the dot
-    has_topics  whether a file holds topics, of which one is read
+    endings     suffixes of its files, in lower case, with the dot
+    has_topics  whether a file holds several topics, of which one is read
     """
 
     endings: tuple[str, ...]
@@ -85,11 +86,12 @@ class LogFormat(ABC):
     @abstractmethod
     @contextmanager
     def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
-        """Open a file that a log description describes; InputError if it is missing, damaged or of another kind."""
+        """Open a file for a log description. Raises InputError if it is missing, damaged or of another format."""
 
 
 class TableFormat(LogFormat):
-    """A kind of table. `pieces` reads tables whose columns psdmc has named; `write` writes them, if it can."""
+    """A format of tables. `pieces` reads tables with psdmc's own column names; `write` writes such tables, if
+    possible."""
 
     @contextmanager
     def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
@@ -106,7 +108,7 @@ class TableFormat(LogFormat):
 
     @abstractmethod
     def pieces(self, file: BinaryIO, name: str) -> Pieces:
-        """Return names and rows of a table of numbers; InputError if any column holds anything else."""
+        """Return the names and rows of a table of numbers. Raises InputError if a column holds anything else."""
 
     def write(self, columns: Mapping[str, Array], path: Path) -> None:
         """Write named columns of equal length."""
@@ -114,13 +116,13 @@ class TableFormat(LogFormat):
 
 
 def refuse_dates(dates: bool, name: str) -> None:
-    """InputError if dates are asked of a file whose columns are all numbers."""
+    """Raise InputError if the user asks for dates in a file whose columns are all numbers."""
     if dates:
         raise InputError(f"{name}: its time holds no dates", "write s, ms, us or ns as the unit of [time]")
 
 
 def require_equal(lengths: Mapping[str, int], name: str) -> None:
-    """InputError if columns, whose lengths are given by name, differ in length."""
+    """Raise InputError if the columns, whose lengths are given by name, differ in length."""
     first = next(iter(lengths), "")
     odd = [f"{quoted(column)} has {count}" for column, count in lengths.items() if count != lengths[first]]
     if odd:

@@ -1,4 +1,4 @@
-"""The figures that the checks of a log need, from one pass over its rows, a stretch at a time."""
+"""Statistics of a log's columns that its checks need, from one pass over the rows in parts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAST_SHARE = 0.99
 
 @dataclass(frozen=True, slots=True)
 class NoNumber:
-    """A column with values that are not finite, or too large for a measurement: how many, and the first."""
+    """A column with values that are not finite, or too large for a measurement: their number, and the first one."""
 
     what: str
     rows: int
@@ -31,13 +31,13 @@ class NoNumber:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """A log's columns in figures. n joints.
+    """Statistics of the columns of a log with n joints.
 
-    no_numbers      columns that hold any; the other figures then mean nothing
+    no_numbers      columns with values that are not finite; if there are any, the other statistics have no meaning
     reach, motion   (n,)  largest |position|; peak to peak
-    speed           (n,)  slope of the position below which FAST_SHARE of the rows lie
+    speed           (n,)  slope of the position that the share FAST_SHARE of the rows does not exceed
     slope_power     (n,)  sum of squared slopes
-    slope_velocity  (n,)  sum of slope times logged velocity; None where there is none
+    slope_velocity  (n,)  sum of slope times logged velocity; None if there is none
     largest_effort  (n,)  |effort|
     saturated       efforts that stay at an extreme value while their joint moves
     """
@@ -53,7 +53,7 @@ class Survey:
 
     @property
     def velocity_ratios(self) -> dict[int, float]:
-        """Logged velocity over the position's slope, by the index of each joint that moves."""
+        """Return the ratio of logged velocity to the slope of the position, by the index of each joint that moves."""
         if self.slope_velocity is None:
             return {}
         moves = (self.motion >= SEEN_MOTION) & (self.slope_power > 0)
@@ -65,9 +65,9 @@ SEEN_MOTION = 1e-2
 
 
 def surveyed(log: AnyLog, saturated_share: float) -> Survey:
-    """The survey of a log of two rows or more.
+    """Return the statistics of a log with two rows or more.
 
-    saturated_share  of rows at an extreme effort from which it counts as saturated
+    saturated_share  share of rows at an extreme effort above which the effort counts as saturated
     """
     n = len(log.joint_names)
     bad: dict[str, NoNumber] = {}
@@ -115,7 +115,8 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
 
 
 def position_slope(log: Log) -> Array:
-    """(N - 2, n) central differences over two periods: too coarse for dynamics, enough to distinguish units."""
+    """Return central differences (N - 2, n) of the position over two periods. They are too coarse for dynamics but
+    sufficient to distinguish units."""
     return np.asarray((log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None])
 
 
@@ -152,13 +153,13 @@ BY_SENSE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Saturated:
-    """A joint's effort that stays at its largest or smallest value.
+    """The effort of a joint that stays at its largest or smallest value.
 
-    joint    its name
-    level    the value, in the effort's unit
-    share    of the rows in which the joint moves
-    certain  False where friction of a constant size would look the same
-    unit     of the level; empty where it is not known
+    joint    name of the joint
+    level    that value, in the effort's unit
+    share    share of the rows in which the joint moves
+    certain  False if friction of constant magnitude would look the same
+    unit     unit of the level; empty if it is not known
     """
 
     joint: str
@@ -175,7 +176,8 @@ class Saturated:
 def saturated(
     names: Sequence[str], effort: Array, speed: Array, fast: Array, smallest_share: float
 ) -> tuple[Saturated, ...]:
-    """What repeats in some rows of a log: of each joint, the extreme that repeats more.
+    """Return the efforts that stay at an extreme value in some rows of a log: for each joint the extreme that is more
+    frequent.
 
     effort, speed  (N, n);  fast (n,) the speed of each joint's fast motion;  smallest_share  of rows at an extreme
     """

@@ -1,4 +1,4 @@
-"""The zero-phase low-pass: its options, its design for a sampling rate, and the length of its memory."""
+"""The zero-phase low-pass filter: its options, its design for a sampling rate, and the length of its memory."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ SMALLEST_CUTOFF, LARGEST_CUTOFF = 0.01, 10_000.0
 
 @dataclass(frozen=True, slots=True)
 class FilterOptions:
-    """Low-pass filtering as in Denso-2022 3.1: forwards and backwards, so that no phase is lost.
+    """Options of the low-pass filter of Denso-2022, 3.1. It runs forwards and backwards, so it has no phase shift.
 
     cutoff   Hz; the paper's: motor and gravity 4, friction 40, inertial 15
-    order    of the Butterworth filter that runs once each way
-    settle   cut-off periods dropped at either end, where the filter starts up
+    order    of the Butterworth filter, which runs once in each direction
+    settle   number of cut-off periods that are dropped at either end, where the filter has not settled
     """
 
     cutoff: float = 15.0
@@ -41,7 +41,7 @@ class LowPass:
     """A zero-phase Butterworth filter along axis 0, for one sample period.
 
     sections  its second-order sections
-    settled   their states where the input has always been one
+    settled   state of the sections if the input has always been one
     """
 
     sections: Array
@@ -82,7 +82,7 @@ MEMORY_CYCLES = 30.0
 
 
 def memory(cutoff: float, period: float) -> int:
-    """Rows after which a sample's effect on the filter is rounding."""
+    """Return the number of rows after which the effect of a sample on the filter is smaller than rounding."""
     return int(np.ceil(MEMORY_CYCLES / cutoff / period))
 
 
@@ -99,11 +99,11 @@ SEED = 30_301
 
 
 def position_noise(position: Array, filtered: Array, in_band: float) -> Array:
-    """(n,) standard deviation of a raw sample, rad or m, from what the low-pass removed.
+    """Return the standard deviation (n,) of an unfiltered sample, rad or m, from what the low-pass filter removed.
 
-    position, filtered  (N, n) of a log on an even grid;  in_band  share of the spectrum below the cut-off
+    position, filtered  (N, n) of a log at equal time steps;  in_band  share of the spectrum below the cut-off
 
-    The noise is taken as white: the part above the cut-off stands for the part below.
+    The noise is assumed to be white, so the part above the cut-off gives the part below.
     """
     left = position - filtered
     left = left - np.median(left, axis=0)
@@ -114,7 +114,7 @@ def position_noise(position: Array, filtered: Array, in_band: float) -> Array:
 
 
 def smallest_steps(position: Array) -> Array:
-    """(n,) smallest difference between two readings: the encoder's step where a joint hardly moves."""
+    """Return the smallest difference (n,) between two readings: the encoder's step for a joint that hardly moves."""
     steps = np.zeros(position.shape[1])
     for k, column in enumerate(position.T):
         values = np.unique(column)
@@ -125,7 +125,8 @@ def smallest_steps(position: Array) -> Array:
 def resting(
     position: Array, motion: Array, filtered_motion: Array, noise: Array, in_band: float, smallest: float
 ) -> NDArray[np.bool_]:
-    """(n,) whether a joint's motion is no more than its sensor's noise, a few encoder steps, or `smallest` (rad or m).
+    """Return for each joint (n,) whether its motion is no more than sensor noise, a few encoder steps, or `smallest`
+    (rad or m).
 
     motion, filtered_motion  (n,)  peak to peak, before and after the filter
     """
@@ -138,7 +139,8 @@ NOISE_CHUNK = 65_536
 
 
 def noise_like(noise: Array, first: int, last: int) -> Array:
-    """(last - first, n) raw position noise of these standard deviations at some rows, the same on every call."""
+    """Return random position noise (last - first, n) with these standard deviations for some rows. It is the same in
+    every call."""
     parts = []
     for chunk in range(first // NOISE_CHUNK, (last - 1) // NOISE_CHUNK + 1):
         start = chunk * NOISE_CHUNK

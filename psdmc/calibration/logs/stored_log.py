@@ -1,4 +1,4 @@
-"""A log whose rows are on disk: the interface of Log for files larger than memory."""
+"""A log whose rows are on disk, for files larger than memory. It has the interface of Log."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ HELD_BYTES = 128 * 1024**2
 
 
 class RowStore:
-    """Rows of equal width, appended piece by piece and read back by place; the temporary file is removed with the
-    store.
+    """A store of rows with equal width, in memory or in a temporary file, which is removed with the store.
 
-    width   numbers in a row
-    held    bytes in memory before the file is used
+    width   numbers per row
+    held    most bytes in memory before the file is used
     """
 
     def __init__(self, width: int, held: int = HELD_BYTES) -> None:
@@ -36,7 +35,7 @@ class RowStore:
         return self._file is not None
 
     def append(self, rows: Array) -> None:
-        """(k, width) rows after those that are there."""
+        """Append rows (k, width) to the store."""
         if rows.ndim != 2 or rows.shape[1] != self.width:
             raise ValueError(f"rows of shape {rows.shape}, expected (k, {self.width})")
         self._count += len(rows)
@@ -54,7 +53,7 @@ class RowStore:
         self._pieces = []
 
     def rows(self, start: int, stop: int) -> Array:
-        """(stop - start, width) a copy of some rows."""
+        """Return a copy of some rows, (stop - start, width)."""
         stop = min(stop, self._count)
         if self._file is None:
             if len(self._pieces) > 1:
@@ -67,11 +66,11 @@ class RowStore:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredLog(Timed):
-    """A Log's fields; position, velocity and effort are read with `rows`. N rows, n joints.
+    """A log with the fields of Log. Position, velocity and effort are read with `rows`. N rows, n joints.
 
-    time    (N,)  s, held in memory
+    time    (N,)  s, in memory
     store   rows of positions, velocities (unused unless `has_velocity`) and efforts, of `stored` joints each
-    places  (n,)  of this log's joints among those
+    places  (n,)  indices of this log's joints among these
     """
 
     name: str
@@ -88,12 +87,13 @@ class StoredLog(Timed):
     use: Use = "fit"
 
     def ordered(self, joint_names: tuple[str, ...]) -> StoredLog:
-        """The same log with its columns in the order of these joints; InputError names every joint that is missing."""
+        """Return the same log with its columns in the order of these joints. Raises InputError with all joints that
+        are missing."""
         found = places_of(self.name, self.joint_names, joint_names)
         return replace(self, joint_names=joint_names, places=tuple(self.places[k] for k in found))
 
     def rows(self, start: int, stop: int) -> Log:
-        """Some rows as a log in memory."""
+        """Return the rows from `start` to `stop` as a log in memory."""
         values, places = self.store.rows(start, stop), list(self.places)
         position, velocity, effort = values[:, : self.stored], None, values[:, -self.stored :]
         if self.has_velocity:
@@ -110,7 +110,7 @@ class StoredLog(Timed):
         )
 
     def held(self) -> Log:
-        """The same log in memory."""
+        """Return the whole log in memory."""
         return replace(self.rows(0, len(self)), notes=self.notes, date=self.date, use=self.use)
 
 

@@ -1,4 +1,4 @@
-"""Limits of a table's size, and of its columns' names."""
+"""Limits of the size of a table and of the names of its columns."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ALWAYS_ALLOWED = 64 * 1024**2
 
 
 def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
-    """InputError where a table has more rows, columns or values than are read, before they are."""
+    """Raise InputError if a table has too many rows, columns or values. The check runs before they are read."""
     found, most = (rows, columns), (LARGEST_ROWS, LARGEST_COLUMNS)
     for what, count, largest in zip(("rows", "columns"), found, most, strict=True):
         if count > largest:
@@ -40,7 +40,7 @@ def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
 
 
 def require_unpacked(size: int, file_bytes: int, name: str) -> None:
-    """InputError where a packed file claims to unpack to more bytes than its own size makes plausible."""
+    """Raise InputError if a compressed file claims to unpack to more bytes than is plausible for its size."""
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
     if size > allowed:
         raise InputError(
@@ -50,7 +50,7 @@ def require_unpacked(size: int, file_bytes: int, name: str) -> None:
 
 
 def require_names(names: Sequence[str], name: str) -> None:
-    """InputError where columns are too many, named twice, or named with control characters."""
+    """Raise InputError if there are too many columns, or if a name occurs twice or contains control characters."""
     require_size(0, len(names), 0, name)
     twice = [quoted(column) for column, count in Counter(names).items() if count > 1]
     if twice:

@@ -1,4 +1,4 @@
-"""TOML files of a calibration, read key by key: every fault is named with its table and key."""
+"""Reads TOML files of a calibration key by key. Every fault states its table and key."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _ZIP = b"PK\x03\x04"
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """A TOML file's content; InputError where it is missing, too large or no TOML.
+    """Return the content of a TOML file. Raises InputError if it is missing, too large or no TOML.
 
-    what   that is expected, such as 'a plant (.toml)'
+    what   the expected kind of file for messages, such as 'a plant (.toml)'
     """
     with opened(path, LARGEST_TOML) as file:
         return toml_content(read_rest(file, LARGEST_TOML, str(path), SHORTER), str(path), what)
 
 
 def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
-    """The content of a TOML file's bytes."""
+    """Return the content of a TOML file from its bytes."""
     if data.startswith(_ZIP):
         raise InputError(
             f"{name}: is a zip or npz file, such as a model: expected {what}", "give the text file"
@@ -49,9 +49,9 @@ def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
 
 
 class TomlTable:
-    """One table that is read key by key; faults go to `faults`, with the table's name.
+    """One table that is read key by key. Faults are added to `faults` with the name of the table.
 
-    Every reader returns its default, or a harmless value, where a key is missing or wrong; the caller checks `faults`.
+    If a key is missing or wrong, its reader returns the default or a harmless value. The caller then checks `faults`.
     """
 
     def __init__(self, value: object, where: str, keys: tuple[str, ...], faults: list[str]) -> None:
@@ -68,7 +68,7 @@ class TomlTable:
         return key in self.content
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
-        """A number from `low` to `high`; missing it is a fault where there is no default."""
+        """Return a number from `low` to `high`. A missing key is a fault if there is no default."""
         if key not in self.content and default is not None:
             return default
         value = self.content.get(key)
@@ -78,7 +78,7 @@ class TomlTable:
         return low
 
     def whole(self, key: str, low: int, high: int, default: int) -> int:
-        """A whole number from `low` to `high`."""
+        """Return a whole number from `low` to `high`."""
         value = self.content.get(key, default)
         if is_number(value) and low <= value <= high and value == int(value):
             return int(value)
@@ -86,7 +86,7 @@ class TomlTable:
         return low
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A text that is neither empty nor longer than LONGEST_TEXT, and has no control characters."""
+        """Return a text that is not empty, not longer than LONGEST_TEXT, and without control characters."""
         if key not in self.content and default is not None:
             return default
         value = self.content.get(key)
@@ -96,7 +96,7 @@ class TomlTable:
         return ""
 
     def word(self, key: str, words: tuple[str, ...], default: str | None = None) -> str:
-        """One of some words; missing it is a fault where there is no default."""
+        """Return the text of a key, which must be one of `words`. A missing key is a fault if there is no default."""
         if key not in self.content and default is not None:
             return default
         value = self.content.get(key)
@@ -106,7 +106,7 @@ class TomlTable:
         return words[0]
 
     def triple(self, key: str, largest: float) -> tuple[float, float, float]:
-        """Three numbers of at most this size."""
+        """Return three numbers whose magnitude is at most `largest`."""
         value = self.content.get(key)
         if (
             isinstance(value, list)
@@ -118,7 +118,7 @@ class TomlTable:
         return (0.0, 0.0, 0.0)
 
     def items(self, key: str) -> list[Any]:
-        """A list; empty where it is missing."""
+        """Return a list; it is empty if the key is missing."""
         value = self.content.get(key, [])
         if isinstance(value, list):
             return value
@@ -131,7 +131,7 @@ class TomlTable:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a TOML value is a finite number that a double holds."""
+    """Return whether a TOML value is a finite number within the range of 64-bit floats."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:
@@ -141,7 +141,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def shown(value: object) -> str:
-    """A TOML value as text for a message."""
+    """Return a TOML value as text for a message."""
     if isinstance(value, str):
         return quoted(value)
     if isinstance(value, bool):
@@ -154,6 +154,6 @@ def shown(value: object) -> str:
 
 
 def require_none(faults: list[str], name: str, hint: str) -> None:
-    """InputError with the first of the faults, if there is one."""
+    """Raise InputError with the first of the faults, if there are any."""
     if faults:
         raise InputError(f"{name}: {first_faults(faults)}", hint)

@@ -1,4 +1,4 @@
-"""Long lists in messages: the first entries, and the number of the others."""
+"""Shortens long lists in messages to the first entries and the number of the others."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ MOST_FAULTS = 3
 
 
 def listed(names: Sequence[str], most: int = MOST_NAMES) -> str:
-    """'a, b, c and 9 more'."""
+    """Return a list of names such as 'a, b, c and 9 more'."""
     return _first(names, most, ", ")
 
 
 def first_faults(faults: Sequence[str], most: int = MOST_FAULTS) -> str:
-    """'this; that and 9 more'."""
+    """Return a list of faults such as 'this; that and 9 more'."""
     return _first(faults, most, "; ")
 
 
@@ -26,7 +26,7 @@ def _first(texts: Sequence[str], most: int, between: str) -> str:
 
 
 def quoted(text: str) -> str:
-    """Text from a file for a message: in quotes, control characters escaped, shortened where it is long."""
+    """Return a text of a file for a message: in quotes, with escaped control characters, and shortened if it is long."""
     return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
 
 

@@ -1,4 +1,4 @@
-"""What a planned run may not do: leave its joints' limits, ask too much of the motors, or hit something."""
+"""Limits of a planned motion: those of the joints, torque limits, and collisions."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ LOOKED_AT = 0.01
 class Allowed:
     """Limits of motions.
 
-    torques        None: not looked at
-    torque_margin  share of them that a motion may take
-    clearance      shapes that may not touch; None: not looked at
+    torques        torque limits; None: torques are not checked
+    torque_margin  share of these limits that a motion may use
+    clearance      shapes that may not collide; None: collisions are not checked
     """
 
     chain: Mechanism
@@ -36,8 +36,8 @@ class Allowed:
     clearance: Clearance | FloorPoints | None = None
 
     def faults(self, motion: Trajectory, load: Load | None = None) -> list[str]:
-        """One sentence for each thing that the motion does and may not do; the cheapest to find out come first, and what
-        follows is not looked at."""
+        """Return one sentence for each limit that the motion violates. Cheap checks come first; after a fault, later
+        checks are skipped."""
         found = limit_faults(motion, self.chain)
         if not found and self.torques is not None:
             taken = slice(None, None, max(1, round(LOOKED_AT / motion.period)))
@@ -55,12 +55,12 @@ LARGEST_LIMIT = 1e6
 
 @dataclass(frozen=True, slots=True)
 class GivenLimits:
-    """By joint name, SI. A range may only be narrower than the file's; a speed, too.
+    """Limits that the user gives by joint name, SI. A range or a speed may only be narrower than the file's.
 
     ranges         lowest and highest position, rad (m)
     speeds         rad/s (m/s)
     accelerations  rad/s^2 (m/s^2)
-    acceleration   of the joints that have none otherwise; None: refuse them
+    acceleration   for joints that have no other limit of acceleration; None: such joints give an error
     efforts        N m (N)
     """
 
@@ -96,9 +96,11 @@ def _require_sizes(what: str, values: Iterable[float]) -> None:
 
 
 def bounded(chain: Mechanism, given: GivenLimits) -> Mechanism:
-    """The chain with the given limits, and half a turn either way for joints that turn freely.
+    """Return the robot with the given limits. Joints that turn without limits get a range of half a turn in each
+    direction.
 
-    InputError where a limit is still missing, a range is none or beyond the file's, or a joint does not exist.
+    Raises InputError if a limit is still missing, if a range is empty or exceeds the file's, or if a joint does not
+    exist.
     """
     unknown = [shown(name) for name in given.names if name not in chain.joint_names]
     if unknown:
@@ -149,11 +151,11 @@ def _ranged(joint: Joint, low: float, high: float) -> Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueLimits:
-    """Largest torques and how a motion's are computed.
+    """The largest torques of a robot, and the data to compute the torques of a motion.
 
-    largest   (n,) N m (N), infinite where a joint has no limit
+    largest   (n,) N m (N), infinite for a joint without limit
     theta_b   (l,)
-    friction  (..., n) speeds to (..., n) torques; None: not known
+    friction  function from speeds (..., n) to torques (..., n); None: unknown
     """
 
     chain: Mechanism
@@ -163,18 +165,19 @@ class TorqueLimits:
     friction: Callable[[Array], Array] | None = None
 
     def torque(self, q: Array, qd: Array, qdd: Array, load: Load | None = None) -> Array:
-        """(N, n) N m (N). A load counts by its weight alone: it is carried in slow sweeps."""
+        """Return the torques (N, n), N m (N). For a load only its weight counts, because it is carried in slow sweeps."""
         tau = self.of(self.model.regressor(q, qd, qdd), qd)
         return tau if load is None else tau + payload_torque(self.chain, q, load.mass, load.com)
 
     def of(self, regressor: Array, qd: Array) -> Array:
-        """(..., n) from the regressor (..., n, l) and the speeds."""
+        """Return the torques (..., n) from the regressor (..., n, l) and the speeds."""
         tau = np.asarray(regressor @ self.theta_b)
         return tau if self.friction is None else tau + self.friction(qd)
 
     def excess(self, regressor: Array, qd: Array, share: float) -> tuple[float, Array, Array]:
-        """What torques take beyond `share` of their limits: the mean over samples of its squares, in shares of the limit,
-        and its derivatives by the regressor (N, n, l) and, through friction, by the speeds (N, n)."""
+        """Return the penalty for torques beyond `share` of their limits: the mean over samples of the squared excess,
+        in shares of the limit. Also return its derivatives by the regressor (N, n, l) and, through friction, by the
+        speeds (N, n)."""
         tau = self.of(regressor, qd)
         usable = share * self.largest
         beyond = np.maximum(np.abs(tau) / usable - 1.0, 0.0)
@@ -186,7 +189,7 @@ class TorqueLimits:
         return float(np.sum(beyond**2)) / len(tau), by_torque[..., None] * self.theta_b, by_speed
 
     def faults(self, tau: Array, share: float) -> list[str]:
-        """One sentence for each joint whose torque (N, n) goes beyond `share` of its limit."""
+        """Return one sentence for each joint whose torque (N, n) exceeds `share` of its limit."""
         reach = np.abs(tau).max(axis=0)
         return [
             f"{joint.name}: torque {value:.4g} beyond {share:.0%} of {limit:g}"
@@ -196,7 +199,7 @@ class TorqueLimits:
 
 
 def require_limits(joints: Sequence[Joint]) -> None:
-    """InputError names the joints that have no limits to move within, and which."""
+    """Raise InputError with the joints that lack limits of motion, and with the limits that they lack."""
     lacking = []
     for joint in joints:
         limits = joint.limits

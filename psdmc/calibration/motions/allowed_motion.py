@@ -1,4 +1,4 @@
-"""The first of several motions that is allowed, in ever smaller parts of the joints' ranges."""
+"""Selects the first allowed motion from several, which use smaller and smaller parts of the joints' ranges."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ Try = tuple[float, Callable[[], Trajectory]]
 def first_allowed(
     what: str, tries: Iterable[Try], faults: Callable[[Trajectory], list[str]]
 ) -> tuple[Trajectory, float]:
-    """The first motion without faults, and its share of the ranges; InputError where all have some, or, from the first,
-    where it cannot be made."""
+    """Return the first motion without faults, and its share of the ranges. Raises InputError if all motions have
+    faults, or with the first error if no motion can be made."""
     found: list[str] = []
     for number, (share, make) in enumerate(tries):
         try:
@@ -43,7 +43,8 @@ def first_allowed(
 
 
 def smaller_boxes(chain: Mechanism, seed: int) -> Iterator[tuple[float, int, Mechanism]]:
-    """Parts of the ranges, large ones first: share, number of the try, and the chain with these as its limits."""
+    """Yield parts of the joints' ranges, large ones first: the share, the number of the attempt, and the robot with
+    these limits."""
     rng = np.random.default_rng(seed)
     low, high = np.array([(joint.limits.lower, joint.limits.upper) for joint in chain.joints]).T
     for share in SHARES:

@@ -1,4 +1,5 @@
-"""Which poses hit something: the robot itself, or the floor. Shapes are the URDF's, distances coal's, by Pinocchio."""
+"""Checks which poses collide with the robot itself or with the floor. Shapes come from the URDF, and the library coal
+computes distances, through Pinocchio."""
 
 from __future__ import annotations
 
@@ -38,11 +39,11 @@ FLOOR = "the floor"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearance:
-    """Pairs of shapes that may not come near each other.
+    """Pairs of shapes that must keep a distance from each other.
 
-    model, shapes  Pinocchio's; pairs are those of `shapes`
-    place          (n,) index of each joint's coordinate in Pinocchio's q;  held (nq,) the others' values
-    always         pairs, "A and B", that touch in every pose and are not looked at
+    model, shapes  Pinocchio's; the pairs are those of `shapes`
+    place          (n,) index of each joint's coordinate in Pinocchio's q;  held (nq,) values of the other coordinates
+    always         pairs, "A and B", that touch in every pose and are not checked
     """
 
     model: Any
@@ -60,9 +61,9 @@ class Clearance:
         object.__setattr__(self, "_working", (self.model.createData(), shaped))
 
     def first_touch(self, q: Array, step: float = LARGEST_STEP) -> str | None:
-        """What touches first along a path of poses (N, n), in a sentence; None where nothing does.
+        """Return a sentence on the first collision along a path of poses (N, n); None if there is none.
 
-        step  rad (m) by which a joint moves, at most, between two poses that are looked at
+        step  rad (m) by which a joint moves, at most, between two poses that are checked
         """
         data, shaped = self._working
         for pose in itertools.chain(spread(q, FAR * step), spread(q, step)):
@@ -76,16 +77,16 @@ class Clearance:
 
     @property
     def pairs(self) -> tuple[str, ...]:
-        """The pairs that are looked at, "A and B"."""
+        """The pairs that are checked, "A and B"."""
         return tuple(_named(self.shapes, pair) for pair in self.shapes.collisionPairs)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorPoints:
-    """A floor for robots without shapes: origins of joints and the tip stay above it.
+    """A floor for robots without shapes. The origins of joints and the tip must stay above it.
 
-    above   points that are looked at: 0 to n - 1 the joints' origins, n the tip
-    height  m above the base's origin, across gravity
+    above   points that are checked: 0 to n - 1 are the joints' origins, n the tip
+    height  m above the base's origin, against gravity
     """
 
     chain: Mechanism
@@ -93,7 +94,8 @@ class FloorPoints:
     above: tuple[int, ...] = ()
 
     def first_touch(self, q: Array, step: float = LARGEST_STEP) -> str | None:
-        """The first point that comes to the floor along a path of poses (N, n), in a sentence; None where none does."""
+        """Return a sentence on the first point that comes too close to the floor along a path of poses (N, n); None if
+        there is none."""
         poses = np.array(list(spread(q, step)))
         heights = self._heights(poses)[:, list(self.above)]
         low = np.argwhere(heights < self.height + APART)
@@ -118,7 +120,8 @@ class FloorPoints:
 
 
 def floor_points(chain: Mechanism, height: float) -> FloorPoints:
-    """The floor, for the points that are above it in some pose: a joint that stands on it is below in all."""
+    """Return the floor for those points that are above it in some pose. A joint on which the robot stands is below it
+    in all."""
     found = FloorPoints(chain, height)
     heights = found._heights(_random_poses(chain))
     return FloorPoints(
@@ -127,13 +130,14 @@ def floor_points(chain: Mechanism, height: float) -> FloorPoints:
 
 
 def touch(pair: tuple[str, str], pose: Array) -> str:
-    """The pair of links that comes too close at a pose (n,), in words."""
+    """Return a sentence that names the two links that come too close at a pose (n,)."""
     angles = ", ".join(f"{value:.2f}" for value in pose)
     return f"{' and '.join(pair)} come within {1000 * APART:g} mm of each other at q = ({angles})"
 
 
 def spread(q: Array, step: float) -> Iterator[Array]:
-    """Poses of a path (N, n) between which no joint moves by more than a step, nor rows are left out where it turns."""
+    """Yield poses of a path (N, n) between which no joint moves by more than a step, including the poses where the
+    motion turns."""
     if not len(q):
         return
     moved = np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0)
@@ -147,12 +151,12 @@ def spread(q: Array, step: float) -> Iterator[Array]:
 
 
 def clearance_of(model: DynamicsModel, folders: Sequence[Path] = (), floor: float | None = None) -> Clearance:
-    """The clearance of a model that holds a URDF with collision shapes.
+    """Return the Clearance of a model that contains a URDF with collision shapes.
 
-    folders  where its meshes lie
-    floor    m, height of a floor above the base's origin, across gravity; None: no floor
+    folders  folders with its meshes
+    floor    m, height of a floor above the base's origin, against gravity; None: no floor
 
-    InputError, whose message says why, where there are no shapes to look at.
+    Raises InputError, with the reason, if there are no shapes to check.
     """
     chain, source = model.mechanism, str(model.provenance.get("source_name", "robot"))
     if model.provenance.get("source_format") != "urdf":
@@ -280,12 +284,12 @@ MOST_SHAPES = 1000
 
 
 def with_shapes(text: str, source: str, folders: Sequence[Path]) -> tuple[str, int]:
-    """The URDF that Pinocchio reads links, joints and collision shapes from, and the number of these shapes.
+    """Return a URDF with the links, joints and collision shapes for Pinocchio, and the number of shapes.
 
-    folders   where packages and meshes lie: `package://NAME/PATH` is FOLDER/NAME/PATH, or FOLDER/PATH where FOLDER is
-              called NAME; other names are FOLDER/NAME
+    folders   folders with packages and meshes: `package://NAME/PATH` is FOLDER/NAME/PATH, or FOLDER/PATH if FOLDER is called
+              NAME; other names are FOLDER/NAME
 
-    InputError where a shape cannot be used, or its mesh is not there.
+    Raises InputError if a shape cannot be used, or if its mesh is missing.
     """
     root = parse_xml(text, source, "robot")
     found = dynamics_of(root, None, {"continuous": "revolute"})
@@ -321,7 +325,7 @@ def _copy(shape: Element, link: Element, where: str, folders: Sequence[Path]) ->
 
 
 def mesh_file(name: str, where: str, folders: Sequence[Path]) -> Path:
-    """The file of a mesh below one of the folders; InputError where there is none, it is no mesh, or too large."""
+    """Return the path of a mesh in one of the folders. Raises InputError if it is missing, no mesh, or too large."""
     plain = name.removeprefix("file://")
     package, _, inside = plain.removeprefix("package://").partition("/")
     for folder in folders if "\0" not in name else ():

@@ -1,4 +1,7 @@
-"""How well a motion's columns tell the parameters apart, with derivatives: smaller is better."""
+"""Measures how well a motion distinguishes the parameters of a fit, with derivatives. Smaller values are better.
+
+Most functions need the Gram matrix of the fit's columns A, which is A^T A.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +26,9 @@ TINY = 1e-100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scaled:
-    """The Gram matrix of columns scaled to unit length.
+    """The Gram matrix of columns after scaling to unit length.
 
-    matrix (m, m), lengths (m,) of the columns, values (m,) ascending, vectors (m, m)
+    matrix (m, m), lengths (m,) of the columns, eigenvalues `values` (m,) ascending, eigenvectors `vectors` (m, m)
     """
 
     matrix: Array
@@ -35,26 +38,27 @@ class Scaled:
 
     @property
     def condition(self) -> float:
-        """Condition number of the scaled columns, exact enough up to 1e6."""
+        """Condition number of the scaled columns, accurate up to 1e6."""
         return float(np.sqrt(self.values[-1] / self.values[0]))
 
     @property
     def deviation(self) -> float:
-        """A bound on the parameters' standard deviations where each row's error is one, as a geometric mean over them: the
-        condition number over the columns' lengths.
+        """Bound of the parameters' standard deviations, as a geometric mean, if the error of each row is one: the
+        condition number divided by the columns' lengths.
 
-        Parameter j has the standard deviation sqrt((C^-1)_jj) / L_j, C the matrix and L_j its column's length; the first
-        factor is at most the condition number, as the largest eigenvalue of a matrix with a unit diagonal is at least one.
+        The standard deviation of parameter j is sqrt((C^-1)_jj) / L_j, with the matrix C and the length L_j of its
+        column. The first factor is at most the condition number, because the largest eigenvalue of a matrix with unit
+        diagonal is at least one.
         """
         return self.condition / float(np.exp(np.mean(np.log(self.lengths))))
 
     @property
     def log_det(self) -> float:
-        """Minus the log determinant of the columns' own Gram matrix."""
+        """Minus the log determinant of the unscaled Gram matrix."""
         return -float(np.sum(np.log(self.values)) + 2.0 * np.sum(np.log(self.lengths)))
 
     def score(self, objective: Objective) -> float:
-        """What the objective minimises."""
+        """Return the value that the objective minimises."""
         match objective:
             case "deviation":
                 return self.deviation
@@ -65,7 +69,7 @@ class Scaled:
 
 
 def scaled(columns: Array) -> Scaled:
-    """Of columns (..., m), all leading axes being rows."""
+    """Return the scaled Gram matrix of columns (..., m), where all leading axes are rows."""
     rows = columns.reshape(-1, columns.shape[-1])
     gram = rows.T @ rows
     lengths = np.sqrt(np.maximum(np.diagonal(gram), TINY))
@@ -75,7 +79,7 @@ def scaled(columns: Array) -> Scaled:
 
 
 def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float, Array]:
-    """The objective's smooth form, logarithmic, and its derivatives by the unscaled Gram matrix (m, m)."""
+    """Return a smooth form of the objective, in logarithms, and its derivatives by the unscaled Gram matrix (m, m)."""
     if objective == "log_det":
         return negative_log_det(of)
     value, by_gram = smooth_condition(of, power)
@@ -86,10 +90,10 @@ def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float,
 
 
 def smooth_condition(of: Scaled, power: float) -> tuple[float, Array]:
-    """The logarithm of the condition number with its extreme eigenvalues replaced by means of all, and its derivatives by
-    the unscaled Gram matrix (m, m).
+    """Return a smooth form of the logarithm of the condition number, and its derivatives by the unscaled Gram matrix
+    (m, m). Means over all eigenvalues replace the extreme ones.
 
-    power   the means are sums of powers: 1 counts all directions alike, large ones the best and the worst alone
+    power   exponent of these means: 1 weights all directions equally, large values only the best and the worst
     """
     values, vectors = of.values, of.vectors
     up, down = (values / values[-1]) ** power, (values / values[0]) ** -power
@@ -102,7 +106,7 @@ def smooth_condition(of: Scaled, power: float) -> tuple[float, Array]:
 
 
 def negative_log_det(of: Scaled) -> tuple[float, Array]:
-    """Minus the log determinant of the unscaled Gram matrix, and its derivatives."""
+    """Return minus the log determinant of the unscaled Gram matrix, and its derivatives."""
     inverse = (of.vectors / of.values) @ of.vectors.T
     return of.log_det, -inverse / np.outer(of.lengths, of.lengths)
 
@@ -115,11 +119,12 @@ ANGLE_STEP = 1e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitColumns:
-    """Columns (..., n, m + n f) of a linear fit at states: (Y @ into) of l base parameters, then each joint's own.
+    """The columns (..., n, m + n f) of a linear fit at states: (Y @ into) for theta_b, then friction and offset of
+    each joint.
 
-    model  Y
-    into   (l, m)  directions of theta_b that the fit looks for
-    terms  (..., n) speeds to (..., n, f) factors of a joint's friction and offset; None: the fit has none
+    model  regressor Y
+    into   (l, m)  directions of theta_b that the fit determines
+    terms  function from speeds (..., n) to factors (..., n, f) of a joint's friction and offset; None: the fit has none
     """
 
     model: Regressor
@@ -127,7 +132,7 @@ class FitColumns:
     terms: Callable[[Array], Array] | None = None
 
     def of(self, regressor: Array, qd: Array) -> Array:
-        """The columns from the regressor (..., n, l) and the speeds."""
+        """Return the columns from the regressor (..., n, l) and the speeds."""
         rigid = regressor @ self.into
         if self.terms is None:
             return np.asarray(rigid)
@@ -142,7 +147,7 @@ class FitColumns:
         return self.of(self.model.regressor(q, qd, qdd), qd)
 
     def slopes(self, states: Array, weights: Array, on_regressor: Array | None = None) -> Array:
-        """(3, n, N) derivatives by the states of sum(weights * columns) + sum(on_regressor * Y).
+        """Return the derivatives (3, n, N) of sum(weights * columns) + sum(on_regressor * Y) by the states.
 
         states (3, n, N), weights (N, n, m + n f), on_regressor (N, n, l)
         """
@@ -161,7 +166,7 @@ class FitColumns:
 
 
 def all_columns(model: Regressor, l: int, options: LinearOptions) -> FitColumns:
-    """Those of the linear fit of one log: all base parameters, friction, offsets, before its filter."""
+    """Return the columns of the linear fit of one log, before its filter: all base parameters, friction and offsets."""
 
     def terms(qd: Array) -> Array:
         return np.stack(friction_columns(options.terms, qd, options.sign_speed), axis=-1)
@@ -170,14 +175,16 @@ def all_columns(model: Regressor, l: int, options: LinearOptions) -> FitColumns:
 
 
 def inertial_columns(chain: Mechanism, model: Regressor, l: int) -> FitColumns:
-    """Those of the inertial step of the four: the parameters that gravity does not show, (23). Friction is known by then."""
+    """Return the columns of the inertial step of the four steps: the parameters that do not affect gravity torques,
+    (23) of Denso-2022. Friction is known in that step."""
     return FitColumns(model, gravity_split(chain, model, l).from_psi())
 
 
 def regressor_slopes(model: Regressor, q: Array, qd: Array, qdd: Array, weights: Array) -> Array:
-    """(3, n, N) derivatives by q, qd and qdd, (N, n) each, of sum(weights * Y(q, qd, qdd)), weights (N, n, l).
+    """Return the derivatives (3, n, N) of sum(weights * Y(q, qd, qdd)) by q, qd and qdd, (N, n) each; weights (N, n,
+    l).
 
-    Y is linear in the accelerations and quadratic in the speeds, so that differences are exact there.
+    Y is linear in the accelerations and quadratic in the speeds, so differences are exact for these.
     """
     count, n = q.shape
     away = np.eye(n)[:, None]

@@ -1,5 +1,5 @@
-"""Exciting trajectories: sums of sines per joint (22), optimised for the fit's columns (23), within
-limits that every candidate keeps."""
+"""Finds exciting trajectories: sums of sines for each joint (22), optimised for the fit's columns (23) within limits
+that every candidate keeps. Source of the equations: Denso-2022."""
 
 from __future__ import annotations
 
@@ -37,16 +37,15 @@ SPARE = 0.99
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Excitation:
-    """A motion found, compared with random ones.
+    """The exciting motion that was found, compared with random motions.
 
-    condition         of the scaled columns along it
-    random_conditions (random,) of random motions within the same limits, ascending; infinite where a motion asks too
-                      much torque at any amplitude. None that is better by the objective than the best allowed one is left
-                      where it hits something
-    history           (k, 2) evaluations and best score so far: the objective
-    seconds           of CPU, since the count of the options began
-    ended_by_clock    whether the clock ended the search: another machine, or another day, finds another motion
-    deviation         bound on standard deviations along it (criterion.Scaled);  random_deviation of the best random motion
+    condition         condition number of the scaled columns along the motion
+    random_conditions (random,) of random motions within the same limits, ascending; infinite if a motion needs too much
+                      torque at any amplitude. Motions that collide do not count if they are better than the best allowed one
+    history           (k, 2) number of evaluations, and best value of the objective so far
+    seconds           CPU time since the time limit of the options began to count
+    ended_by_clock    whether the time limit ended the search; if so, another run may find another motion
+    deviation         bound on standard deviations (criterion.Scaled);  random_deviation: that of the best random motion
     """
 
     motion: SineSum
@@ -61,12 +60,12 @@ class Excitation:
 
     @property
     def gain(self) -> float:
-        """Best condition of the random motions over the one reached."""
+        """Best condition number of the random motions divided by that of the motion found."""
         return float(self.random_conditions[0] / self.condition)
 
     @property
     def deviation_gain(self) -> float:
-        """Best bound on standard deviations of the random motions over the one reached."""
+        """Best bound on standard deviations of the random motions divided by that of the motion found."""
         return self.random_deviation / self.deviation
 
 
@@ -78,15 +77,15 @@ def excite(
     allowed: Allowed | None = None,
     began: float | None = None,
 ) -> Excitation:
-    """Search for an exciting motion by quasi-Newton descents, started from the best random ones.
+    """Search for an exciting motion by quasi-Newton descents that start from the best random motions.
 
-    model    columns that count; or a regressor, all of whose columns do
-    allowed  limits of torque and clearance beside the joints' own; None: none
-    began    cpu_seconds() from which the options' seconds count; None: now
+    model    columns of the fit; or a regressor, all of whose columns count
+    allowed  limits of torque and collisions in addition to the joints' limits; None: none
+    began    value of cpu_seconds() from which the time limit counts; None: now
 
-    The result is never worse than the best of the random motions, which keep the same limits and hit nothing. It depends on
-    the options alone where the clock does not end the search. InputError where a joint has no limits to keep, or no motion
-    is allowed.
+    The result is never worse than the best random motion that keeps the same limits without a collision. It depends on
+    the options alone if the time limit does not end the search. Raises InputError if a joint has no limits, or if no
+    motion is allowed.
     """
     options, allowed = options or ExciteOptions(), allowed or Allowed(chain)
     require_limits(chain.joints)
@@ -233,8 +232,8 @@ UNFELT = 1e-6
 def motor_poses(
     chain: Mechanism, load: Load, *, tries: int = 400, range_share: float = 0.9, seed: int = 0
 ) -> tuple[Array, Array]:
-    """Random poses (tries, n), and the root mean square (tries, n), N m (N), of the torque by which the load acts on each
-    joint over that joint's sweep."""
+    """Return random poses (tries, n). Also return the RMS torque (tries, n), N m (N), of the load on each joint while
+    that joint moves through its sweep."""
     rng = np.random.default_rng(seed)
     low, high = np.array([swept_range(joint, range_share) for joint in chain.joints]).T
     poses = rng.uniform(low, high, (tries, len(chain)))
@@ -248,6 +247,7 @@ def motor_poses(
 
 
 def unfelt(chain: Mechanism, load: Load, effect: Array) -> tuple[int, ...]:
-    """Joints that the load does not act on in any pose: their axes are along gravity, or it lies on them."""
+    """Return the joints on which the load does not act in any pose: their axes are along gravity, or go through the
+    load."""
     weight = load.mass * float(np.linalg.norm(chain.gravity))
     return tuple(int(k) for k in np.flatnonzero(effect.max(axis=0) <= UNFELT * weight))

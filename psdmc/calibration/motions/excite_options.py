@@ -1,4 +1,5 @@
-"""What an exciting motion is searched among, and for how long; apart from the search, which the command line loads late."""
+"""Options of the search for an exciting motion. They are in a separate module so that the command line need not import
+the search."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ Objective = Literal["deviation", "condition", "log_det"]
 
 
 def chosen_objective(condition: bool, log_det: bool) -> Objective:
-    """By the flags --condition and --log-det, of which one at most may be given (InputError)."""
+    """Return the objective for the options --condition and --log-det. Raises InputError if both are given."""
     if condition and log_det:
         raise InputError("--condition and --log-det are two objectives", "give one of them, or neither")
     return "condition" if condition else "log_det" if log_det else "deviation"
@@ -31,20 +32,20 @@ def chosen_objective(condition: bool, log_det: bool) -> Objective:
 
 @dataclass(frozen=True, slots=True)
 class ExciteOptions:
-    """What is searched, and for how long.
+    """Which motions are searched, and for how long.
 
     duration       s, the period of the motion
     harmonics      multiples of 1/duration that each joint's sines have
-    samples        times per period at which the columns are stacked
+    samples        number of samples per period at which the columns are computed
     objective      deviation: smallest condition number of the scaled columns over their mean length, a bound on standard
                    deviations; condition: smallest condition number, whatever the lengths; log_det: largest log determinant
-    margin         share of the limits of position, speed and acceleration that is used
-    torque_margin  share of the torque limits; friction that the model does not know and the controller need the rest
-    seconds        s of CPU in all, child processes included, after which the search ends; the random motions and the checks
-                   of limits and collisions are made all the same
-    evaluations    of the criterion with its gradient: they, and not the clock, end the search where `seconds` are enough;
-                   only then does a seed give the same motion again
-    seed           of the random trajectories, which are compared with and started from
+    margin         share of the limits of position, speed and acceleration that the motion uses
+    torque_margin  share of the torque limits that the motion uses; the rest is for unknown friction and the controller
+    seconds        limit of CPU time, child processes included; the random motions and the checks of limits and collisions
+                   run in any case
+    evaluations    largest number of evaluations of the objective with its gradient. If they end the search before
+                   `seconds`, the same seed gives the same motion again
+    seed           of the random motions, from which the search starts and with which the result is compared
     random         number of random trajectories
     """
 

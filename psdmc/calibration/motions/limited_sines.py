@@ -1,8 +1,7 @@
-"""Sums of sines as points of a space without limits: whatever its coordinates, a motion keeps the joints' limits.
+"""Describes sums of sines by unbounded coordinates, so that every motion keeps the joints' limits.
 
-Each joint's sines are divided by the share that they take of its tightest limit. The largest value of a curve is
-replaced by a norm that is never smaller, so that motions are smooth in their coordinates and the limits hold all the
-same.
+The sines of each joint are divided by the share of its tightest limit that they need. A norm that is never smaller
+replaces the largest value of a curve. So motions are smooth in their coordinates, and the limits still hold.
 """
 
 from __future__ import annotations
@@ -28,10 +27,10 @@ TINY = 1e-300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """Motions at points of the space, with what their derivatives need.
+    """Motions for given coordinates, with the data for their derivatives.
 
     states  (3, n, N)  position, speed and acceleration
-    raw     (3, n, N)  before scaling;  norm (n,) their share of the tightest limit, reach (n,) of the position's
+    raw     (3, n, N)  before scaling;  norm (n,) share of the tightest limit, reach (n,) share of the position limit
     fill    (n,)       share of the limits that is used;  place (n,) of the centre within the range, -1 to 1
     """
 
@@ -44,7 +43,8 @@ class Placed:
 
 
 class LimitedSines:
-    """The space. Per joint: weights of sines and cosines, the share of its limits that is used, the centre's place."""
+    """The coordinates that describe a motion: for each joint the weights of sines and cosines, the used share of its
+    limits, and the position of its centre."""
 
     def __init__(self, chain: Mechanism, options: ExciteOptions) -> None:
         limits = [joint.limits for joint in chain.joints]
@@ -67,13 +67,13 @@ class LimitedSines:
         self.basis = np.stack([np.vstack(part) * self.weight for part in parts])
 
     def drawn(self, count: int, rng: np.random.Generator) -> Array:
-        """(count, size) random points whose motions fill their limits."""
+        """Return random coordinates (count, size) of motions that fill their limits."""
         found = rng.standard_normal((count, self.size))
         found.reshape(count, self.n, -1)[..., -2] = FULL
         return found
 
     def filled(self, point: Array, share: float) -> Array:
-        """The point with every joint's motion at most this share of its limits."""
+        """Return the coordinates with every joint's motion limited to this share of its limits."""
         found = point.copy().reshape(self.n, -1)
         found[:, -2] = np.minimum(found[:, -2], np.log(share / (1.0 - share)))
         return found.ravel()
@@ -101,7 +101,8 @@ class LimitedSines:
         )
 
     def slope(self, at: Placed, by_states: Array) -> Array:
-        """(size,) derivatives by the point of a number whose derivatives by the states (3, n, N) are given."""
+        """Return the derivatives (size,) by the coordinates of a number whose derivatives by the states (3, n, N) are
+        given."""
         by_centre = by_states[0].sum(axis=1)
         by_scale = np.einsum("pnt,pnt->n", by_states, at.raw) - by_centre * at.place * self.half * at.reach
         by_norm = -by_scale * at.fill / at.norm**2
@@ -131,7 +132,8 @@ def _norm_slope(shares: Array, norm: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SineSum:
-    """q_i(t) = centre_i + sum over k of a_ik sin(w_k t) + b_ik cos(w_k t), w_k = 2 pi harmonic_k / duration.
+    """A periodic motion, q_i(t) = centre_i + sum over k of a_ik sin(w_k t) + b_ik cos(w_k t), w_k = 2 pi harmonic_k /
+    duration.
 
     centre (n,), sine (n, h), cosine (n, h): rad (m). As amplitude and phase: A sin(w t + phi), A = hypot(a, b).
     """
@@ -151,24 +153,24 @@ class SineSum:
         return np.arctan2(self.cosine, self.sine)
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """(N, n) each: position, speed and acceleration at any times (N,)."""
+        """Return position, speed and acceleration, (N, n) each, at any times (N,)."""
         basis = sine_basis(self.harmonics, self.duration, time)
         q, qd, qdd = (self.sine @ s + self.cosine @ c for s, c in basis)
         return q.T + self.centre, qd.T, qdd.T
 
     def sampled(self, joint_names: tuple[str, ...], period: float, repeats: int = 1) -> Trajectory:
-        """The motion on an even grid, `repeats` periods of it."""
+        """Return the motion at equal time steps, `repeats` periods long."""
         count = round(repeats * self.duration / period) + 1
         time: Array = np.arange(count, dtype=np.float64) * period
         return Trajectory(joint_names, time, *self.at(time))
 
     def shrunk(self, share: float) -> SineSum:
-        """The motion with all amplitudes times `share`, about the same centre."""
+        """Return the motion with all amplitudes multiplied by `share`, about the same centre."""
         return replace(self, sine=share * self.sine, cosine=share * self.cosine)
 
 
 def sine_basis(harmonics: tuple[int, ...], duration: float, time: Array) -> list[tuple[Array, Array]]:
-    """(sine, cosine) rows (h, N) of position, speed and acceleration."""
+    """Return the sines and cosines, as rows (h, N), for position, speed and acceleration."""
     w = 2.0 * np.pi * np.array(harmonics)[:, None] / duration
     s, c = np.sin(w * time), np.cos(w * time)
     return [(s, c), (w * c, -w * s), (-(w**2) * s, -(w**2) * c)]
@@ -185,9 +187,9 @@ Faults = Callable[[Trajectory], list[str]]
 def from_rest_to_rest(
     motion: SineSum, chain: Mechanism, period: float, repeats: int, faults: Faults
 ) -> Trajectory:
-    """`repeats` periods of the motion with a ramp before and after them, rows `period` apart.
+    """Return `repeats` periods of the motion with a ramp before and after them, in rows that are `period` (s) apart.
 
-    InputError where no ramp keeps the limits.
+    Raises InputError if no ramp keeps the limits.
     """
     found: list[str] = []
     for ramp in RAMPS:
@@ -204,7 +206,7 @@ def from_rest_to_rest(
 def ramped(
     motion: SineSum, joint_names: tuple[str, ...], period: float, repeats: int, ramp: float
 ) -> Trajectory:
-    """The motion with ramps of that many seconds, rounded to rows."""
+    """Return the motion with ramps of `ramp` seconds, rounded to rows."""
     rows = max(round(ramp / period), 1)
     middle: Array = np.arange(round(repeats * motion.duration / period) + 1, dtype=np.float64) * period
     length = rows * period

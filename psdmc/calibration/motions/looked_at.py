@@ -1,4 +1,5 @@
-"""What planned motions are checked for, and the sentences that say so; also which checks were not possible, and why."""
+"""Decides for which limits and collisions planned motions are checked, and describes these checks in sentences. The
+sentences also say which checks were not possible, and why."""
 
 from __future__ import annotations
 
@@ -28,14 +29,14 @@ def allowed_of(
     shapes: Sequence[Path] | None,
     floor: float | None,
 ) -> Allowed:
-    """Limits of a model's motions: torques where theta_b is known and a joint has a limit, clearance where the model holds
-    shapes.
+    """Return the limits of a model's motions. Torques are limited if theta_b is known and a joint has a torque limit;
+    collisions are checked if the model contains shapes.
 
-    chain   the model's, with the limits that the motions keep
-    shapes  folders of meshes; None: shapes are not looked at
-    floor   m above the base's origin; None: none
+    chain   the model's robot, with the limits that the motions keep
+    shapes  folders of meshes; None: shapes are not checked
+    floor   m above the base's origin; None: no floor
 
-    InputError where a floor is asked for that cannot be looked at, or meshes are given that are not there.
+    Raises InputError if a floor that cannot be checked is given, or if meshes are missing.
     """
     clearance: Clearance | FloorPoints | None = None
     if shapes is not None:
@@ -64,7 +65,7 @@ def _torques(model: DynamicsModel, chain: Mechanism, regressor: Regressor) -> To
 def looked_at(
     allowed: Allowed, model: DynamicsModel, shapes: Sequence[Path] | None, floor: float | None
 ) -> tuple[str, ...]:
-    """A sentence each on torques, shapes and floor."""
+    """Return one sentence each on the checks of torques, shapes and floor."""
     return (_of_torques(allowed, model), _of_shapes(allowed, model, shapes), _of_floor(allowed, floor))
 
 

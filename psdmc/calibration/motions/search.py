@@ -1,7 +1,7 @@
-"""The search for an exciting motion: quasi-Newton descents from the best of many random motions.
+"""Searches for an exciting motion by quasi-Newton descents from the best of many random motions.
 
-A condition number has corners where its smallest eigenvalue is double. A descent therefore goes from a mean over all
-directions to the worst one in steps.
+The condition number has kinks where its smallest eigenvalue is double. So a descent first minimises a smooth mean over
+all directions, and then approaches the condition number in steps.
 """
 
 from __future__ import annotations
@@ -41,18 +41,19 @@ SearchProgress = Callable[[float, float, float], None]
 
 
 def cpu_seconds() -> float:
-    """CPU time of this process, its threads, and the processes that it started and that have ended."""
+    """Return the CPU time of this process with its threads and its ended child processes, s."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 class OutOfTime(Exception):
-    """The clock or the count ended a descent."""
+    """The time limit or the number of evaluations ended a descent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Best points of each descent, best first; evaluations, and (k, 2) of these and the best score so far."""
+    """The result of a search: the best point of each descent, best first; the number of evaluations; and a history (k,
+    2) of this number and the best score so far."""
 
     points: tuple[Array, ...]
     evaluations: int
@@ -61,7 +62,7 @@ class Found:
 
 
 class Criterion:
-    """What is minimised at a point of the space: the options' objective, and excess of torque."""
+    """The function that the search minimises: the objective of the options plus a penalty for excess torque."""
 
     def __init__(
         self, space: LimitedSines, columns: FitColumns, options: ExciteOptions, torques: TorqueLimits | None
@@ -69,12 +70,12 @@ class Criterion:
         self.space, self.columns, self.options, self.torques = space, columns, options, torques
 
     def score(self, point: Array) -> float:
-        """The objective."""
+        """Return the objective at a point."""
         found = scaled(self.columns.at(*(part.T for part in self.space.placed(point).states)))
         return found.score(self.options.objective)
 
     def cost(self, point: Array) -> float:
-        """The smooth criterion of the last descent with excess of torque, without derivatives."""
+        """Return the smooth objective of the last descent with the penalty for excess torque, without derivatives."""
         q, qd, qdd = (np.ascontiguousarray(part.T) for part in self.space.placed(point).states)
         regressor = self.columns.model.regressor(q, qd, qdd)
         seen = scaled(self.columns.of(regressor, qd))
@@ -84,7 +85,7 @@ class Criterion:
         return value + TORQUE_COST * self.torques.excess(regressor, qd, self.options.torque_margin)[0]
 
     def smooth(self, point: Array, power: float) -> tuple[float, Array, float]:
-        """The smooth criterion with excess of torque, its derivatives, and the score."""
+        """Return the smooth objective with the penalty for excess torque, its derivatives, and the objective itself."""
         at = self.space.placed(point)
         q, qd, qdd = (np.ascontiguousarray(part.T) for part in at.states)
         regressor = self.columns.model.regressor(q, qd, qdd)
@@ -109,11 +110,12 @@ def search(
     is_free: Callable[[Array], bool] | None = None,
     progress: SearchProgress | None = None,
 ) -> Found:
-    """Descents from the first of the starts (k, size), best first; as many as the options' evaluations allow.
+    """Return the results of descents from the first of the starts (k, size), best first. The options' evaluations
+    determine how many there are.
 
-    begin     cpu_seconds() from which the options' seconds count
-    is_free   whether the motion at a point meets nothing; descents keep to such points, and where they end early, as
-              the slope leads into what is in the way, a walk by random steps goes on
+    begin     value of cpu_seconds() from which the time limit counts
+    is_free   function that returns whether the motion at a point has no collision. Descents stay at such points. If a
+              collision ends a descent early, a random walk continues
     """
     options = criterion.options
     budget = options.evaluations
@@ -194,7 +196,7 @@ class _Counted:
         return value, slope
 
     def steps_left(self) -> Iterator[int]:
-        """Steps of the walk, until its evaluations or the time are over."""
+        """Yield the steps of the random walk until its evaluations or the time are used up."""
         for step in range(STEPS_PER_EVALUATION * max(self.budget - self.count, 0)):
             if self.is_late:
                 return
@@ -222,7 +224,8 @@ def walked(
     steps: Iterable[object],
     rng: np.random.Generator,
 ) -> Array:
-    """The cheapest point found in as many steps, one of those that are free; `point` is."""
+    """Return the best point that a random walk of these steps finds among points without collision. It starts at
+    `point`, which has none."""
     lowest, step = cost(point), FIRST_STEP
     for _ in steps:
         tried = point + step * rng.standard_normal(len(point))

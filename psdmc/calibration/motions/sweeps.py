@@ -1,4 +1,4 @@
-"""Slow sweeps and single-joint sine series: the motions of Denso-2022 3.1 to 3.3."""
+"""Slow sweeps, and sines of single joints: the motions of Denso-2022 3.1 to 3.3."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ LONGEST_RUN = 3600.0
 
 @dataclass(frozen=True, slots=True)
 class SweepOptions:
-    """Sweeps at constant speed.
+    """Options of sweeps at constant speed.
 
-    speed     share of each joint's speed limit; above static friction's speeds, slow enough that inertia is small
+    speed     share of each joint's speed limit; fast enough to avoid static friction, slow enough for small inertial torque
     range     share of the position range that is swept, centred
     blend     s, over which a speed changes sign
     seconds   s, of the forward half of a gravity sweep
@@ -36,12 +36,12 @@ class SweepOptions:
 
 @dataclass(frozen=True, slots=True)
 class SineOptions:
-    """Sines of growing amplitude, one joint at a time.
+    """Options of sines with growing amplitude, one joint at a time.
 
     smallest, largest  amplitudes, rad: from within pre-sliding to what the speed limit allows
-    ratio              from one amplitude to the next
-    frequencies        Hz; each amplitude is run at each of them that the limits allow, or as fast as they do
-    cycles             periods at full amplitude; one more on either side swells and fades
+    ratio              ratio of one amplitude to the one before
+    frequencies        Hz; each amplitude is run at each frequency that the limits allow, or at the largest possible one
+    cycles             periods at full amplitude; during one more before and after them the amplitude grows and falls
     margin             share of the speed and acceleration limits that is used
     period             s between rows
     """
@@ -60,7 +60,7 @@ Piece = tuple[float, float, float]
 
 
 def swept_range(joint: Joint, share: float) -> tuple[float, float]:
-    """The middle `share` of a joint's position range; half a turn either way where it has no limits."""
+    """Return the middle `share` of a joint's position range; half a turn in each direction if it has no limits."""
     lower, upper = joint.limits.lower, joint.limits.upper
     if not np.isfinite([lower, upper]).all():
         lower, upper = -np.pi, np.pi
@@ -69,7 +69,7 @@ def swept_range(joint: Joint, share: float) -> tuple[float, float]:
 
 
 def sweep_speed(joint: Joint, share: float) -> float:
-    """rad/s or m/s: a share of the joint's speed limit, of 2 where it has none."""
+    """Return a share of the joint's speed limit, rad/s or m/s; without a limit, of 2."""
     return share * (joint.limits.speed if np.isfinite(joint.limits.speed) else 2.0)
 
 
@@ -88,7 +88,8 @@ def _require_short(joint: Joint, what: str, seconds: float) -> None:
 
 
 def single_joint_sweep(chain: Mechanism, joint: int, pose: Array, options: SweepOptions) -> Trajectory:
-    """One joint through its range and back at constant speed, the others at `pose` (n,): the motion of (16)."""
+    """Return a motion of one joint through its range and back at constant speed, while the others stay at `pose` (n,).
+    Source: Denso-2022, (16)."""
     low, high = swept_range(chain.joints[joint], options.range)
     speed = sweep_speed(chain.joints[joint], options.speed)
     _require_speed(chain.joints[joint], speed)
@@ -110,9 +111,10 @@ def single_joint_sweep(chain: Mechanism, joint: int, pose: Array, options: Sweep
 
 
 def gravity_sweep(chain: Mechanism, seed: int, options: SweepOptions) -> Trajectory:
-    """All joints to and fro, each at its own constant speed, then the same path backwards: the motion of (18).
+    """Return a motion of all joints forwards and backwards, each at its own constant speed, and then the same path
+    backwards. Source: Denso-2022, (18).
 
-    Speeds and starts are drawn from the seed, so that the joints meet in new poses all the time.
+    Speeds and starts are random numbers from the seed, so the joints always meet in new poses.
     """
     rng = np.random.default_rng(seed)
     half = _times(options.seconds, options.period)
@@ -137,9 +139,10 @@ def gravity_sweep(chain: Mechanism, seed: int, options: SweepOptions) -> Traject
 
 
 def sine_series(chain: Mechanism, joint: int, pose: Array, options: SineOptions) -> Trajectory:
-    """One joint through sines of growing amplitude about its place in `pose`: 3.3's motion.
+    """Return a motion of one joint along sines of growing amplitude about its position in `pose`. Source: Denso-2022,
+    3.3.
 
-    Each sine swells and fades with its envelope's first two derivatives zero at both ends.
+    The first two derivatives of each sine's envelope are zero at both ends.
     """
     runs: list[tuple[Array, Array, Array]] = []
     plan = sine_plan(chain.joints[joint], float(pose[joint]), options)
@@ -157,7 +160,7 @@ def sine_series(chain: Mechanism, joint: int, pose: Array, options: SineOptions)
 
 
 def sine_plan(joint: Joint, centre: float, options: SineOptions) -> list[tuple[float, float]]:
-    """(amplitude, frequency) of each sine of a series, within the joint's limits."""
+    """Return (amplitude, frequency) of each sine of a series, within the joint's limits."""
     limits = joint.limits
     room = min(limits.upper - centre, centre - limits.lower, options.largest)
     if not room >= options.smallest or not min(limits.speed, limits.acceleration) > 0:

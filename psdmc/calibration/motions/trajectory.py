@@ -1,4 +1,4 @@
-"""A motion to be run: positions, speeds and accelerations on an even time grid, as a table for robots."""
+"""A motion for a robot: positions, speeds and accelerations at equal time steps, and its table as a file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SLIDING = ("position_m", "velocity_m_s", "acceleration_m_s2")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """A motion of n joints at N even times.
+    """A motion of n joints at N equal time steps.
 
     time        (N,)    s, from zero
     q, qd, qdd  (N, n)  rad, rad/s, rad/s^2 (m for sliding joints)
@@ -63,7 +63,8 @@ def _column(part: int, name: str, sliding: Sequence[str]) -> str:
 
 
 def read_trajectory(path: str | Path) -> Trajectory:
-    """A trajectory from its table; InputError where a column is missing, a value is not finite or time is uneven."""
+    """Return a trajectory from its file. Raises InputError if a column is missing, a value is not finite or time steps
+    differ."""
     path = Path(path)
     columns = read_columns(path)
     names, sliding = _named(tuple(columns))
@@ -93,7 +94,8 @@ def read_trajectory(path: str | Path) -> Trajectory:
 
 
 def trajectory_joints(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the joints that a trajectory's table moves, and of those that slide, without reading all of it."""
+    """Return the names of the joints in the file of a trajectory, and of those that slide, without reading the whole
+    file."""
     return _named(column_names(Path(path)))
 
 
@@ -104,12 +106,12 @@ def _named(columns: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def sliding_joints(chain: Mechanism) -> tuple[str, ...]:
-    """Names of the chain's joints whose position is in m."""
+    """Return the names of the robot's joints whose position is in m."""
     return tuple(joint.name for joint in chain.joints if joint.type.length_order)
 
 
 def limit_faults(trajectory: Trajectory, chain: Mechanism) -> list[str]:
-    """One sentence for each joint and limit that the trajectory exceeds; empty where it keeps all of them."""
+    """Return one sentence for each joint and limit that the trajectory exceeds; empty if it keeps all limits."""
     faults: list[str] = []
     for k, joint in enumerate(chain.joints):
         limits = joint.limits

@@ -1,7 +1,8 @@
-"""A virtual robot's files: the plant (motors, friction, sensors, harness) and the DH table that it names.
+"""Reads the files of a virtual (simulated) robot: the plant file with motors, friction, sensors and cable harness, and
+the DH table or URDF that it names.
 
-A DH table's values are read by code of its own here and a URDF's by Pinocchio, so that the virtual robot shares none with
-the calibration.
+This module has its own code to read a DH table, and Pinocchio reads a URDF. So the virtual robot shares no code with
+the calibration that it tests.
 """
 
 from __future__ import annotations
@@ -65,9 +66,10 @@ LARGEST_PLANT = 100
 
 @dataclass(frozen=True, slots=True)
 class JointTruth:
-    """One joint's motor and friction: K_t (N m/A), and values of the plant's friction laws by name, SI.
+    """The motor and friction of one joint: torque constant K_t (N m/A), and values of the plant's friction laws by
+    name, SI.
 
-    drive_inertia  kg m^2 (kg) at the joint, which a URDF cannot state; a DH table states its own
+    drive_inertia  kg m^2 (kg) at the joint, for a URDF, which cannot state it; a DH table states its own
     """
 
     name: str
@@ -78,12 +80,12 @@ class JointTruth:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """The sensors' imperfections.
+    """The imperfections of the sensors.
 
     position_step   rad, quantisation
     current_noise   A RMS, white
     current_step    A, quantisation
-    effort_delay    s; a row's current belongs to a motion this much later
+    effort_delay    s; the current in a row belongs to a motion this much later
     """
 
     position_step: float = 0.0
@@ -94,8 +96,8 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Harness:
-    """A cable harness, an effect that no model here has: a spring that saturates at `torque` (N m) beyond about `angle`
-    (rad)."""
+    """A cable harness, an effect that no model in psdmc has: a spring that saturates at `torque` (N m) beyond about
+    `angle` (rad)."""
 
     joints: tuple[str, ...]
     torque: float
@@ -104,7 +106,8 @@ class Harness:
 
 @dataclass(frozen=True, slots=True)
 class PlantRow:
-    """One joint of a standard DH table with its link; m, rad, kg, kg m^2 about the centre of mass, link's frame."""
+    """One joint of a standard DH table with its link; m, rad, kg, kg m^2 about the centre of mass, along the link's
+    frame."""
 
     name: str
     slides: bool
@@ -120,7 +123,7 @@ class PlantRow:
 
 @dataclass(frozen=True, slots=True)
 class PlantRobot:
-    """A robot's rows; gravity in m/s^2, base frame."""
+    """The rows of a DH table, and gravity in m/s^2 along the axes of the base frame."""
 
     name: str
     gravity: Triple
@@ -129,7 +132,7 @@ class PlantRobot:
 
 @dataclass(frozen=True, slots=True)
 class PlantUrdf:
-    """A URDF's text; joints that the plant does not list are held at zero.
+    """The text of a URDF. Joints that the plant does not list stay at zero.
 
     tip  link that carries a load
     """
@@ -141,9 +144,9 @@ class PlantUrdf:
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """The content of both files.
+    """The content of a plant file and of the robot file that it names.
 
-    terms       of the joints' friction
+    terms       friction terms of the joints
     sign_speed  rad/s (m/s) over which friction without a state changes sign
     """
 
@@ -156,12 +159,12 @@ class Plant:
 
 
 def read_plant(path: Path) -> Plant:
-    """A plant from its file; InputError names the table and key that is missing or wrong."""
+    """Return a plant (virtual robot) from its file. Raises InputError with the table and key that is missing or wrong."""
     return plant_of(read_toml(path, WHAT), path)
 
 
 def plant_of(content: dict[str, Any], path: Path) -> Plant:
-    """The plant of a file's content; `path` is the file that it came from."""
+    """Return the plant (virtual robot) from the content of its file; `path` is the path of that file."""
     faults: list[str] = []
     table = TomlTable(content, "plant", KEYS, faults)
     where = path.parent / table.text("robot")
@@ -196,7 +199,7 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
 
 
 def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
-    """The bytes that a plant depends on: its own file's and its robot's."""
+    """Return the bytes on which a plant (virtual robot) depends: those of its own file and of the robot file."""
     path = Path(path)
     robot = path.parent / str(read_toml(path, WHAT).get("robot"))
     return _bytes_of(path), _bytes_of(robot, LARGEST_URDF)
@@ -276,7 +279,8 @@ def _harness(value: object, names: Sequence[str], faults: list[str]) -> Harness:
 
 
 def read_plant_urdf(path: Path, names: Sequence[str], tip: str | None) -> PlantUrdf:
-    """A virtual robot's URDF; InputError where it is none, or lacks the plant's joints or the tip."""
+    """Return the URDF of a virtual robot. Raises InputError if the file is no URDF, or lacks the plant's joints or the
+    tip."""
     data = _bytes_of(path, LARGEST_URDF)
     with decoding(str(path), "a robot (.toml or .urdf)"):
         text = data.decode("utf-8-sig")
@@ -296,7 +300,8 @@ def read_plant_urdf(path: Path, names: Sequence[str], tip: str | None) -> PlantU
 
 
 def read_plant_robot(path: Path) -> PlantRobot:
-    """The DH table of a virtual robot; InputError where it is no such table, or a value is unknown."""
+    """Return the DH table of a virtual robot. Raises InputError if the file is no such table, or if a value is
+    unknown."""
     data = _bytes_of(path)
     content = toml_content(data, str(path), "a robot as a DH table (.toml)")
     with decoding(str(path), "a DH table"):

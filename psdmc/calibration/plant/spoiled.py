@@ -1,4 +1,4 @@
-"""Logs with faults that real logs have, made on purpose: a verdict must notice them."""
+"""Adds faults to logs that real logs can have, for tests of the verdict of a calibration."""
 
 from __future__ import annotations
 
@@ -14,31 +14,32 @@ ALL = (*MOVED, "effort")
 
 
 def scaled(log: Log, factor: float | Sequence[float]) -> Log:
-    """Efforts multiplied by one factor, or one per joint: another unit, or currents in place of torques."""
+    """Return the log with efforts multiplied by one factor, or one per joint. This imitates a wrong unit, or currents
+    instead of torques."""
     return replace(log, effort=log.effort * np.asarray(factor, dtype=np.float64))
 
 
 def turned(log: Log, joint: int, columns: Sequence[str]) -> Log:
-    """One joint's columns (of "position", "velocity", "effort") with the opposite sign."""
+    """Return the log with the sign of one joint's columns (of "position", "velocity", "effort") reversed."""
     signs = np.ones(len(log.joint_names))
     signs[joint] = -1.0
     return _changed(log, columns, lambda values: signs * values)
 
 
 def swapped(log: Log, first: int, second: int, columns: Sequence[str]) -> Log:
-    """Two joints' columns exchanged."""
+    """Return the log with the columns of two joints exchanged."""
     order = list(range(len(log.joint_names)))
     order[first], order[second] = second, first
     return _changed(log, columns, lambda values: values[:, order])
 
 
 def decimated(log: Log, every: int) -> Log:
-    """Every `every`-th row."""
+    """Return the log with every `every`-th row only."""
     return log.at(slice(None, None, every))
 
 
 def noise_only(log: Log, seed: int = 0) -> Log:
-    """Efforts of the same size that are unrelated to the motion."""
+    """Return the log with efforts replaced by noise of the same size, which is unrelated to the motion."""
     rng = np.random.default_rng(seed)
     return replace(log, effort=rng.standard_normal(log.effort.shape) * np.std(log.effort, axis=0))
 
@@ -53,13 +54,13 @@ def _changed(log: Log, columns: Sequence[str], change: Callable[[Array], Array])
 
 
 def clipped(log: Log, share: float) -> Log:
-    """The log with every joint's effort cut off at a share of its peak."""
+    """Return the log with every joint's effort limited to a share of its peak."""
     peak = share * np.abs(log.effort).max(axis=0)
     return replace(log, effort=np.clip(log.effort, -peak, peak))
 
 
 def late(log: Log, rows: int) -> Log:
-    """The log whose effort comes so many rows late."""
+    """Return the log with its effort delayed by this number of rows."""
     velocity = None if log.velocity is None else log.velocity[rows:]
     return replace(
         log, time=log.time[rows:], position=log.position[rows:], velocity=velocity, effort=log.effort[:-rows]

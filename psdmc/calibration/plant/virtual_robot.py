@@ -1,8 +1,8 @@
-"""A robot with known truth: Pinocchio's dynamics, friction, imperfect sensors.
+"""Simulates a robot with known parameters: Pinocchio's dynamics, friction, and imperfect sensors.
 
-Robot files and sensors are implemented here a second time. Friction is that of the law's files, but a state is integrated
-by SciPy's stiff integrator, not by the step of the law that the calibration takes. The
-motion is prescribed, as by a stiff position controller; the motors give the torque that it needs.
+It has its own code for robot files and sensors. Friction torques come from the friction laws, but SciPy's stiff
+integrator integrates their states, and not the step that the calibration uses. The motion is prescribed, as by a stiff
+position controller, and the motors give the torque that it needs.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ LONGEST_STEP = 2e-3
 
 @dataclass(frozen=True, slots=True)
 class Payload:
-    """A mass (kg) at the tip; com (m) in the tip frame."""
+    """A load at the tip: mass in kg, and its centre of mass `com` in m in the tip frame."""
 
     mass: float
     com: tuple[float, float, float]
@@ -55,7 +55,8 @@ class Payload:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VirtualRobot:
-    """A plant: Pinocchio's model, joint truths, sensors and perhaps a harness."""
+    """A simulated robot: Pinocchio's model, motors and friction of the joints, sensors, and optionally a cable
+    harness."""
 
     name: str
     model: Any
@@ -81,12 +82,13 @@ class VirtualRobot:
 def load_virtual_robot(
     path: str | Path, *, ideal_sensors: bool = False, harness: bool = False
 ) -> VirtualRobot:
-    """A plant from its TOML file; `robot` there names a DH table or a URDF beside it.
+    """Return a virtual robot from its plant file (TOML), in which `robot` names a DH table or a URDF in the same
+    folder.
 
-    ideal_sensors  no noise, no steps, no delay
-    harness        with the file's cable harness
+    ideal_sensors  True: sensors without noise, quantisation and delay
+    harness        True: with the cable harness in the file
 
-    InputError names the faults of either file.
+    Raises InputError with the faults of either file.
     """
     plant = read_plant(Path(path))
     if harness and plant.harness is None:
@@ -144,7 +146,7 @@ def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:
 def simulate(
     robot: VirtualRobot, trajectory: Trajectory, *, payload: Payload | None = None, seed: int = 0
 ) -> Log:
-    """The log that the robot's sensors give while it runs a trajectory from rest. Rows as the trajectory's."""
+    """Return the log of the robot's sensors while it runs a trajectory from rest, with the rows of the trajectory."""
     shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
     rigid = _rigid_torque(_loaded(robot, payload), *shifted)
     tau = rigid + _friction(robot, trajectory, shifted[0], shifted[1], rigid)

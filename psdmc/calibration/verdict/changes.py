@@ -1,4 +1,5 @@
-"""What has changed on a robot: how all values of a calibrated file differ by new logs, and which few explain it."""
+"""Finds what has changed on a robot: how all values of a calibrated file differ in new logs, and which few changes
+explain this."""
 
 from __future__ import annotations
 
@@ -37,10 +38,10 @@ RESOLVED = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One value of the file, and what the logs say of it.
+    """One value of the calibrated file, and its change in the logs.
 
-    value, change, std  of the file, and by the logs minus that of the file, with its standard deviation. std is infinite if
-                        the logs do not show the value by itself
+    value, change, std  value in the file, and its change in the logs with its standard deviation. std is infinite if the
+                        logs do not determine the value by itself
     torque              largest RMS over the joints of the torque of this change, N m (N)
     """
 
@@ -67,8 +68,8 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class LoadChange:
-    """A load at the tip that explains the logs; negative if one was taken off. kg, and (3,) m in the tip's frame, NaN
-    for what the logs do not show."""
+    """A load at the tip that explains the logs: mass in kg (negative if a load was removed), and centre of mass (3,)
+    in m in the tip frame, NaN for what the logs do not show."""
 
     mass: float
     mass_std: float
@@ -83,8 +84,11 @@ class LoadChange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    """A load and changes of single values, `chosen` of them; values (u,) of the whole vector; left: the chi-square that
-    remains."""
+    """An explanation of the logs by a load and changes of single values, `chosen` in number.
+
+    values  (u,) changes of the whole vector
+    left    chi-square that remains
+    """
 
     values: Array
     load: LoadChange | None = None
@@ -94,10 +98,10 @@ class Explanation:
 
 
 class Changes:
-    """The change of all u values of a file, theta_b first, by some logs.
+    """The changes of all u values of a calibrated file, theta_b first, in some logs.
 
-    white     (r,)    changes in the directions that the logs show, in variances of file and logs together
-    by_value  (r, u)  the same of a unit change of each value
+    white     (r,)    changes in the directions that the logs show, in standard deviations of file and logs together
+    by_value  (r, u)  the same for a unit change of each value
     """
 
     def __init__(self, found: Delivered, fit: LinearResult, rows: PredictedRows) -> None:
@@ -130,14 +134,15 @@ class Changes:
 
     @property
     def chance(self) -> float:
-        """Probability that an unchanged robot has as large a chi-square, or a single value with as large a change."""
+        """Probability that an unchanged robot gives a chi-square at least as large, or a single value with at least as
+        large a change."""
         sizes = np.linalg.norm(self.by_value, axis=0)
         alone = (self.by_value.T @ self.white) / np.where(sizes > 0.0, sizes, np.inf)
         single = len(sizes) * stats.chi2.sf(np.max(alone**2, initial=0.0), 1)
         return float(min(1.0, 2.0 * min(stats.chi2.sf(self.chi2, self.freedom), single)))
 
     def torque(self, values: Array) -> Array:
-        """(N, n) of a change of all values."""
+        """Return the torque (N, n) of a change of all values."""
         return np.concatenate([block.columns @ values for block in self.fit.problem.rows])
 
     def _change(self, k: int, change: float, std: float) -> Change:
@@ -158,10 +163,12 @@ class Changes:
         return Change(f"{name} of {owner}", "", unit, value, change, std, torque)
 
     def explanation(self) -> Explanation:
-        """Add the load, or the single value, that explains the most, until no other explains more than chance.
+        """Return the explanation, to which the load or single values are added one by one. At each step the one that
+        explains most is added, until the remaining differences are no more than chance.
 
-        A load has more parameters than a single value, which explain more by chance, so each parameter has its price. But
-        what is mounted on a robot changes sooner than a link: if a load is possible, a base parameter costs as much.
+        A load has more parameters than a single value, so it explains more by chance. Therefore each parameter has a
+        cost. But a load changes more often than a link, so a base parameter costs as much as a load if a load is
+        possible.
         """
         price = float(stats.chi2.isf(CHANCE / self.size, 1))
         blocks = {k: self.by_value[:, [k]] for k in range(self.size) if self.by_value[:, k].any()}

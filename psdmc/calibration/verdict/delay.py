@@ -1,7 +1,7 @@
-"""The time between motion and torque, estimated by the fit itself.
+"""Estimates the delay between motion and torque in a log.
 
-Every sample's torque is also taken from before and after it. Base parameters, friction and offsets are fitted to each such
-set of torques; the delay is where the fit is best.
+The torque of every sample is also taken from earlier and later times. Base parameters, friction and offsets are fitted
+for each of these delays. The result is the delay with the best fit.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ time."""
 def delays_of(
     regressor: Regressor, logs: Sequence[Shifted], coupling: Coupling | None, known: float = 0.0
 ) -> tuple[Delay, ...]:
-    """Each log's delay beyond the known one; logs that are too short for a fit of their own are fitted together."""
+    """Return the delay of each log in addition to the known one. Logs that are too short for their own fit are fitted
+    together."""
     alone = [
         log
         for log in logs

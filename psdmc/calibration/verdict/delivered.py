@@ -1,6 +1,8 @@
-"""How well a calibrated model file predicts logs. All figures are computed from the file's content, none from the fit.
+"""Measures how well a calibrated model file predicts logs. All figures are computed from the content of the file, and
+none from the fit.
 
-The regressor is not used where one log was fitted: torques come from Newton-Euler on the file's theta_b.
+For a calibration from plain logs, torques come from the Newton-Euler algorithm on the file's theta_b, and not from the
+regressor.
 """
 
 from __future__ import annotations
@@ -48,9 +50,9 @@ from psdmc.progress import silent
 class Delivered:
     """A calibrated model as read from its file.
 
-    friction         by joint and parameter name
-    constants        N m/A by joint, empty where torques were logged
-    shown            those of them that a step found; given ones are not judged by it
+    friction         values by joint and parameter name
+    constants        N m/A by joint, empty if torques were logged
+    shown            those of them that the calibration determined; given ones are not part of its quality
     columns, extra   springs and further friction, and their values (m,)
     """
 
@@ -68,13 +70,13 @@ class Delivered:
 
     @property
     def step(self) -> StepOptions:
-        """Filter and split of the whole torque of a fast motion."""
+        """Filter and split of the step that fits the whole torque of a fast motion."""
         steps = self.prediction.steps
         return step_of(steps["all"] if "all" in steps else steps["inertial"])
 
     @property
     def linear(self) -> LinearOptions:
-        """Options of a linear fit with the file's filter and, where its friction has no state, the file's friction."""
+        """Options of a linear fit with the file's filter and, if its friction law has no state, the file's friction."""
         law, options = self.prediction, LinearOptions(filter=self.step.filter)
         if not law.is_linear:
             return options
@@ -89,7 +91,7 @@ class Delivered:
 
     @property
     def motors(self) -> Motors:
-        """The motors, which turn logged effort into torque."""
+        """The motors, which convert logged effort to torque."""
         names = self.model.joint_names
         constants = (
             np.array([self.constants[name] for name in names]) if self.constants else np.ones(len(names))
@@ -98,7 +100,8 @@ class Delivered:
 
 
 def delivered(model: DynamicsModel) -> Delivered:
-    """The contents of a calibrated model; InputError where it was not calibrated by this psdmc or a newer one."""
+    """Return the contents of a calibrated model. Raises InputError if the model holds no calibration from which
+    torques can be predicted."""
     kept = model.calibrated
     if model.theta_b is None or kept is None or kept.prediction is None:
         raise InputError(
@@ -120,13 +123,14 @@ def delivered(model: DynamicsModel) -> Delivered:
 
 
 def sprung(found: Delivered) -> Callable[[States, NDArray[np.intp]], Array] | None:
-    """(rows, n) torque of the springs alone, filtered like a log's, as a function of states and rows; None where there are
-    none."""
+    """Return a function of states and rows that computes the torque (rows, n) of the springs, filtered like a log's.
+    Return None if there are no springs."""
     return beside(found, found.columns.of_springs)
 
 
 def beside(found: Delivered, held: NDArray[np.bool_]) -> Callable[[States, NDArray[np.intp]], Array] | None:
-    """The same of some of the extra columns (m,), none of which depends on the load."""
+    """Return a function of states and rows that computes the torque (rows, n) of the springs and friction values
+    selected by the mask `held` (m,), filtered like a log's. None of them depends on the load."""
     if not held.any():
         return None
     values = np.where(held, found.extra, 0.0)
@@ -144,7 +148,7 @@ def beside(found: Delivered, held: NDArray[np.bool_]) -> Callable[[States, NDArr
 
 
 def reread(model: DynamicsModel) -> DynamicsModel:
-    """The model after it was written to a file and read back."""
+    """Return the model after it was written to a file and read back."""
     with tempfile.TemporaryDirectory(prefix="psdmc_") as folder:
         path = Path(folder) / "model.npz"
         save(model, path)
@@ -156,12 +160,13 @@ def delivered_quality(
     source: str | Path | Sequence[AnyLog | str | Path] | Runs,
     check: CheckOptions | None = None,
 ) -> tuple[StepQuality, ...]:
-    """R^2 and RMSE of a calibrated model on logs, or on a campaign's runs, from the content of its file.
+    """Return the R^2 and RMSE of a calibrated model on logs or on the runs of a campaign, from the content of its
+    file.
 
-    model   or the path of its file
+    model   a model, or the path of its file
     source  logs, or their paths; a campaign's runs, or its path; or the path of a log description
 
-    InputError where the model holds no calibration, or a file is missing or a log cannot be used.
+    Raises InputError if the model holds no calibration, or if a file is missing or a log cannot be used.
     """
     found = delivered(model_of(model))
     given = [source] if isinstance(source, str | Path) else source
@@ -187,7 +192,7 @@ def _read(found: Delivered, given: Sequence[AnyLog | str | Path]) -> Sequence[An
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedRows:
-    """Independent samples of one log: time (N,) s; joint speeds, measured and predicted torque (N, n)."""
+    """Independent samples of one log: time (N,) s; joint speeds, measured torque and predicted torque (N, n) each."""
 
     time: Array
     qd: Array
@@ -198,8 +203,8 @@ class PredictedRows:
 def log_parts(
     model: DynamicsModel, log: AnyLog, check: CheckOptions
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Of one log's independent samples, by a model that plain logs calibrated: time (N,), measured torque and the model's
-    (N, n), and which are held out (N,)."""
+    """Return data of one log's independent samples, for a model that was calibrated from plain logs: time (N,),
+    measured torque and predicted torque (N, n), and which samples are held out (N,)."""
     found = delivered(model)
     rows = predicted_rows(found, log, check)
     return rows.time, rows.measured, rows.predicted, held_out_of(log, len(rows.time), found.step.split)
@@ -220,7 +225,10 @@ def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) 
 def predicted_rows(
     found: Delivered, log: AnyLog, check: CheckOptions, motors: Motors | None = None
 ) -> PredictedRows:
-    """Measured and predicted torque of one log's independent samples; motors instead of the file's."""
+    """Return measured and predicted torque of one log's independent samples.
+
+    motors  motors to use instead of the file's
+    """
     step, motors, parts = found.step, motors or found.motors, []
     friction = None if found.prediction.is_linear else _with_state(found)
     for stretch in stretches(
@@ -241,7 +249,8 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
 
 
 def linear_torque(found: Delivered, q: Array, qd: Array, qdd: Array) -> Array:
-    """(N, n) motor torque of a file with a linear law: rigid bodies, friction, springs."""
+    """Return the motor torque (N, n) of a calibrated file whose friction is linear in its values: rigid bodies,
+    friction, springs."""
     rigid = recursive.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
     law = found.prediction
     coupling = coupling_of(law.coupling)

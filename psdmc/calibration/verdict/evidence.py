@@ -1,4 +1,4 @@
-"""The data that a verdict is based on: independent samples of the exciting motion, as the log has them."""
+"""The data on which a verdict is based: independent samples of the exciting motion, taken from the log."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Torque = Callable[[States, NDArray[np.intp]], Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A run to judge by: its log and the known load at the tip."""
+    """A run on which the verdict is based: its log and the known load at the tip."""
 
     log: AnyLog
     tool: Load | None = None
@@ -47,10 +47,10 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shifted:
-    """A log's independent samples with torques of other times. N samples, n joints, D delays.
+    """Independent samples of a log with torques from other times; N samples, n joints, D delays.
 
-    lags         (D,) s, evenly spaced about zero;  torque (N, n, D) so much later than the motion
-    q, qd, qdd   (N, n);  speed, sign (N, n) of the motors, as Evidence has them
+    lags         (D,) s, evenly spaced about zero;  torque (N, n, D) this much later than the motion
+    q, qd, qdd   (N, n);  speed, sign (N, n) of the motors, as in Evidence
     """
 
     log: str
@@ -65,17 +65,17 @@ class Shifted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Independent samples, one per half period of the cut-off. N samples, n joints.
+    """Independent samples, one per half period of the filter's cut-off; N samples, n joints.
 
-    model       as it was before it was calibrated: its theta_b is the file's, or None
-    regressor   of the model
+    model       the model before its calibration: its theta_b is that of the robot file, or None
+    regressor   regressor of the model
     q, qd, qdd  (N, n)
-    sign        (N, n)  smooth sign of the motors' speed, filtered like the torque: Coulomb friction's column
-    torque      (N, n)  of the motors, N m (N), filtered, without what the tool weighs and springs take
-    noise       (n,)    RMS of the sensor noise that passes the filter, from what lies above its cut-off
+    sign        (N, n)  smooth sign of the motors' speed, filtered like the torque: the column of Coulomb friction
+    torque      (N, n)  of the motors, N m (N), filtered, without the torques of the known load and of springs
+    noise       (n,)    RMS of the sensor noise that passes the filter, estimated from noise above its cut-off
     coupling    of the motors that drive several joints together; None: motor k drives joint k
-    shifted     fewer samples, log by log, with torques of other times
-    saturated   where efforts stay at an extreme value
+    shifted     fewer samples, log by log, with torques from other times
+    saturated   efforts that stay at an extreme value
     """
 
     model: DynamicsModel
@@ -98,16 +98,17 @@ class Evidence:
         return int(self.q.shape[1])
 
     def columns(self) -> Array:
-        """(N, n, l) the regressor in these states."""
+        """Return the regressor (N, n, l) at these states."""
         return self.regressor.regressor(self.q, self.qd, self.qdd)
 
     def file_torque(self) -> Array | None:
-        """(N, n) torque by the file's own theta_b, without friction; None where it states none."""
+        """Return the torques (N, n) from the robot file's own theta_b, without friction; None if the file does not
+        give it."""
         theta_b = self.model.theta_b
         return None if theta_b is None else np.asarray(self.columns() @ theta_b)
 
     def thinned(self, most: int) -> Evidence:
-        """At most about so many samples, evenly spread."""
+        """Return about `most` samples or fewer, evenly spread."""
         return self._at(slice(None, None, max(1, -(-len(self) // most))))
 
     def _at(self, rows: slice) -> Evidence:
@@ -115,7 +116,7 @@ class Evidence:
         return replace(self, **kept)
 
     def turned(self, signs: Array, order: Sequence[int]) -> Evidence:
-        """The samples as if joint k's position were `signs[k]` times column `order[k]` of the log."""
+        """Return the samples as if joint k's position were `signs[k]` times column `order[k]` of the log."""
         columns = list(order)
         moved = {name: signs * getattr(self, name)[:, columns] for name in ("q", "qd", "qdd", "sign")}
         if self.coupling is not None:
@@ -123,7 +124,8 @@ class Evidence:
         return replace(self, **moved)
 
     def of_motors(self) -> Evidence:
-        """The same samples by motors: their torques, speeds, accelerations and columns; positions stay the joints'."""
+        """Return the samples with torques, speeds, accelerations and columns of motors instead of joints. Positions
+        remain the joints'."""
         return self if self.coupling is None else _of_motors(self, self.coupling)
 
 
@@ -160,9 +162,9 @@ def evidence_of(
     coupling: Coupling | None = None,
     springs: Torque | None = None,
 ) -> Evidence:
-    """Samples of all motions, one after the other; InputError where a log cannot be used.
+    """Return the samples of all motions in sequence. Raises InputError if a log cannot be used.
 
-    springs   their torque (rows, n) at rows of states; it is taken off, as what a tool weighs. None: no springs
+    springs   function that returns their torque (rows, n) at rows of states, which is subtracted; None: no springs
     """
     most = max(1, MOST_SHIFTED // model.n // len(motions))
     parts = [_samples(model, motion, motors, options, coupling, springs, most) for motion in motions]
@@ -184,7 +186,7 @@ def evidence_of(
 
 
 def delays_tried(cutoff: float) -> Array:
-    """(D,) s."""
+    """Return the delays (D,) that are tried, s."""
     step = 1.0 / (PER_CYCLE * cutoff)
     count = int(np.ceil(REACH / step))
     return np.asarray(step * np.arange(-count, count + 1), dtype=np.float64)

@@ -1,4 +1,5 @@
-"""The figures from which a verdict's reasons and doubts follow: the record's and the log's, joint by joint."""
+"""Computes the figures for a verdict's reasons and doubts, joint by joint, from a calibration's result (record) and
+its log."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ NOISE_FLOOR = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """A step's independent samples that were fitted, and the number of unknowns that the data determined from them."""
+    """The number of independent samples that a step used, and the number of unknowns that they determined."""
 
     step: str
     samples: int
@@ -35,11 +36,11 @@ class Demand:
 
 
 class Findings:
-    """A record and the log that it was fitted to, with figures of both.
+    """A calibration's record and the log that it was fitted to, with figures of both.
 
-    delays             of torques behind the motion, log by log, beyond what the record's own prediction has
+    delays             of torques after the motion, log by log, in addition to the delay that the record itself has
     variation, speed   (n,) standard deviation of the torque; RMS speed
-    fitted, held_out   per joint, of the whole torque: RMSE and R^2
+    fitted, held_out   RMSE and R^2 of the whole torque per joint, on fitted and on held-out samples
     """
 
     def __init__(
@@ -61,11 +62,12 @@ class Findings:
         return any(demand.per_unknown < self.limits.fewest_samples for demand in self.demands)
 
     def follows_badly(self, k: int) -> bool:
-        """Whether a joint's R^2 is too low, or not a number though there is a torque to predict."""
+        """Return whether R^2 of joint k is too low, or not a number although there is a torque to predict."""
         return not self.held_out[k].r2 >= self.limits.poor_r2 and bool(self.variation[k] > 0)
 
     def excused(self, k: int) -> bool:
-        """Whether a joint hardly moves, or its torque is sensor noise, so that there is nothing to predict."""
+        """Return whether joint k hardly moves, or has only sensor noise as torque, so that there is nothing to
+        predict."""
         noise = float(self.evidence.noise[k])
         noisy = noise > NOISE_FLOOR * self.variation[k] and self.held_out[k].rmse < self.limits.sure * noise
         return bool(self.speed[k] < self.limits.hardly) or noisy
@@ -85,13 +87,13 @@ class Findings:
         return self.evidence.model.mechanism.joints[k].type.effort_unit
 
     def gained(self, joints: Sequence[int]) -> list[dict[str, Any]]:
-        """Items of a ground: joints with their gains."""
+        """Return for these joints the names, gains and standard deviations, as a ground of the verdict lists them."""
         return [
             {"joint": self.names[k], "gain": self.gains[k].value, "std": self.gains[k].std} for k in joints
         ]
 
     def followed(self, joints: Sequence[int]) -> list[dict[str, Any]]:
-        """Items of a ground: joints with R^2 and RMSE on held-out data."""
+        """Return for these joints the names, R^2 and RMSE on held-out data, as a ground of the verdict lists them."""
         return [
             {
                 "joint": self.names[k],

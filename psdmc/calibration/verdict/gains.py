@@ -1,4 +1,5 @@
-"""Unit and sign of each joint's torque: its gain against the file's own theta_b, and the power that friction takes."""
+"""Checks unit and sign of each joint's torque: its gain (measured torque over the torque from the robot file's
+theta_b), and the power that friction takes."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ FEWEST = 8
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Measured torque per torque by the file; NaN where there is none. `visible`: whether it counts."""
+    """The ratio of measured torque to the torque from the file; NaN if there is none. `visible`: whether it is
+    reliable."""
 
     value: float
     std: float
@@ -36,15 +38,15 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """W, mean power that friction takes of a joint, with its standard deviation; NaN where it cannot be determined."""
+    """The mean power that friction takes at a joint, W, with its standard deviation; NaN if it cannot be determined."""
 
     value: float
     std: float
 
 
 def joint_gains(evidence: Evidence) -> tuple[Gain, ...]:
-    """Per joint (of its motor where motors are coupled): measured torque regressed on the file's, beside friction and the
-    drive inertia that the file omits."""
+    """Return the gain of each joint (of its motor if motors are coupled), by a regression of the measured torque on
+    the file's. The regression also contains friction, and the drive inertia if the file does not give it."""
     evidence = evidence.of_motors()
     by_file = evidence.file_torque()
     if by_file is None:
@@ -84,7 +86,8 @@ def _line(evidence: Evidence, by_file: Array, k: int) -> _Line:
 
 
 def nuisance(evidence: Evidence, k: int) -> Array:
-    """(N, 3 or 4) joint k's Coulomb and viscous friction, offset, and acceleration where the file has no drive inertia."""
+    """Return the columns (N, 3 or 4) besides the file's torque in the regression of joint k's gain: Coulomb and
+    viscous friction, offset, and acceleration if the file has no drive inertia."""
     columns = [evidence.sign[:, k], evidence.qd[:, k], np.ones(len(evidence))]
     drive = evidence.model.mechanism.parameters[k, DRIVE]
     if not drive > 0:
@@ -106,8 +109,8 @@ def _gain(line: _Line, scale: float) -> Gain:
 
 
 def friction_powers(evidence: Evidence) -> tuple[Power, ...]:
-    """Per joint (of its motor where motors are coupled): power of Coulomb and viscous friction, every base parameter of
-    the joint free."""
+    """Return the power of Coulomb and viscous friction of each joint (of its motor if motors are coupled). All base
+    parameters of the joint are fitted, too."""
     evidence = evidence.of_motors()
     columns = evidence.columns()
     return tuple(_power(evidence, columns[:, k], k) for k in range(evidence.n))
@@ -132,7 +135,8 @@ def _power(evidence: Evidence, rigid: Array, k: int) -> Power:
 
 
 def basis(columns: Array) -> Array:
-    """(N, rank) orthonormal basis of the columns; directions of the scaled columns that are noise are left out."""
+    """Return an orthonormal basis (N, rank) of the columns, without directions of the scaled columns that are only
+    noise."""
     scale: Array = np.linalg.norm(columns, axis=0)
     kept: Array = columns[:, scale > 0] / scale[scale > 0]
     if not kept.shape[1]:
@@ -147,7 +151,8 @@ def _less(explained: Array, values: Array) -> Array:
 
 
 def clustered(scores: Array) -> Array:
-    """Covariance of the scores' sum when neighbours in time depend on each other (Liang and Zeger 1986)."""
+    """Return the covariance of the sum of the scores if neighbours in time depend on each other (Liang and Zeger
+    1986)."""
     count = min(CLUSTERS, len(scores))
     sums = np.zeros((count, scores.shape[1]))
     np.add.at(sums, np.arange(len(scores)) * count // len(scores), scores)

@@ -1,9 +1,9 @@
-"""The verdict on a calibration, from its record and from the log's own evidence.
+"""Determines the verdict on a calibration from its record and from its log.
 
-A calibration is refused for too few samples, a joint whose torque has the wrong size or sign compared with the file's,
-friction that gives power, and held-out data that the model does not predict. Doubts only are a fair fit, a joint that
-hardly moves, an effect that the model lacks, and parameters that the data leave open. docs/calibration.md lists the
-limits, decision 0021 their reasons.
+A calibration is not usable for any of these reasons: too few samples, a joint whose torque has the wrong size or sign
+compared with the robot file's, friction that generates power, or held-out data that the model does not predict. Doubts
+are a moderate fit, a joint that hardly moves, an effect that the model lacks, and parameters that the data do not
+determine. docs/calibration.md lists the limits, and decision 0021 gives the reasons for them.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ def with_verdict_on_logs(
     options: FilterOptions,
     limits: VerdictOptions,
 ) -> Calibration:
-    """The record of a fit of plain logs, with its verdict.
+    """Return the record of a fit of plain logs with its verdict.
 
-    model   as it was given, whose theta_b is the file's; record holds the calibrated one
+    model   the model before the calibration, whose theta_b is the robot file's; the record holds the calibrated one
     """
     matrix = () if record.prediction is None else record.prediction.coupling
     springs = sprung(delivered(record.model))
@@ -68,7 +68,7 @@ def with_verdict_on_campaign(
     options: FilterOptions,
     limits: VerdictOptions,
 ) -> Calibration:
-    """The record of a campaign with its verdict: gains and friction are judged on its exciting motions."""
+    """Return the record of a campaign with its verdict. Gains and friction are judged on its exciting motions."""
     motions = [Motion(run.log, run.tool) for run in runs.inertial]
     evidence = evidence_of(model, regressor, motions, motors, options)
     demands = [
@@ -90,7 +90,7 @@ def judge(
     demands: Sequence[Demand],
     options: VerdictOptions | None = None,
 ) -> Verdict:
-    """The verdict; `evidence` holds the model as it was before, whose theta_b is the file's."""
+    """Return the verdict. `evidence` holds the model before the calibration, whose theta_b is that of the robot file."""
     found = Findings(record, evidence, tuple(demands), options or VerdictOptions())
     against, doubted = list(reasons(found)), list(doubts(found))
     likely = _suspects(found)
@@ -118,7 +118,7 @@ def _suspects(found: Findings) -> tuple[Ground, ...]:
 
 
 def reasons(found: Findings) -> Iterator[Ground]:
-    """Why a calibration is not usable; none where it is."""
+    """Yield the reasons why a calibration is not usable; there are none if it is usable."""
     yield from _saturated(found)
     yield from _late(found)
     yield from _unphysical(found)
@@ -146,7 +146,7 @@ def _late(found: Findings) -> Iterator[Ground]:
 
 
 def late(delay: Delay) -> Ground:
-    """A delay, and how to take it out."""
+    """Return the ground of a verdict for a delay, with the change that removes it."""
     return Ground("late", {"log": delay.log, "seconds": delay.value, "std": delay.std})
 
 
@@ -194,7 +194,7 @@ def _poor(found: Findings) -> Iterator[Ground]:
 
 
 def doubts(found: Findings) -> Iterator[Ground]:
-    """All doubts."""
+    """Yield all doubts about a calibration."""
     yield from _perhaps_saturated(found)
     yield from _a_little_late(found)
     yield from _sampled_slowly(found)
@@ -225,7 +225,7 @@ def _a_little_late(found: Findings) -> Iterator[Ground]:
 
 
 def fits_poorly(found: Findings) -> bool:
-    """Whether R^2 or gains raise a doubt. Only then are other readings of the log's columns considered."""
+    """Return whether R^2 or gains raise a doubt. Only then does psdmc look for exchanged columns and reversed signs."""
     return any(True for _ in (*_fair(found), *_odd_gains(found)))
 
 
@@ -245,15 +245,17 @@ def _sampled_slowly(found: Findings) -> Iterator[Ground]:
 
 
 def acceleration_lost(share: float) -> float:
-    """Share by which a second difference is smaller than the second derivative of a sine, whose frequency is `share` of
-    the sampling rate: 1 - (2 - 2 cos w) / w^2, w = 2 pi share."""
+    """Return the share by which a second difference is smaller than the second derivative of a sine.
+
+    The result is 1 - (2 - 2 cos w) / w^2, w = 2 pi share, for a sine with a frequency of `share` of the sampling rate.
+    """
     w = 2.0 * np.pi * share
     return float(1.0 - (2.0 - 2.0 * np.cos(w)) / w**2)
 
 
 def cutoff_for(lost: float) -> float:
-    """The largest frequency, in units of the sampling rate, whose acceleration loses no more than this share: by the
-    first terms of the series, w^2 / 12 - w^4 / 360."""
+    """Return the largest frequency, in units of the sampling rate, at which second differences lose at most this share
+    of the acceleration. It follows from the first terms of the series, w^2 / 12 - w^4 / 360."""
     return float(np.sqrt(15.0 - np.sqrt(225.0 - 360.0 * lost)) / (2.0 * np.pi))
 
 

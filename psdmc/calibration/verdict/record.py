@@ -1,4 +1,5 @@
-"""The record of a calibration: its result with the model that carries it, made of either method's numbers."""
+"""The record of a calibration: its results together with the calibrated model. Both the four steps and the linear fit
+have one."""
 
 from __future__ import annotations
 
@@ -66,7 +67,7 @@ DROPPED_LINKS = "dropped_links"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Calibration(Calibrated):
-    """The whole result of a calibration, its steps with samples to plot.
+    """The whole result of a calibration, with its steps and samples to plot.
 
     model  the calibrated model, whose `calibrated` has these numbers
     """
@@ -74,23 +75,26 @@ class Calibration(Calibrated):
     model: DynamicsModel
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for a user; numbers that are not finite become null."""
+        """Return the record as plain values; numbers that are not finite become null."""
         return document(self)
 
 
 def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:
-    """The record with a model that carries its present numbers, and these base parameters where given."""
+    """Return the record with a model that has its present numbers, and with theta_b if it is given."""
     theta = record.model.theta_b if theta_b is None else theta_b
     return replace(record, model=replace(record.model, theta_b=theta, calibrated=record.kept()))
 
 
 def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
-    """The record with its logs and the versions of the programs that computed it."""
+    """Return the record with its logs and the versions of the programs that computed it."""
     return replace(record, logs=logs_used(logs), versions=_versions())
 
 
 def logs_used(logs: Sequence[AnyLog], use: str = "") -> tuple[LogUsed, ...]:
-    """Names, lengths and dates of logs; use: instead of each log's own."""
+    """Return names, lengths and dates of logs.
+
+    use  fit or validate for all of them; None: each log's own
+    """
     return tuple(LogUsed(log.name, len(log), log.duration, log.date, use or log.use) for log in logs)
 
 
@@ -106,12 +110,12 @@ def _versions() -> dict[str, str]:
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
-    """The calibration with its verdict, which its model also has."""
+    """Return the calibration with its verdict, which its model also gets."""
     return with_model(replace(record, verdict=verdict))
 
 
 def verdict_of(record: Calibration) -> Verdict:
-    """The verdict of a finished calibration's record."""
+    """Return the verdict of a finished calibration."""
     if record.verdict is None:
         raise InternalError(f"{record.robot}: calibrated, but not judged")
     return record.verdict
@@ -123,7 +127,7 @@ def verdict_of(record: Calibration) -> Verdict:
 def four_step_record(
     model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
 ) -> Calibration:
-    """The record of a campaign with these base parameters, without its quality."""
+    """Return the record of a campaign with these base parameters, without its quality."""
     inertial, gravity = found.inertial, found.gravity
     groups = ["inertial"] * model.l
     for k in gravity.split.pivots:
@@ -196,7 +200,7 @@ def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, .
 def linear_record(
     model: DynamicsModel, found: LinearResult, values: Array, options: LinearOptions
 ) -> Calibration:
-    """The record of a linear fit with these values of the whole vector, without its quality."""
+    """Return the record of a linear fit with these values of the whole vector, without its quality."""
     problem, solved = found.problem, found.estimate
     names = (*model.base_parameters.labels, *problem.names)
     at = _kept_at(model, values, found.prior.scale, found.prior.values)
@@ -298,7 +302,7 @@ def _kept_at(model: DynamicsModel, values: Array, scale: Array, start: Array | N
 
 
 def dropped_links(model: DynamicsModel) -> tuple[str, ...]:
-    """A sentence on links without inertia in the file, which the model has no parameters for."""
+    """Return a sentence on links without inertia in the file, for which the model has no parameters."""
     chain = model.mechanism
     if not chain.massless:
         return ()
@@ -379,10 +383,10 @@ def judged_record(
     distance: float | None = None,
     check: CheckOptions | None = None,
 ) -> Calibration:
-    """The record with its quality on these logs or runs, read back from its model's file.
+    """Return the record with its quality on these logs or runs, computed from its model's file after reading it back.
 
-    plain     the unconstrained fit's record, where this one is physically consistent; distance from it in standard
-              deviations
+    plain     record of the unconstrained fit, if this one is physically consistent
+    distance  distance from the unconstrained fit in standard deviations
     """
     model = reread(record.model)
     steps = delivered_quality(model, source, check)

@@ -1,8 +1,8 @@
-"""Explanations of a bad fit: columns of joints exchanged, signs reversed, another unit.
+"""Finds possible causes of a bad fit: exchanged columns of joints, reversed signs, or another unit.
 
-Hypotheses on positions (a sign reversed, two columns exchanged) are tried one after the other, the best kept. Under
-each, every effort column is explained by every joint with either sign (`explain`), and an assignment finds which column
-is whose. A change must improve the explanation enough to be named.
+Hypotheses on positions (a reversed sign, two exchanged columns) are tried one after the other, and the best is kept.
+For each, every effort column is explained by every joint with either sign (`explain`), and an assignment gives the
+joint of each column. A change is reported only if it improves the explanation enough.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ BELIEVED = 0.7
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """What the log would have to be: joint k's position is signs[k] times column order[k], its effort likewise.
+    """A hypothesis about a log: joint k's position is signs[k] times column order[k]; the same holds for its effort.
 
     score   explained share of the torque's variation, summed over joints
     """
@@ -53,7 +53,8 @@ class Hypothesis:
 
     @property
     def changes(self) -> int:
-        """Signs reversed and pairs exchanged; all signs at once, or one change of position and effort, count as one."""
+        """Number of reversed signs and exchanged pairs. All signs together, or the same change of position and effort,
+        count as one."""
         swaps = exchanges(self.order)
         if self.effort_order != self.order:
             swaps += exchanges(self.effort_order)
@@ -62,8 +63,8 @@ class Hypothesis:
         return swaps + sum(-1 in both for both in zip(self.signs, self.effort_signs, strict=True))
 
     def worth(self, stated: Hypothesis) -> float:
-        """The number of changes that the better explanation justifies, compared with the log as it is, less the changes
-        made."""
+        """Return how many changes the improvement over the log as it is (`stated`) justifies, minus the number of
+        changes in this hypothesis."""
         gained = self.score - stated.score
         left = max(len(self.signs) - self.score, 1e-12)
         fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
@@ -71,15 +72,16 @@ class Hypothesis:
 
     @property
     def reading(self) -> dict[str, tuple[int, ...]]:
-        """The hypothesis as a ground has it."""
+        """The hypothesis as plain values for a ground of the verdict."""
         names = ("order", "signs", "effort_order", "effort_signs")
         return {name: getattr(self, name) for name in names}
 
 
 def suspect(evidence: Evidence, positions: bool = True) -> Ground | None:
-    """The best explanation of a log that is not what it says; None where none is much better.
+    """Return the best hypothesis about exchanged columns and reversed signs; None if none is much better than the log
+    as it is.
 
-    positions   whether positions are suspected, too, or efforts alone
+    positions   True: consider positions and efforts; False: efforts alone
     """
     evidence = evidence.thinned(ROWS)
     stated = _stated(evidence)
@@ -170,7 +172,8 @@ TRAINING = 0.7
 
 
 class Explainer:
-    """explain(k, torque) -> share of a column's variation that joint k explains as it is, and turned: each 0 to 1."""
+    """A function explain(k, torque) that returns which share of a column's variation joint k explains, without and
+    with reversed sign: each 0 to 1."""
 
     def __init__(self, evidence: Evidence) -> None:
         evidence = evidence.of_motors()
@@ -243,7 +246,7 @@ MOTOR_SIDE = (1.0 / 300.0, 1.0 / ABOUT)
 
 
 def unit_suspect(gains: Sequence[Gain]) -> Ground | None:
-    """The suspected unit; None where the visible gains are about one, or contradict each other."""
+    """Return the likely wrong unit; None if the reliable gains are about one, or contradict each other."""
     seen = np.array([gain.value for gain in gains if gain.visible])
     if not len(seen) or np.any(seen <= 0) or seen.max() > ALIKE * seen.min():
         return None

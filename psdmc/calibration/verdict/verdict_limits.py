@@ -1,4 +1,4 @@
-"""The limits of a verdict. docs/calibration.md lists them, decision 0021 gives the reasons."""
+"""The limits from which a verdict follows. docs/calibration.md lists them, decision 0021 gives the reasons."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class VerdictOptions:
-    """The limits of a verdict.
+    """The limits from which a verdict follows. A calibration beyond the first limit of a pair is not usable; beyond
+    the second, it is doubtful.
 
-    fewest_samples, few_samples  independent samples per fitted unknown: below, refused; doubted
-    poor_r2, fair_r2             held-out R^2 of a joint's whole torque: below, refused; doubted
-    gains, sure_gains            measured torque per torque by the file: outside, refused; doubted
-    hardly                       rad/s (m/s) RMS, below which a joint hardly moves: friction's sign is then unknown
+    fewest_samples, few_samples  independent samples per fitted unknown: smallest number
+    poor_r2, fair_r2             held-out R^2 of a joint's whole torque: smallest value
+    gains, sure_gains            measured torque over the torque from the file: range
+    hardly                       rad/s (m/s) RMS; a slower joint hardly moves, so the sign of its friction is unknown
     noise_ratio                  residual over sensor noise above which the model lacks an effect
     worse                        held-out RMSE over fitted RMSE above which a fit does not predict other data
     carried                      held-out RMSE over the torque's variation below which `worse` does not matter
-    noticeable                   the same for an effect that the model lacks
+    noticeable                   held-out RMSE over the torque's variation below which a lacking effect does not matter
     settled                      torque for one standard deviation of a parameter, over the torque's variation
     sure                         standard deviations by which friction's power must be negative
-    friction_share               of the motor's power below which friction is not judged
-    of_limit                     largest torque over the file's effort limit: doubted outside
-    late, hardly_late            s between motion and torque: above, refused; doubted
-    acceleration_lost            share by which differences of samples lose acceleration at the cut-off: doubted above
+    friction_share               share of the motor's power below which friction is not judged
+    of_limit                     largest torque over the file's effort limit: range outside of which there is a doubt
+    late, hardly_late            s between motion and torque: largest value
+    acceleration_lost            share of the acceleration that differences of samples lose at the cut-off: doubt above it
     """
 
     fewest_samples: float = 8.0

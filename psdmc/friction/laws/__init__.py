@@ -1,4 +1,4 @@
-"""The friction laws that psdmc has: one file of this folder each, described by its LAW."""
+"""The friction laws that psdmc offers. Each file in this folder describes one law by an object LAW."""
 
 from __future__ import annotations
 

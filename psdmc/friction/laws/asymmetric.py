@@ -1,7 +1,7 @@
 """Coulomb friction that differs between the directions: coulomb + asymmetry forward, coulomb - asymmetry backward.
 
-Its column is the size of the smooth sign. It differs from an offset's near rest only: a fit with both shows little more
-than their sum.
+In a linear fit, the torque per unit of `asymmetry` is the magnitude of the smooth sign. It differs from a constant
+torque only near rest. A fit of an asymmetry and a constant torque therefore determines little more than their sum.
 """
 
 import math

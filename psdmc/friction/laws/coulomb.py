@@ -1,4 +1,4 @@
-"""Coulomb friction: a constant against the motion."""
+"""Coulomb friction: a torque of constant magnitude that acts against the motion."""
 
 from psdmc.friction.law import Law, Value
 

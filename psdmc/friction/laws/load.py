@@ -1,4 +1,4 @@
-"""Friction that grows with the torque that the joint carries, as that of gears does."""
+"""Load-dependent friction: it grows with the torque that the joint transmits, like the friction of gears."""
 
 from psdmc.friction.law import Law, Value
 from psdmc.friction.scalars import absolute

@@ -1,4 +1,4 @@
-"""LuGre friction: bristles that bend before they slide, by z (rad, m), the law's state. Denso-2022, (12) to (14)."""
+"""LuGre friction: a model of bristles that bend by z (rad, m) before they slide. Source: Denso-2022, (12) to (14)."""
 
 from collections.abc import Sequence
 
@@ -17,21 +17,24 @@ VALUES = (
 
 
 def bent(p: Sequence[Scalar], v: Scalar) -> Scalar:
-    """g(v): the deflection in steady sliding, (13)."""
+    """Return g(v), the deflection of the bristles in steady sliding at speed v. Source: Denso-2022, (13)."""
     ratio = v / p[2]
     return (p[0] + (p[1] - p[0]) * exp(-(ratio * ratio))) / p[5]
 
 
 def rate(p: Sequence[Scalar], v: Scalar, z: Scalar) -> Scalar:
-    """dz/dt, (12)."""
+    """Return dz/dt, the rate of change of the deflection z of the bristles. Source: Denso-2022, (12)."""
     return v - absolute(v) * z / bent(p, v)
 
 
 def step(p: Sequence[Scalar], v0: Scalar, v1: Scalar, z: Scalar, dt: Scalar) -> Scalar:
-    """(12) over dt with the speed going evenly from v0 to v1, both of one sign.
+    """Return the deflection of the bristles after a time dt in which the speed changes linearly from v0 to v1 (same
+    sign).
 
-    dz/dt = lambda (target - z) with lambda = |v| / g(v) and target = sign(v) g(v): solved exactly for a target that moves
-    evenly and lambda at its mean (Simpson). Any dt is stable; in steady sliding the lag is exact to first order.
+    The differential equation (12) of Denso-2022 is dz/dt = lambda (target - z). Here lambda is |v| / g(v), target is
+    sign(v) g(v), and g(v) is the deflection in steady sliding. The step solves the equation exactly for a target that
+    changes linearly with time. For lambda it takes the mean over the step by Simpson's rule. The solution is stable for
+    any dt. In steady sliding, the lag of z behind the target is exact to first order.
     """
     middle = 0.5 * (v0 + v1)
     g0, g1 = bent(p, v0), bent(p, v1)
@@ -46,19 +49,28 @@ def step(p: Sequence[Scalar], v0: Scalar, v1: Scalar, z: Scalar, dt: Scalar) -> 
 
 
 def pieces(p: Sequence[Scalar], v0: Scalar, v1: Scalar) -> Scalar:
-    """The speed changes by at most a quarter of the Stribeck velocity in each step, where that matters."""
+    """Return the number of additional steps in which the speed changes from v0 to v1; 0 means a single step.
+
+    In each step the speed changes by at most a quarter of the Stribeck velocity, in up to 64 steps. If both speeds
+    exceed four times the Stribeck velocity, one step is enough.
+    """
     slowest = smaller(absolute(v0), absolute(v1))
     return select(4.0 * p[2], slowest, 0.0, smaller(4.0 * absolute(v1 - v0) / p[2], 63.0))
 
 
 def torque(p: Sequence[Scalar], at: At) -> Scalar:
-    """(14)."""
+    """Return the friction torque, N m (N for a sliding joint), from the fitted values p, the speed and the deflection
+    of the bristles. Source: Denso-2022, (14)."""
     viscous = p[3] * power(absolute(at.v), p[4])
     return p[5] * at.z + p[6] * rate(p, at.v, at.z) + select(at.v, 0.0, -viscous, viscous)
 
 
 def line(p: Sequence[float], number: float, top: float) -> tuple[float, float, str]:
-    """The Coulomb force, and the line nearest to the viscous law up to `top`."""
+    """Return a constant torque and a damping that approximate LuGre friction, and in words what they leave out.
+
+    The constant is the Coulomb torque. The damping is the slope of the line nearest to the viscous torque, for speeds
+    from 0 to `top`.
+    """
     slope = 3.0 / (p[4] + 2.0) * top ** (p[4] - 1.0)
     return (
         p[0],

@@ -1,4 +1,4 @@
-"""A constant torque of a joint: what is left of a cable, a spring's rest position or a sensor's zero."""
+"""A constant torque of a joint, for example from a cable, a spring's rest position or the zero of a sensor."""
 
 import math
 

@@ -1,7 +1,8 @@
-"""The Stribeck effect: Coulomb friction is larger near rest.
+"""The Stribeck effect: friction that is larger near rest.
 
-Linear in the values, so that they belong to the one vector and its one prior, the semidefinite program stays convex and rows
-stay additive. A speed that is not known is found by giving several: their sum follows any curve that falls from rest on.
+The user gives the Stribeck velocity, so that the law is linear in its fitted values and the fit remains a convex
+problem. If you do not know the velocity, give several. The sum of the terms, one for each velocity, approximates any
+falling curve.
 """
 
 from psdmc.friction.law import Law, Number, Value

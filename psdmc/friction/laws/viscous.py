@@ -1,4 +1,4 @@
-"""Viscous friction: grows with a power of the speed. Several exponents together follow any growing curve."""
+"""Viscous friction, which grows with a power of the speed. Terms with several exponents approximate any growing curve."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,12 @@ from psdmc.friction.scalars import absolute, power
 
 
 def line(p: Sequence[float], exponent: float, top: float) -> tuple[float, float, str]:
-    """The least-squares line s v to v^exponent over 0 to `top`."""
+    """Return the constant torque (zero) and the damping that approximate the viscous friction, and in words what they
+    leave out.
+
+    The damping is the fitted value times the slope s for which s v is nearest to v^exponent, by least squares for
+    speeds from 0 to `top`.
+    """
     slope = 3.0 / (exponent + 2.0) * top ** (exponent - 1.0)
     return (
         0.0,

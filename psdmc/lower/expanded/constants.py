@@ -1,4 +1,4 @@
-"""Constants that are closer than their uncertainty are made the same float."""
+"""Replacement of constants that differ by less than their uncertainty: all of them become the same float."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ SMALLEST_UNCERTAINTY = 1e-15
 
 
 class Constants:
-    """A growing table of magnitudes. `merged` returns each value's entry, so that equal values have equal bits.
+    """A growing table of positive numbers. `merged` replaces each value by a number of the table that is equal within
+    the uncertainty. Equal values then have equal bits.
 
-    The most certain values are entered first and replace less certain ones near them: no value moves by more than its
-    own uncertainty plus its entry's, and no uncertain value joins two certain ones.
+    The most certain values are entered first and replace less certain ones near them. No value changes by more than the
+    sum of two uncertainties, that of the value and that of the number in the table. No uncertain value joins two
+    certain ones.
     """
 
     def __init__(self) -> None:
@@ -25,7 +27,8 @@ class Constants:
         self._uncertainty: Array = np.full(len(EXACT), SMALLEST_UNCERTAINTY)
 
     def merged(self, values: Array, uncertainty: Array) -> Array:
-        """Entries of the table with the values' signs, (k,), for (k,) values and relative uncertainties."""
+        """Return, for each of k values, the number of the table that replaces it, with the value's sign. `uncertainty`
+        is relative."""
         out = np.abs(values)
         uncertainty = np.maximum(uncertainty, SMALLEST_UNCERTAINTY)
         decade = np.floor(np.log10(uncertainty)).astype(int)

@@ -1,10 +1,14 @@
-"""Polynomials as a diagram of nested Horner forms, in which parts that are equal up to a constant factor are shared.
+"""Polynomials as nested Horner forms, in which parts that are equal up to a constant factor are shared. The data
+structure is called a diagram.
 
-PSDM-2021, section 4.1: take the rows in some order, group the terms that agree in all remaining rows, and write what a
-group's members differ in as a small polynomial in the row just taken, whose coefficients are sums over the groups
-further in. Here the diagram is built from the innermost row outward, so that each group is known by the nodes it is
-made of: it is scaled until its leading coefficient is one, looked up among the nodes of its row, and its factor is
-passed outward. (Decision diagrams with multiplicative edge values are the same thing.)
+The method is from PSDM-2021, section 4.1. Each term of a polynomial is a product of powers of variables, such as sin q1
+or qd2. A row of the matrix of exponents belongs to one variable. The variables are taken in some order. Terms that
+agree in the exponents of all later variables form a group. Each group becomes a node: a small polynomial in the
+variable just taken. The coefficients of the node are nodes of the later variables.
+
+The diagram is built from the last (innermost) variable outward, so that the nodes within each group are known. The
+group is scaled until its leading coefficient is one, and looked up among the nodes of its variable. Its factor is
+passed outward. Decision diagrams with multiplicative edge values are the same thing.
 """
 
 from __future__ import annotations
@@ -32,12 +36,13 @@ and gains nothing.)"""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Level:
-    """All nodes of one row: value = sum over powers k = 0..2 of ratio[k] * child[k] * row ** k. m nodes.
+    """All m nodes (small polynomials) of one variable in a diagram. The value of a node is the sum over powers k = 0..2
+    of ratio[k] * child[k] * variable ** k.
 
-    row    which row of the terms' exponents
+    row    number of the variable, a row of the terms' exponents
     first  number of the first node
-    child  (m, 3) int    node numbers further in
-    ratio  (m, 3) float  zero where there is no child; the leading one is 1
+    child  (m, 3) int    numbers of nodes that are factors of the coefficients; they belong to variables further in
+    ratio  (m, 3) float  constant factors of the coefficients; zero if there is no child; the leading one is 1
     """
 
     row: int
@@ -48,7 +53,8 @@ class Level:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagram:
-    """levels, innermost row first; polynomial `output[k]` is factor[k] times node root[k]."""
+    """All polynomials as nodes, each a small polynomial in one variable. Levels are ordered from the innermost
+    variable. Polynomial `output[k]` is factor[k] times node root[k]."""
 
     levels: tuple[Level, ...]
     output: Integers
@@ -57,7 +63,10 @@ class Diagram:
 
 
 def nested_horner(terms: Terms, rows: Sequence[int]) -> Diagram:
-    """The diagram of all polynomials in `terms`, rows taken in the given order, outermost first."""
+    """Return all polynomials in `terms` as a Diagram of nested Horner forms.
+
+    rows  the variables (rows of the exponents), outermost first
+    """
     if len(terms) == 0:
         return Diagram((), terms.output, np.zeros(0, dtype=np.int64), np.zeros(0))
     order, differs = _sorted(terms, rows)
@@ -128,7 +137,8 @@ class _Groups:
         return self.coefficient[index, self.lead], self.uncertainty[index, self.lead]
 
     def as_level(self, row: int, first: int, constants: Constants) -> tuple[Level | None, Integers]:
-        """New nodes, if any, and each group's node; groups that do not contain the row are nodes already."""
+        """Return the new nodes of this variable, or None, and the node number of each group of terms. A group whose
+        terms do not contain the variable is already a node of another variable."""
         node = self.child[:, 0].copy()
         contains: NDArray[np.bool_] = np.asarray(self.child[:, 1:].any(axis=1))
         if not contains.any():
@@ -152,9 +162,12 @@ class _Groups:
 
 
 def with_constants(diagram: Diagram, values: Mapping[int, float]) -> Diagram:
-    """The diagram with numbers for its innermost rows, whose nodes become factors of the nodes around.
+    """Return the diagram with constants in place of its innermost variables. Nodes of these variables become constant
+    factors of the nodes around them.
 
-    ValueError where a row that gets a number has one outside it that does not.
+    values  by row, the variable's value
+
+    Raises ValueError if `values` has a number for a variable, but not for all variables further in.
     """
     inner = [level for level in diagram.levels if level.row in values]
     outer = diagram.levels[len(inner) :]
@@ -182,7 +195,8 @@ def _numbers_as_factors(node: Integers, ratio: Array, number: Array) -> tuple[In
 
 
 def operations(diagram: Diagram) -> tuple[int, int]:
-    """Multiplications and additions that the diagram takes; squares of rows are computed once."""
+    """Return the number of multiplications and the number of additions that an evaluation of the diagram takes. Squares
+    of variables are computed once."""
     multiplications, additions = 0, 0
     for level in diagram.levels:
         present = level.child != NOTHING

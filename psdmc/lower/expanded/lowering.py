@@ -1,4 +1,5 @@
-"""The expanded lowering: nested Horner forms straight from E, P and theta_b (PSDM-2021, section 4.1)."""
+"""The expanded lowering: a method that makes code from E, P and theta_b, as nested Horner forms of the torques'
+polynomials (PSDM-2021, section 4.1)."""
 
 from __future__ import annotations
 
@@ -49,12 +50,16 @@ def lower_expanded(
     costs: Costs = COSTS,
     noise: float = COEFFICIENT_NOISE,
 ) -> Program:
-    """The PROGRAM of one function that is a part of the torques' polynomials. With `theta`, theta_b is an input; else
-    its values are constants; `noise` is the uncertainty of coefficients.
+    """Return the PROGRAM (list of operations) of one function, made from the torques' polynomials.
 
-    The order of rows, and whether parameters enter before or after equal parts are found, are chosen by cost, the same
-    on every machine. Raises InputError where the model has no E and P, or its base parameters are needed and unknown;
-    SingularMatrix where the mass matrix cannot be inverted for any q.
+    Orders of variables are compared by cost, and the result is the same on every machine. With known theta_b, equal
+    parts are found before or after theta_b is inserted, whichever is cheaper.
+
+    theta  True: theta_b is an input of the PROGRAM; False: its values are constants
+    noise  uncertainty of the coefficients
+
+    Raises InputError if the model has no E and P, or if its base parameters are needed and unknown. Raises
+    SingularMatrix if the mass matrix cannot be inverted for any q.
     """
     if recipe.polynomials is None or (theta and not recipe.signature.theta):
         raise ValueError(f"the expanded lowering does not make {recipe.name}{'_theta' * theta}")

@@ -1,4 +1,5 @@
-"""The orders in which the expanded lowering takes the rows of E."""
+"""The orders in which the expanded lowering (code from polynomials) takes the variables, the rows of E. The order
+determines the number of operations."""
 
 from __future__ import annotations
 
@@ -14,22 +15,26 @@ TRIGONOMETRY = ((0, 2, 1), (0, 1, 2))
 
 
 def base_first(n: int) -> Joints:
-    """Joint order for torques, from the base outward: the inner parts of the nested forms then depend on the outer
-    links only, and recur often."""
+    """Return the order of joints for torques, from the base outward. The inner parts of the nested forms then depend on
+    the outer links only, and recur often."""
     return tuple(range(n))
 
 
 def tip_first(n: int) -> Joints:
-    """Joint order for regressors, from the tip inward: a column is about one link and does not contain the joints
-    beyond it."""
+    """Return the order of joints for regressors, from the tip inward. A regressor column belongs to one link, and
+    joints after this link do not occur in it."""
     return tuple(reversed(range(n)))
 
 
 def candidates(joints: Joints, rows: int) -> Iterator[Order]:
-    """Orders of all rows, outermost first, with the joints' positions in the order given.
+    """Return orders of all variables (rows of the exponents), outermost first. Joint positions are in the given order
+    of joints.
 
-    Rates stand outermost, where the torques of two joints share polynomials of position, or joint by joint. Parameters,
-    the rows from 5 n on, stay innermost.
+    In most orders, joint rates and accelerations are outermost, so that the torques of two joints share polynomials of
+    position. In the other orders, all variables of a joint stand together. Base parameters, the rows from 5 n on, are
+    always innermost.
+
+    rows  number of rows
     """
     n = len(joints)
     parameters = tuple(range(BLOCKS * n, rows))

@@ -1,4 +1,5 @@
-"""The expanded lowering's input: outputs as sums of monomials, read from E, P and theta_b."""
+"""The input of the expanded lowering (code from polynomials): a function's outputs as sums of monomials, read from E, P
+and theta_b."""
 
 from __future__ import annotations
 
@@ -24,14 +25,15 @@ nearer to each other are made one."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terms:
-    """Polynomials as monomials: value[output] = sum of coefficient * product over rows of row ** exponent.
+    """Polynomials as t terms: value[output] = sum of coefficient * product over variables of variable ** exponent.
 
-    t terms over r rows: the 5 n of E, then one per base parameter where these stay symbols.
+    There are r variables: the 5 n rows of E (q, sin q, cos q, qd and qdd). If base parameters are variables, each has
+    one more row.
 
-    output       (t,) int      which polynomial the term belongs to
+    output       (t,) int      the polynomial to which the term belongs
     exponents    (r, t) uint8  0..2
     coefficient  (t,) float    not zero
-    uncertainty  (t,) float    absolute; coefficients closer than this may be equal
+    uncertainty  (t,) float    absolute error; two coefficients that differ by less may be equal
     """
 
     output: Integers
@@ -58,7 +60,8 @@ class Terms:
 
 
 def torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """tau[0..n-1] over rows of E and theta_b; InputError where the model was not expanded."""
+    """Return the torques tau[0..n-1] as sums of terms, with the rows of E and the base parameters as variables. Raises
+    InputError if the model has no E and P."""
     expansion = _expanded(model)
     terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     one_hot = (np.arange(model.l)[:, None] == parameter).astype(np.uint8)
@@ -67,7 +70,8 @@ def torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Term
 
 
 def baked_torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """tau[0..n-1] over rows of E, theta_b in the coefficients; InputError where it is unknown."""
+    """Return the torques tau[0..n-1] as sums of terms, with the rows of E as variables and theta_b in the coefficients.
+    Raises InputError if theta_b is unknown."""
     expansion, theta_b = _expanded(model), known_parameters(model)
     n, p = expansion.n, expansion.p
     joint, row, column, value = expansion.entries
@@ -78,7 +82,8 @@ def baked_torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -
 
 
 def regressor_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
-    """Y[i, k] as output i * l + k, over rows of E."""
+    """Return the regressor's entries Y[i, k] as sums of terms, with the rows of E as variables. Entry Y[i, k] has the
+    output number i * l + k."""
     expansion = _expanded(model)
     terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     output = terms.output * model.l + parameter
@@ -119,9 +124,13 @@ def _stacked(E: NDArray[np.uint8], weights: Entries, width: int, noise: float) -
 
 
 def mass_matrix_terms(torque: Terms, n: int) -> Terms:
-    """M[i, j], i <= j, as output i * n + j. The terms are those with qdd[j] in tau[i] or with qdd[i] in tau[j],
-    whichever torque's coefficients are less uncertain: what is rounding beside an arm's inertia may matter for its
-    finger."""
+    """Return the mass matrix's entries M[i, j], i <= j, as sums of terms. Entry M[i, j] has the output number i * n +
+    j.
+
+    The terms of M[i, j] are those with qdd[j] in tau[i], or those with qdd[i] in tau[j]. The ones with smaller
+    uncertainty of the coefficients are taken. A term that is only rounding in the torque of an arm may matter in the
+    torque of its finger.
+    """
     accelerations = torque.exponents[RowBlocks.of(n).qdd]
     own, other = torque.output, np.argmax(accelerations, axis=0)
     doubt = np.zeros(n)
@@ -135,17 +144,20 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
 
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
-    """h[i]: the terms of tau[i] without joint accelerations."""
+    """Return the torques without joint accelerations, h[i], as sums of terms: the terms of tau[i] that contain no
+    acceleration."""
     return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).qdd].any(axis=0)))
 
 
 def gravity_terms(torque: Terms, n: int) -> Terms:
-    """g[i]: the terms of tau[i] without joint rates and accelerations."""
+    """Return the gravity torques g[i] as sums of terms: the terms of tau[i] that contain no joint rates and
+    accelerations."""
     return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).rates].any(axis=0)))
 
 
 def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
-    """The terms with gravity's multiplied by |g| (m/s^2), which E leaves to the monomials y."""
+    """Return the terms, with each gravity term multiplied by the strength of gravity |g| (m/s^2). The columns of E do
+    not contain |g|."""
     n = len(chain)
     at_rest = ~terms.exponents[RowBlocks.of(n).rates].any(axis=0)
     factor = np.where(at_rest, length(np.asarray(chain.gravity)), 1.0)
@@ -153,7 +165,7 @@ def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
 
 
 def joined(first: Terms, second: Terms, offset: int) -> Terms:
-    """Both lists of terms; `offset` is added to the second one's output numbers."""
+    """Return the terms of both arguments. `offset` is added to the output numbers of the second one."""
     return Terms(
         np.concatenate([first.output, second.output + offset]),
         np.concatenate([first.exponents, second.exponents], axis=1),

@@ -1,4 +1,5 @@
-"""A diagram's polynomials computed on values of its rows: symbols, which record the PROGRAM, or numbers."""
+"""Evaluation of nested Horner forms (diagram.py). The values of the variables are numbers, or symbols that record the
+operations as a PROGRAM."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ from psdmc.program.trace import Tracer
 
 
 def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
-    """A value per row of the terms' exponents: q, sin q, cos q, qd, qdd, then theta_b if that is an input."""
+    """Return a symbol for each variable of the polynomials: q, sin q, cos q, qd, qdd of all joints, then theta_b if
+    `theta`. The symbols record operations."""
     n = model.n
     q = tracer.symbols("q", n)
     sincos = [
@@ -24,7 +26,7 @@ def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scala
 
 
 def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
-    """The diagram's polynomials by output number, computed on the rows' values."""
+    """Return the value of each polynomial of the diagram by its number, from the values of the variables (rows)."""
     nodes: dict[int, Scalar] = {NOTHING: 0.0, ONE: 1.0}
     for level in diagram.levels:
         _compute_level(nodes, level, rows[level.row])

@@ -9,10 +9,12 @@ from psdmc.program.program import Instr, Op, Program
 
 
 def absorb_negations(program: Program) -> Program:
-    """Remove negations that the operation after or before them can absorb.
+    """Remove negations: the operation before or after a negation can often be changed so that the negation is not
+    needed.
 
-    A use absorbs one as x + -y = x - y, x - -y = x + y, -x * -y = x * y, -x / -y = x / y, --x = x, |-x| = |x|. A producer
-    that nothing else needs absorbs one as -(x - y) = y - x, -(c x) = (-c) x, -((x - y) z) = (y - x) z.
+    The operation that uses a negated value becomes another one, as in x + -y = x - y, x - -y = x + y, -x * -y = x * y,
+    -x / -y = x / y, --x = x, |-x| = |x|. If a result is used once, by a negation, the operation that computes the
+    result is changed, as in -(x - y) = y - x, -(c x) = (-c) x, -((x - y) z) = (y - x) z.
 
     Needs:  every argument precedes its use.
     Keeps:  output values, bit for bit but for the sign of a zero; output names and order.

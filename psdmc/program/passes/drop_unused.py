@@ -6,10 +6,10 @@ from psdmc.program.program import Instr, Program
 
 
 def drop_unused(program: Program) -> Program:
-    """Keep only the instructions that some output depends on.
+    """Return the PROGRAM (list of operations to generate) with only those instructions on which some output depends.
 
     Needs:  every argument precedes its use.
-    Keeps:  output values, bit for bit; the order of what stays.
+    Keeps:  output values, bit for bit; the order of the remaining instructions.
     Gives:  every instruction is an output or an argument.
     """
     if all(program.uses()):  # by what lies behind, and the last one by an output

@@ -1,4 +1,5 @@
-"""Take common factors out of sums, and leave out what cancels."""
+"""A pass of the code generator: it takes common factors out of sums, and leaves out terms that are both added and
+subtracted."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ class _Term:
     factors: tuple[int | _Sum, ...]
 
     def is_product_with(self, factor: int) -> bool:
-        """Whether the term has this factor and others: a * b + a gains nothing as a * (b + 1)."""
+        """Return whether the term is a product of this factor and at least one other. A term that is the factor alone
+        does not count, because a * (b + 1) needs as many operations as a * b + a."""
         return len(self.factors) > 1 and factor in self.factors
 
     def without(self, factor: int) -> _Term:
@@ -35,10 +37,13 @@ class _Sum:
 
 
 def factor_common(program: Program) -> Program:
-    """Write a*b + a*c as a*(b + c), over chains of sums and of products of which nothing else uses a part.
+    """Return the PROGRAM (list of operations to generate) with every a*b + a*c written as a*(b + c).
 
-    The factor that most terms of a sum share goes first, then again among the others and within the bracket.
-    A term that is added and subtracted is left out. A sum in which no two terms share a factor or cancel stays as it is.
+    Products and partial sums that are used elsewhere, too, stay as they are.
+
+    The factor that most terms of a sum share is taken out first. The function repeats this for the other terms and
+    within the bracket. A term that is both added and subtracted is left out. A sum stays as it is if no two terms share
+    a factor or cancel.
 
     Needs:  every argument precedes its use.
     Keeps:  outputs up to rounding (it reorders floating point); output names and order.
@@ -188,7 +193,8 @@ class _Builder:
         return len(self.body) - 1
 
     def total(self, terms: tuple[_Term, ...]) -> int:
-        """The index of the sum of some terms. The first one has a plus, as in every chain of sums and every bracket."""
+        """Add instructions that compute the sum of some terms, and return the index of the sum's value. The first term
+        must have a plus sign."""
         value = self._product(terms[0])
         for term in terms[1:]:
             op = Op.ADD if term.sign > 0 else Op.SUB

@@ -1,4 +1,4 @@
-"""Compute at compile time what does not depend on the inputs."""
+"""A pass of the code generator: it computes those operations at compile time that do not depend on the inputs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from psdmc.program.program import Instr, Op, Program
 
 
 def fold_constants(program: Program) -> Program:
-    """Replace operations on constants by their results, and drop sums with 0 and products with 0 and 1.
+    """Return the PROGRAM (list of operations to generate) with operations on constants replaced by their results. Sums
+    with 0 and products with 0 and 1 are dropped.
 
     Needs:  every argument precedes its use; finite inputs (0 * x is taken for 0).
     Keeps:  output values, bit for bit but for the sign of a zero; output names and order.
-    Gives:  no operation has only constants as arguments, but one whose result is not finite; what is no longer
-            needed stays.
+    Gives:  no operation has only constants as arguments, except if its result is not finite; unused instructions stay.
     """
     constants = {i for i, instr in enumerate(program.body) if instr.value is not None}
     if not any(_folds(instr, program.body) for instr in program.body if not constants.isdisjoint(instr.args)):

@@ -1,4 +1,5 @@
-"""Put instructions in an order that ends values' lives soon, over the whole PROGRAM instead of output by output."""
+"""A pass of the code generator: it orders the instructions of a PROGRAM (list of operations to generate). In the new
+order, each value is needed for few instructions after it is computed."""
 
 from __future__ import annotations
 
@@ -19,11 +20,15 @@ TIES: tuple[Tie, ...] = (
 
 
 def free_registers(program: Program) -> Program:
-    """Compute next, of what can be computed, what leaves the fewest values alive: an instruction that reads two values for
-    the last time before one that reads values which others need, too.
+    """Return the PROGRAM (list of operations to generate) in an order in which few values are alive at a time. A value
+    is alive if it is computed and still needed.
 
-    Repeated while it helps; the order given is kept where this one would hold more values alive over the whole PROGRAM.
-    `schedule` takes outputs one after the other, and keeps alive what the later ones share with the first.
+    Of all instructions whose arguments are known, the next one is the one that leaves the fewest values alive. An
+    instruction that is the last to read two values comes before one that reads values which are needed later. The
+    reordering is repeated as long as it lowers the number of values alive.
+
+    The given order is kept if the new one would hold more values alive over the whole PROGRAM. The pass `schedule`
+    orders instructions output by output instead, and keeps values alive that later outputs share with the first.
 
     Needs:  every argument precedes its use; every instruction is needed.
     Keeps:  output values, bit for bit; output names and order; the set of instructions.

@@ -1,5 +1,5 @@
-"""Nest sums so that their results are ready early: the term that is ready last is added last, and products are added by
-multiply-add."""
+"""A pass of the code generator: it changes the order of additions in sums so that results are ready early. The term
+that is ready last is added last, and products are added by fused multiply-add."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ Term = tuple[bool, int]
 
 
 def cycles(latency: Latency) -> dict[Op, int]:
-    """Cycles until the result of each operation is ready."""
+    """Return for each kind of operation (sum, product, sine ...) the number of processor cycles until its result is
+    ready."""
     return {op: 0 if op.unit is Unit.NONE else getattr(latency, op.unit) for op in Op}
 
 
 def fuse_sums(program: Program, latency: Latency = COSTS.latency) -> Program:
-    """Re-nest every sum, always adding the two parts that are ready soonest on the target.
+    """Return the PROGRAM (list of operations to generate) with the additions of every sum in a new order. The two parts
+    of a sum that are ready soonest are always added first, by the latencies of the target processor.
 
     Needs:  every argument precedes its use.
     Keeps:  operation counts; output values up to rounding (sums are reordered).
-    Gives:  short dependency chains, counted with fused multiply-adds.
+    Gives:  short chains of operations that wait for each other, counted with fused multiply-adds.
     """
     return _Fusion(program, latency).run()
 

@@ -8,10 +8,10 @@ from psdmc.program.program import Instr, Program
 
 
 def merge_duplicates(program: Program) -> Program:
-    """Compute equal things once (value numbering).
+    """Return the PROGRAM (list of operations to generate) with equal operations computed only once.
 
     Needs:  every argument precedes its use.
-    Keeps:  output values, bit for bit; output names and order.
+    Keeps:  output values, bit for bit; the names and the order of outputs.
     Gives:  no two instructions equal up to the order of commutative arguments.
     """
     first_seen: dict[Instr, int] = {}

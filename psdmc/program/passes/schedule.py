@@ -1,4 +1,5 @@
-"""Put instructions in an order that keeps few values alive at a time."""
+"""A pass of the code generator: it orders the instructions of a PROGRAM (list of operations to generate). In the new
+order, few values are alive (computed and still needed) at a time."""
 
 from __future__ import annotations
 
@@ -10,11 +11,12 @@ from psdmc.program.program import Program
 
 
 def schedule(program: Program) -> Program:
-    """Compute each value shortly before its first use.
+    """Return the PROGRAM (list of operations to generate) in an order in which each value is computed shortly before
+    its first use.
 
-    Outputs are taken one after the other, in their order; of an operation's arguments the one is computed
-    first that needs more values alive itself (Sethi and Ullman 1970, exact for trees). The order given is
-    kept where this one would hold more values alive over the whole PROGRAM.
+    Outputs are computed one after the other, in their order. If an operation has two arguments, the argument that keeps
+    more values alive is computed first (Sethi and Ullman 1970, exact for trees). The given order is kept if the new one
+    would hold more values alive over the whole PROGRAM.
 
     Needs:  every argument precedes its use; every instruction is needed.
     Keeps:  output values, bit for bit; output names and order; the set of instructions.
@@ -25,8 +27,8 @@ def schedule(program: Program) -> Program:
 
 
 def live_values(program: Program, order: Sequence[int] | None = None) -> int:
-    """Sum over all instructions of the values alive behind it, in the PROGRAM's order or in another one, of some of them;
-    loads and constants do not count."""
+    """Return the number of values that are still needed after an instruction, summed over all instructions. Inputs and
+    constants do not count. `order` is another order of the instructions that are needed; None: the PROGRAM's own."""
     arguments, users = program.arguments()
     here = np.arange(len(program.body) if order is None else len(order))
     if order is not None:
@@ -43,8 +45,8 @@ def live_values(program: Program, order: Sequence[int] | None = None) -> int:
 
 
 def beyond_registers(program: Program, registers: int) -> int:
-    """Sum over all instructions of the values alive behind it that no register is left for; loads and constants do not
-    count."""
+    """Return the number of needed values that do not fit in the processor's registers, summed over all instructions.
+    Inputs and constants do not count."""
     ends = [0] * (len(program.body) + 1)
     last = list(range(len(program.body)))
     for i, (_, args, _, _) in enumerate(program.body):
@@ -108,7 +110,10 @@ def _depth_first(program: Program) -> list[int]:
 
 
 def reordered(program: Program, order: list[int]) -> Program:
-    """The instructions in this order of their numbers, in which every argument precedes its use."""
+    """Return the PROGRAM (list of operations to generate) with its instructions in the given order.
+
+    The order lists the present numbers of the instructions. Every argument must precede its use in this order.
+    """
     new_index = [0] * len(program.body)
     for new, old in enumerate(order):
         new_index[old] = new

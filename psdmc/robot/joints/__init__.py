@@ -1,4 +1,4 @@
-"""Joint types: one file each, and the table of them."""
+"""The joint types that psdmc supports: one file for each type, and the table of all types."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ URDF_TYPES: dict[str, JointType] = {
 
 
 def joint_type(word: str) -> JointType:
-    """The type of that word; ValueError where there is none."""
+    """Return the joint type with this name, such as 'revolute'. Raises ValueError if no type has this name."""
     known = JOINT_TYPES | WIDE_TYPES
     if word not in known:
         raise ValueError(f"joint kind {word!r}")

@@ -1,4 +1,5 @@
-"""The factors 1, sin q, cos q, q ... that a joint's motion is made of; derivation interpolates in their products."""
+"""The functions 1, sin q, cos q, q ... of a joint's coordinate q, of which torques consist. The derivation finds the
+torques as polynomials in these functions of all joints, by interpolation."""
 
 from __future__ import annotations
 
@@ -11,12 +12,13 @@ Exponents = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """Factors that depend on one coordinate, numbered by digit; digit 0 is the constant one.
+    """The functions of one joint coordinate q that occur in torques, such as 1, sin q, cos q. The number of a function
+    is called a digit; digit 0 is the constant 1.
 
-    exponents    by digit; the first `linear` are of degree one at most, all of degree two at most: products of two of
-                 degree one are sums of these
-    derivatives  by digit: the digits and factors that d/dq of it is the sum of
-    nodes        as many as there are digits: where products are sampled, so that the matrix of values is well conditioned
+    exponents    for each digit, the exponents of q, sin q and cos q. The first `linear` functions have degree one at
+                 most, all others degree two. A product of two of the first is a sum of functions of the basis
+    derivatives  for each digit, the derivative of the function by q: a sum, as pairs of a digit and a factor
+    nodes        values of q, one per digit, at which torques are sampled. They make the interpolation well conditioned
     """
 
     exponents: tuple[Exponents, ...]
@@ -30,12 +32,12 @@ class Basis:
 
     @property
     def size(self) -> int:
-        """Number of digits."""
+        """Number of functions in the basis."""
         return len(self.exponents)
 
     @property
     def has_sincos(self) -> bool:
-        """Whether sine or cosine of the coordinate occurs."""
+        """Return whether the sine or cosine of the coordinate occurs in the basis."""
         return any(sine or cosine for _, sine, cosine in self.exponents)
 
 

@@ -1,4 +1,4 @@
-"""A joint that leaves its body every motion: the root of a robot that stands, walks or flies."""
+"""The free joint, with six degrees of freedom. It connects a floating base to the world."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ from psdmc.robot.joints.scalars import TINY, sign, square_of, unit
 
 
 class Free(WideJoint):
-    """q is the position (m) and a unit quaternion (x, y, z, w); rates are the velocity of the moved frame's origin (m/s) and
-    its angular velocity (rad/s), both along its own axes. Efforts are the force and the moment about that origin."""
+    """The free joint. q is the position (m) and a unit quaternion (x, y, z, w).
+
+    Rates are the velocity of the moved frame's origin (m/s) and the angular velocity (rad/s), both along the axes of
+    the moved frame. Efforts are the force and the moment about the origin of the moved frame.
+    """
 
     __slots__ = ()
 
@@ -49,8 +52,11 @@ class Free(WideJoint):
         return (q[0], q[1], q[2])
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """Move the origin along v and w. With t the angle of w, it goes by v + (1 - cos t) / t^2 w x v + (t - sin t) /
-        t^3 w x (w x v)."""
+        """Return q after one second at constant rates: velocity v and angular velocity w.
+
+        Let t be the angle of w. The origin moves, along the axes of the moved frame at the start, by v + (1 - cos t) /
+        t^2 w x v + (t - sin t) / t^3 w x (w x v).
+        """
         linear, angles, here = step[:3], step[3:], unit(q[3:])
         turned, share, cosine = turned_by(here, angles)
         across = _cross(angles, linear)
@@ -63,8 +69,11 @@ class Free(WideJoint):
         return (*(p + way for p, way in zip(q[:3], moved, strict=True)), *(nearer * x for x in turned))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """Compute the rates that bring the origin to p. With t the angle of w, the linear rates are p - w x p / 2 + (1
-        - t/2 cot(t/2)) / t^2 w x (w x p)."""
+        """Return the constant rates, velocity v and angular velocity w, that lead from q to `other` in one second.
+
+        Let the origin move by p along the axes of the moved frame at the start, and let t be the angle of w. Then v = p
+        - w x p / 2 + (1 - t/2 cot(t/2)) / t^2 w x (w x p).
+        """
         angles, cotangent = angles_between(q[3:], other[3:])
         apart = [there - here for here, there in zip(q[:3], other[:3], strict=True)]
         moved = _inward(rotation_of(inverse(q[3:])), apart)

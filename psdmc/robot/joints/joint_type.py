@@ -1,7 +1,7 @@
-"""Joint types: everything that a stage needs to know about how a joint moves.
+"""The class JointType, which describes how a joint moves. All stages of psdmc use the properties of this class.
 
-A new type is one file beside this one and a line in the table of types (__init__.py). Code outside this folder never
-distinguishes types; it uses the properties below.
+To add a joint type, add a file to this folder and a line to the table of types (__init__.py). Code outside this folder
+does not distinguish joint types.
 """
 
 from __future__ import annotations
@@ -39,30 +39,31 @@ Rows = tuple[Vector, Vector, Vector]
 
 
 class JointType:
-    """One way to move: a turn about z, a slide along z, or both in a fixed ratio; or, where not `about_z`, by several
-    coordinates, from which `rotation` and `way` give the frame's place. Rates are along the moved frame's own axes.
+    """One type of joint. If `about_z` is true, it turns about z, slides along z, or does both in a fixed ratio, by one
+    coordinate. Else it has several coordinates, and the functions `rotation` and `way` give the placement of the moved
+    frame. Rates are along the axes of the moved frame.
 
-    word           in robot files, model files and tables
-    urdf_words     types of a URDF's <joint> that move so, the last for one without position limits
-    follows_axis   whether its frame's z is along a URDF's <axis>; else its frame is the child link's
+    word           name in robot files, model files and tables
+    urdf_words     types of a URDF's <joint> that move like this; the last one is for joints without position limits
+    follows_axis   True: the z axis of the joint frame is a URDF's <axis>; False: the joint frame is the child link's
     only_axis      the only direction that a URDF's <axis> may have, in the child link; None: any
     nq, nv         numbers of coordinates and of rates
-    coordinates    what q and its rates are, in words, where there are several
-    q_names        nq names of its coordinates, and
-    v_names        nv names of its rates, where there are several
-    neutral        nq coordinates at which the frame has not moved
-    unit           those of its coordinates whose length must be one: a quaternion's, or a cosine and a sine
-    about_z        whether it is moved about and along z by one coordinate
-    twists         nv of them, the motion subspace: the joint frame's velocity per unit rate, along its own axes
-    basis          the factors in q that its transform is made of
-    length_order   exponent of the metre in the coordinate: 0 for an angle
+    coordinates    description of q and the rates in words, if there are several
+    q_names        names of the nq coordinates, if there are several
+    v_names        names of the nv rates, if there are several
+    neutral        the nq coordinates at which the frame has not moved
+    unit           slice of the coordinates whose length must be one: a quaternion, or a cosine and a sine
+    about_z        whether one coordinate moves the joint about and along z
+    twists         nv pairs (the motion subspace): linear and angular velocity of the joint frame at a rate of one
+    basis          functions of q of which the joint's transform consists
+    length_order   exponent of the metre in the unit of the coordinate: 0 for an angle
     position_unit  unit of q
     effort_unit    unit of the joint's torque or force
     free_range     range of q for a joint without limits, plus or minus, in the unit of q
-    ordinary       largest position, rate and acceleration of an ordinary arm's joint
-    verb           the verb for its motion, for sentences about it
-    pinocchio      Pinocchio's short name of it: JointModel...
-    mujoco         MuJoCo's word for it
+    ordinary       largest position, rate and acceleration of this type of joint in an ordinary arm
+    verb           the verb for the motion in sentences about the joint
+    pinocchio      short name of Pinocchio's joint model: JointModel...
+    mujoco         MuJoCo's name of the joint type
     """
 
     __slots__ = ()
@@ -91,25 +92,32 @@ class JointType:
     mujoco: ClassVar[str]
 
     def turn(self, x: Scalar) -> Scalar | None:
-        """Angle about z at coordinate x, or its rate or acceleration at that of x (all are linear); None: it never
-        turns."""
+        """Return the angle about z at coordinate x. Return None if the joint never turns.
+
+        The angle is proportional to x, so the function also converts rates and accelerations.
+        """
         return None
 
     def slide(self, x: Scalar) -> Scalar | None:
-        """Displacement along z in m at coordinate x, or its rate or acceleration; None: it never slides."""
+        """Return the displacement along z in m at coordinate x. Return None if the joint never slides.
+
+        The displacement is proportional to x, so the function also converts rates and accelerations.
+        """
         return None
 
     def rotation(self, q: Sequence[Scalar]) -> Rows | None:
-        """The moved frame's axes as columns in the one that has not moved, from nq coordinates; None: it never turns, or by
-        `turn`."""
+        """Return the rotation matrix of the joint frame at nq coordinates, relative to the frame at the neutral
+        position. Return None if the joint never turns, or turns about z (see `turn`)."""
         return None
 
     def way(self, q: Sequence[Scalar]) -> Vector | None:
-        """The moved frame's origin in the one that has not moved, m; None: it stays, or goes along z by `slide`."""
+        """Return the displacement of the joint frame's origin at nq coordinates, in m, relative to the neutral
+        position. Return None if the origin stays, or moves along z (see `slide`)."""
         return None
 
     def transform(self, q: float | Sequence[float]) -> Placement:
-        """The moved joint frame in the one that has not moved; q: a number, or nq of them."""
+        """Return the placement of the joint frame at the position q, relative to the frame at the neutral position; q
+        is a number, or nq numbers."""
         values = [float(x) for x in np.atleast_1d(q)]
         if not self.about_z:
             rows, moved = self.rotation(values), self.way(values)
@@ -123,76 +131,83 @@ class JointType:
         return Placement(rotation, np.array([0.0, 0.0, 0.0 if way is None else way]))
 
     def restored(self, q: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """The coordinates nearest to q that are the joint's: quaternions of length one and so on."""
+        """Return the valid coordinates nearest to q: quaternions, and pairs of cosine and sine, get length one."""
         part = self.unit
         return (*q[: part.start], *unit(q[part]), *q[part.stop :]) if part.stop else tuple(q)
 
     def normalized(self, q: Array) -> Array:
-        """Normalize an array (nq, ...) in its precision."""
+        """Return coordinates (nq, ...) in which quaternions, and pairs of cosine and sine, have length one. The result
+        has the precision of q."""
         return np.stack(self.restored(list(q)))
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """nq coordinates where a joint at q comes that moves at constant rates for one second by nv of `step`; what must be
-        of length one is made so."""
+        """Return the nq coordinates after a motion of one second at the nv constant rates `step`. Quaternions in the
+        result have length one."""
         return tuple(here + way for here, way in zip(q, step, strict=True))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """The nv constant rates that bring a joint from q to `other` in one second, the short way round."""
+        """Return the nv constant rates that bring a joint from q to `other` in one second. A rotation is at most half a
+        turn."""
         return tuple(there - here for here, there in zip(q, other, strict=True))
 
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """How the nq coordinates change per second at nv rates; linear in these."""
+        """Return the time derivatives of the nq coordinates at given joint rates (nv). They are linear in the rates."""
         return tuple(rates)
 
     def rates_bent(
         self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
     ) -> tuple[Scalar, ...]:
-        """How `coordinate_rates` at fixed rates change per second while q moves at nv rates of `way`."""
+        """Return how fast the result of `coordinate_rates`, at constant `rates`, changes while q moves at the nv joint
+        rates `way`. These are second derivatives of the coordinates."""
         return (0.0,) * self.nq
 
     def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """The nv rates at which `restored(q)` moves where the coordinates q, of any length, move by nq of `moved` per
-        second."""
+        """Return the nv joint rates at which the joint moves while the nq coordinates change at the rates `moved`.
+        Quaternions in q may have any length; the motion is that of the quaternion normalized to length one."""
         return tuple(moved)
 
     @property
     def hidden(self) -> int:
-        """How many inertial parameters of its body the joint cannot tell from those of the body before it.
+        """Return how many inertial parameters of the joint's body have the effect of parameters of the body before the
+        joint. They cannot be identified separately.
 
-        They are the pseudo-inertias in the common null space of its twists as 4 x 4 matrices: k (k + 1) / 2 of k dimensions.
+        In terms of 4 x 4 pseudo-inertias, this is k (k + 1) / 2. Here k is the dimension of the common null space of
+        the joint's twists, written as 4 x 4 matrices.
         """
         k = 4 - int(np.linalg.matrix_rank(np.vstack([_generator(twist) for twist in self.twists])))
         return k * (k + 1) // 2
 
     @property
     def q_orders(self) -> tuple[int, ...]:
-        """Exponent of the metre in each coordinate."""
+        """Return the exponent of the metre in the unit of each coordinate: 0 for an angle, 1 for a length."""
         part = range(self.unit.start, self.unit.stop)
         return tuple(0 if k in part else self.length_order for k in range(self.nq))
 
     @property
     def v_orders(self) -> tuple[int, ...]:
-        """Exponent of the metre in each rate."""
+        """Return the exponent of the metre in the unit of each rate: 0 for an angular velocity, 1 for a linear
+        velocity."""
         return tuple(0 if any(angular) else 1 for _, angular in self.twists)
 
     @property
     def has_length(self) -> bool:
-        """Whether the type itself contains a length in m, such as the pitch of a screw."""
+        """Return whether the joint type itself contains a length in m, such as the pitch of a screw."""
         return any(any(linear) and any(angular) for linear, angular in self.twists)
 
     @property
     def comes_round(self) -> bool:
-        """Whether q and q plus a whole turn are the same position."""
+        """Return whether q and q plus a full turn are the same position, as for a revolute joint."""
         return self.basis.has_sincos and not any(power for power, _, _ in self.basis.exponents)
 
     @property
     def effort_order(self) -> int:
-        """Exponent of metre in the unit of its effort: power is effort times rate."""
+        """Return the exponent of the metre in the unit of the joint's effort: 2 for a torque, 1 for a force."""
         return 2 - self.length_order
 
     @property
     def drive_order(self) -> int:
-        """Exponent of metre in the unit of its drive inertia: effort per acceleration."""
+        """Return the exponent of the metre in the unit of the joint's drive inertia, which is effort per
+        acceleration."""
         return self.effort_order - self.length_order
 
     def __eq__(self, other: object) -> bool:
@@ -215,7 +230,8 @@ def _generator(twist: Twist) -> Array:
 
 
 class WideJoint(JointType):
-    """A joint of several coordinates, most of them lengths: no drive turns it, and its torques are not expanded."""
+    """A joint with several coordinates, most of them lengths, such as a floating base. It has no drive inertia, and
+    psdmc does not write its torques as expanded polynomials."""
 
     __slots__ = ()
 

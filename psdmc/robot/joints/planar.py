@@ -1,4 +1,4 @@
-"""A joint that moves in its xy plane and turns about its z."""
+"""The planar joint, which moves in the xy plane and turns about the z axis of the joint frame."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
 
 
 class Planar(WideJoint):
-    """q is x and y (m), cosine and sine of the angle about z; rates are the velocity of the moved frame's origin along its
-    own x and y (m/s) and the angular velocity about z (rad/s)."""
+    """The planar joint. q is x and y (m), and the cosine and sine of the angle about z.
+
+    Rates are the velocity of the moved frame's origin (m/s) and the angular velocity about z (rad/s). The velocity is
+    along the x and y axes of the moved frame.
+    """
 
     __slots__ = ()
 
@@ -44,7 +47,11 @@ class Planar(WideJoint):
         return (q[0], q[1], 0.0)
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """The origin goes along the chord: sin(h)/h times the way, turned by half the angle, h."""
+        """Return q after one second at constant rates.
+
+        The origin moves on a circular arc. The displacement is the linear velocity times sin(h)/h, rotated by h, where
+        h is half of the angle of rotation.
+        """
         (x, y, *pair), (vx, vy, angle) = q, step
         c, s = unit(pair)
         half_s, half_c, share = _half(angle)

@@ -1,4 +1,4 @@
-"""A joint that slides along its z."""
+"""The prismatic joint, which slides along the z axis of the joint frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from psdmc.robot.joints.joint_type import SLIDES, JointType, Scalar, Twist
 
 
 class Prismatic(JointType):
-    """q is the displacement along z, m."""
+    """The prismatic joint; q is the displacement along z, m."""
 
     __slots__ = ()
 

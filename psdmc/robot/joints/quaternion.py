@@ -1,4 +1,5 @@
-"""Unit quaternions (x, y, z, w) for joints that turn about every axis, over abstract scalars."""
+"""Operations on unit quaternions (x, y, z, w), which are coordinates of joints. They work on floats, arrays and symbols
+(which record code)."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ ARCSINE = tuple(math.comb(2 * k, k) / (4**k * (2 * k + 1)) for k in range(12))
 
 
 def rotation_of(quaternion: Sequence[Scalar]) -> Rows:
-    """Rows of the rotation matrix; a rotation where the quaternion is of length one."""
+    """Return the rotation matrix, as three rows, of a quaternion (x, y, z, w). The quaternion must have length one."""
     x, y, z, w = quaternion
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz, xy, xz, yz = x2 * x, y2 * y, z2 * z, y2 * x, z2 * x, z2 * y
@@ -31,8 +32,10 @@ def rotation_of(quaternion: Sequence[Scalar]) -> Rows:
 
 
 def turned_by(quaternion: Sequence[Scalar], angles: Sequence[Scalar]) -> tuple[Quaternion, Scalar, Scalar]:
-    """A unit quaternion after a turn about axes of its own frame by `angles` (rad, a rotation vector), of length one; and,
-    of half the angle h, sin(h)/h and cos(h)."""
+    """Return a unit quaternion rotated by the rotation vector `angles` (rad), which is about axes of the rotated frame.
+
+    Return also sin(h)/h and cos(h), where h is half of the angle of rotation. The new quaternion has length one.
+    """
     half = root(0.25 * square_of(angles) + TINY)
     sine, cosine = sincos(half)
     share = sine / half
@@ -43,12 +46,12 @@ def turned_by(quaternion: Sequence[Scalar], angles: Sequence[Scalar]) -> tuple[Q
 
 
 def angles_between(quaternion: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Vector, Scalar]:
-    """rad: the turn about the first one's own axes that makes it the other, of half a turn at most; and h cot(h), of half
-    its angle h.
+    """Return the rotation vector (rad, at most half a turn) that leads from the first quaternion to the other one. It
+    is about the axes that the first quaternion has rotated. Return also h cot(h), where h is half of the angle.
 
-    The angle is halved, by square roots of 1 + cos, until few terms of the arcsine are enough: exact near zero, where its
-    cosine says nothing, and near half a turn, where its sine does not. The sine comes from the difference of the two, whose
-    share along the first one adds nothing to it: where they are nearly equal, their product itself has lost its digits.
+    The result is accurate for very small angles and for angles near half a turn. The angle comes from a series of the
+    arcsine after repeated halving. The sine is computed from the difference of the quaternions, because their product
+    loses digits if they are nearly equal.
     """
     back = inverse(quaternion)
     w = product(back, other)[3]
@@ -62,7 +65,7 @@ def angles_between(quaternion: Sequence[Scalar], other: Sequence[Scalar]) -> tup
 
 
 def arc(square: Scalar, cosine: Scalar) -> Scalar:
-    """h / sin(h), from sin(h)^2 and cos(h) >= 0."""
+    """Return h / sin(h) for an angle h of at most a quarter turn, from the square of sin(h) and cos(h) >= 0."""
     shrunk: Scalar = 1.0
     for _ in range(HALVINGS):
         cosine = root(0.5 + 0.5 * cosine)
@@ -75,26 +78,29 @@ def arc(square: Scalar, cosine: Scalar) -> Scalar:
 
 
 def rates_of(quaternion: Sequence[Scalar], angular: Sequence[Scalar]) -> Quaternion:
-    """How the quaternion changes at an angular velocity along its own frame's axes."""
+    """Return the time derivative of a quaternion whose frame turns at an angular velocity, given along the axes of the
+    rotated frame."""
     x, y, z = (0.5 * rate for rate in angular)
     return product(quaternion, (x, y, z, 0.0))
 
 
 def rates_bent(quaternion: Sequence[Scalar], angular: Sequence[Scalar], way: Sequence[Scalar]) -> Quaternion:
-    """How `rates_of` change while the quaternion turns at the angular velocity `way`."""
+    """Return how fast the result of `rates_of`, at constant angular velocity `angular`, changes while the quaternion
+    turns at the angular velocity `way`."""
     return rates_of(rates_of(quaternion, way), angular)
 
 
 def turning(quaternion: Sequence[Scalar], moved: Sequence[Scalar]) -> Vector:
-    """The angular velocity, along its own frame's axes, at which a quaternion's direction turns while its entries move; of
-    any length."""
+    """Return the angular velocity at which a quaternion turns while its entries change at the rates `moved`. It is
+    along the axes of the rotated frame. The quaternion may have any length."""
     x, y, z, _ = product(inverse(quaternion), moved)
     twice = 2.0 / square_of(quaternion)
     return (twice * x, twice * y, twice * z)
 
 
 def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
-    """First a, then b about the axes that a has turned."""
+    """Return the product a b of two quaternions. It is the rotation a, followed by the rotation b about the axes that a
+    has rotated."""
     (x, y, z, w), (i, j, k, r) = a, b
     return (
         w * i + x * r + (y * k - z * j),

@@ -1,4 +1,4 @@
-"""A joint that turns about its z."""
+"""The revolute joint, which turns about the z axis of the joint frame."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from psdmc.robot.joints.joint_type import TURNS, JointType, Scalar, Twist
 
 
 class Revolute(JointType):
-    """q is the angle about z, rad."""
+    """The revolute joint; q is the angle about z, rad."""
 
     __slots__ = ()
 

@@ -1,8 +1,8 @@
-"""Sine, cosine and square root of abstract scalars, of which the group operations of joints are made, and tiny numbers
-that keep their quotients defined.
+"""Sine, cosine, square root and sign for floats, arrays and symbols (which record code). The functions of joint
+coordinates, such as those of quaternions, consist of these operations.
 
-PROGRAMs have no branches. So nothing here asks whether an angle is small: 0/0 is avoided by adding to both sides what is
-lost beside any other value.
+A PROGRAM (list of operations) has no branches, so these functions do not test whether an angle is small. To avoid 0/0,
+the functions add a number to numerator and denominator that is too small to change any other result.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FAINTER = 1e-54
 
 
 def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
-    """(sin, cos) of an angle in rad; symbols have a method for it."""
+    """Return (sin, cos) of an angle in rad. The angle is a float, an array or a symbol (which records code)."""
     if hasattr(angle, "sincos"):
         s, c = angle.sincos()
         return s, c
@@ -37,18 +37,18 @@ def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def root(value: Scalar) -> Scalar:
-    """The square root; symbols have a method for it."""
+    """Return the square root of a float, an array or a symbol (which records code)."""
     return value.root() if hasattr(value, "root") else np.sqrt(value)
 
 
 def sign(value: Scalar) -> Scalar:
-    """1 or -1; of zero 1."""
+    """Return 1 for a positive value or zero, and -1 for a negative value. The code has no branch."""
     moved = value + FAINT
     return moved / root(moved * moved + FAINTER)
 
 
 def square_of(values: Sequence[Scalar]) -> Scalar:
-    """The sum of their squares."""
+    """Return the sum of the squares of the values."""
     total = values[0] * values[0]
     for value in values[1:]:
         total = total + value * value

@@ -1,4 +1,4 @@
-"""A joint that turns about every axis."""
+"""The spherical (ball) joint, which turns about every axis."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from psdmc.robot.joints.scalars import unit
 
 
 class Spherical(WideJoint):
-    """q is a unit quaternion (x, y, z, w); rates are the angular velocity along the moved frame's axes, rad/s."""
+    """The spherical joint. q is a unit quaternion (x, y, z, w); rates are the angular velocity along the moved frame's
+    axes, rad/s."""
 
     __slots__ = ()
 

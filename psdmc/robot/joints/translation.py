@@ -1,4 +1,4 @@
-"""A joint that goes along every axis and never turns."""
+"""The translation joint, which moves along all three axes and never turns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from psdmc.robot.joints.joint_type import SLIDES, Scalar, Twist, Vector, WideJoi
 
 
 class Translation(WideJoint):
-    """q is the position, m."""
+    """The translation joint; q is the position (x, y, z), m."""
 
     __slots__ = ()
 

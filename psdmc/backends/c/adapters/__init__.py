@@ -1,4 +1,7 @@
-"""Adapters: files by which other programs call the emitted functions, chosen by `emit-c --with`; one module each."""
+"""Adapters: files through which other programs, such as CasADi, call the generated C functions.
+
+Users choose adapters with `emit-c --with`. Each adapter is written by one module of this folder.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,8 @@ REMARKS = {"casadi": casadi.remark, "casadi_theta": casadi.remark}
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, each once, in the order of ADAPTERS; InputError where one is unknown."""
+    """Return the names of the adapters that the user chose, without duplicates, in the order of the table ADAPTERS.
+    Raises InputError for an unknown name."""
     for name in names:
         if name not in ADAPTERS:
             raise InputError(f"there is no adapter {name!r}", f"choose from {', '.join(ADAPTERS)}")
@@ -33,7 +37,11 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -> list[str]:
-    """The functions, followed by those that the adapters need besides."""
+    """Return the functions that a package must contain: the given functions, followed by further functions that the
+    code of the adapters calls.
+
+    wide  whether q has more entries than qd (quaternions)
+    """
     found = dict.fromkeys(functions)
     for adapter in adapters:
         found |= dict.fromkeys(NEEDS[adapter](functions, wide) if adapter in NEEDS else ())
@@ -41,6 +49,7 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
 
 
 def remarks(robot: Mechanism, adapters: Sequence[str], functions: Sequence[str]) -> tuple[str, ...]:
-    """What users should know of these adapters' functions of a robot, one clause each."""
+    """Return remarks for users about the chosen adapters, one clause each. An example says how CasADi treats the
+    quaternions of this robot."""
     found = (REMARKS[adapter](robot, functions) for adapter in chosen(adapters) if adapter in REMARKS)
     return tuple(dict.fromkeys(reason for reason in found if reason is not None))

@@ -1,11 +1,15 @@
-"""CasADi's external functions: the emitted functions under its calling convention, with exact derivatives.
+"""The adapter that makes the generated functions external functions of CasADi, with exact derivatives.
 
-The convention is CasADi's documented one (user guide, "Using the generated code"; Function::jacobian): beside f itself a
-library exports what f_n_in, f_sparsity_out and so on return, and jac_f: inputs of f, then its outputs (not read: empty
-patterns), to one block per output and input. Matrices are column by column, nonzeros only.
+The calling convention is in CasADi's user guide ("Using the generated code") and in the reference of
+Function::jacobian. For a function f, the library exports f, and helper functions such as f_n_in and f_sparsity_out.
 
-CasADi differentiates by the entries of q. Where q has quaternions, CasADi's f is the emitted one at q with its quaternions
-divided by their lengths, and its derivative is the emitted one, along the tangent, times d tangent / dq.
+The library also exports jac_f, which computes one matrix of derivatives for each pair of an output and an input. The
+inputs of jac_f are the inputs and then the outputs of f. The outputs of f are not read, and CasADi is informed of this
+by empty sparsity patterns. Matrices are stored column by column, without their zeros.
+
+CasADi differentiates by the entries of q. If q contains quaternions, CasADi's f normalizes them before it calls the
+generated function. The generated derivative is by the rates (the tangent vector). The adapter multiplies this
+derivative by d tangent / dq.
 """
 
 from __future__ import annotations
@@ -40,7 +44,12 @@ MAP, REGRESSOR = "tangent_map", "regressor"
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Sparsity in CasADi's form: rows, columns, then 1 (dense), or starts of columns and rows of the nonzeros."""
+    """A sparsity pattern in CasADi's form: number of rows, number of columns, then the positions of the nonzero
+    entries.
+
+    The positions are an offset for the start of each column, and then the row of each nonzero. For a dense matrix,
+    CasADi expects the single number 1 in place of the positions.
+    """
 
     name: str
     numbers: tuple[int, ...]
@@ -48,7 +57,8 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output in CasADi's order; `at` is its place in the work vector, in reals."""
+    """An input or output of a CasADi function: its name and its sparsity pattern. For an output, `at` is where the
+    result begins in the work vector, as an index of real numbers."""
 
     name: str
     pattern: str
@@ -57,18 +67,19 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class External:
-    """One external function.
+    """One external function of CasADi, with the C text of its definition.
 
-    name      that CasADi looks for
-    inputs    all of them
-    called    the emitted function
-    given     what it is called with, as C
-    work      number of reals for results and what leads to them
-    fails     whether it returns a status
-    restored  what is made a position of the robot before: C of q, and where to
-    before    C statements before the call, and
-    after     behind it
-    symbols   emitted functions that are called, `called` first
+    name      the name by which CasADi finds the function
+    inputs    all inputs of the CasADi function
+    outputs   all outputs of the CasADi function
+    called    the generated function that computes the results
+    given     C text of the arguments of the call of `called`
+    work      number of real numbers in the work vector, which holds results and intermediate values
+    fails     whether `called` returns a status
+    restored  positions q that are normalized before the call: C text of q, and of the place for the normalized q
+    before    C statements before the call
+    after     C statements after the call
+    symbols   all generated functions that the CasADi function calls, `called` first
     """
 
     name: str
@@ -86,17 +97,17 @@ class External:
 
 @dataclass(frozen=True, slots=True)
 class CasadiView:
-    """What templates/adapters/casadi.c.jinja prints.
+    """The data that the template adapters/casadi.c.jinja prints.
 
-    robot    identifier that every symbol starts with
+    robot    identifier with which every C name starts
     library  ending of the library's name
-    hidden   emitted functions whose names CasADi's take: they are compiled under others
-    zeros    length of the longest input: what is not given to a function is zero
-    units    parts of q, from an entry to before another, that are made of length one, and
-    nq       length of q, where there are such parts, and
-    nv       number of rates, and
-    map      entries of d tangent / dq that may differ from zero: row and column
-    spoils   whether results become NaN where a function fails
+    hidden   generated functions that have the same name as a CasADi function; they are compiled under other names
+    zeros    length of the longest input: CasADi may omit an input, which is then read as this many zeros
+    units    index ranges (start, end) of q that must have length one (quaternions)
+    nq       length of q
+    nv       number of rates, the length of qd
+    map      (row, column) of each entry of d tangent / dq (from dq to the rates) that may differ from zero
+    spoils   whether all results become NaN if a generated function fails
     helpers  C functions of casadi_calls.h.jinja that are called
     """
 
@@ -116,7 +127,11 @@ class CasadiView:
 
 
 def needed(functions: Sequence[str], wide: bool, theta: bool = False) -> list[str]:
-    """Functions that compute derivatives of these. `wide`: q is longer than the rates; `theta`: also by theta_b."""
+    """Return the names of the functions that the derivatives of the given functions need in the package.
+
+    wide   whether q has more entries than qd (quaternions)
+    theta  whether derivatives by theta_b (the base parameters) are needed, too
+    """
     found = [name + DERIVATIVES for name in functions if _has_blocks(name)]
     return found + [MAP] * wide + [REGRESSOR] * (theta and bool(found))
 
@@ -137,13 +152,15 @@ def _has_blocks(name: str) -> bool:
 
 
 def files(package: PackageView) -> dict[str, str]:
-    """The adapter's C file; InputError where CasADi cannot call the package. It includes the library's sources and becomes
-    a shared library of its own."""
+    """Return the C file of the adapter as a mapping from its path to its text. The file includes the C files of the
+    package and is compiled to a separate shared library. Raises InputError if CasADi cannot call the functions of the
+    package."""
     return _files(package, theta=False)
 
 
 def files_by_theta(package: PackageView) -> dict[str, str]:
-    """The C file of functions that take theta_b as their last input, likewise."""
+    """Return the C file of the adapter as a mapping from its path to its text. The functions of this file take theta_b
+    (the base parameters) as their last input."""
     return _files(package, theta=True)
 
 
@@ -154,7 +171,8 @@ def _files(package: PackageView, theta: bool) -> dict[str, str]:
 
 
 def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
-    """What users should know of CasADi's functions of this robot; None where q has an entry for each rate."""
+    """Return a text for users that says how the CasADi functions of this robot treat quaternions and which lack
+    derivatives. Return None if q has exactly one entry for each rate."""
     if robot.nq == robot.nv:
         return None
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
@@ -165,8 +183,12 @@ def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
 
 
 def casadi_view(package: PackageView, theta: bool = False) -> CasadiView:
-    """What CasADi's adapter prints of a package, `theta`: of its functions that take theta_b. InputError for float, and if
-    theta_b is unknown and not taken."""
+    """Return what the template of the CasADi adapter prints for a package. If `theta` is true, the CasADi functions
+    take theta_b (the base parameters) as their last input.
+
+    Raises InputError if the package computes in float. Also raises InputError if the base parameters are unknown and
+    not an input.
+    """
     info = package.info
     if package.real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
@@ -210,7 +232,8 @@ class _Patterns:
         self._names: dict[tuple[int, ...], str] = {}
 
     def of(self, shape: Sequence[int], zero: Iterable[int] = ()) -> str:
-        """The name of a pattern for a row-major array whose entries `zero` are always zero."""
+        """Return the C name of the sparsity pattern of an array that is stored row by row. `zero` are the indices of
+        entries that are always zero."""
         return self._named(_numbers(shape, frozenset(zero)))
 
     def unread(self, shape: Sequence[int]) -> str:
@@ -248,7 +271,8 @@ class _Externals:
         self.helpers: set[str] = set()
 
     def of(self, kernel: KernelView) -> Iterable[External]:
-        """A function, and its Jacobian, its reverse and its forward mode where there are kernels for them."""
+        """Yield the CasADi functions for one generated function. These are the function itself and, if the package has
+        code for them, its Jacobian, reverse derivative and forward derivative."""
         patterns, name, call = self.patterns, kernel.function.name, _Call(kernel, kernel, self)
         own = [(output.name, call.at(output.name), patterns.of(output.shape)) for output in kernel.outputs]
         yield call.external("", self._inputs(kernel), own)
@@ -334,12 +358,13 @@ class _Call:
             of.helpers.add("restore")
 
     def is_wide(self, k: int) -> bool:
-        """Whether an input of the function is a position with quaternions."""
+        """Return whether input k of the function is a vector q that contains quaternions."""
         inputs = self.kernel.function.inputs
         return bool(self.of.info.units) and k < len(inputs) and inputs[k].axes == Q.axes
 
     def read(self, k: int) -> str:
-        """C of an input, positions as the called function reads them."""
+        """Return C text of input k, as the argument of the generated function. If q must be normalized before the call,
+        the text names the normalized copy."""
         if k in self.restored and not self.called.function.normalizes:
             return self.restored[k]
         return f"given(arg[{k}])"
@@ -348,8 +373,13 @@ class _Call:
         return self.starts[output]
 
     def by_entries(self, block: OutputView, k: int) -> tuple[int, tuple[int, ...], frozenset[int]]:
-        """Where the derivatives by the entries of input k are put, their shape, and what is zero of them, from those along
-        the tangent."""
+        """Add C statements that convert derivatives by the rates to derivatives by the entries of input k, a vector q.
+
+        block  output of the generated function with the derivatives by the rates
+
+        Returns where the result begins in the work vector, the shape of the result, and its entries that are always
+        zero.
+        """
         info, place = self.of.info, self._map(k)
         rows = prod(block.shape[:-1])
         to = self._room(rows * info.nq)
@@ -362,7 +392,9 @@ class _Call:
         return _offset(to), (*block.shape[:-1], info.nq), frozenset(range(rows * info.nq)) - kept
 
     def by_theta(self) -> tuple[int, tuple[int, ...]]:
-        """Where the derivatives by theta_b are put, and their shape: those of torques are the regressor's entries."""
+        """Add the C call that computes derivatives of the function by theta_b (the base parameters). Returns where the
+        result begins in the work vector, and the shape of the result. The derivative of torques by theta_b is the
+        regressor."""
         info, regressor = self.of.info, self.of.kernels[REGRESSOR]
         names = {vector.name: self.read(k) for k, vector in enumerate(self.kernel.inputs)}
         names |= {output.name: f"w + {self.at(output.name)}" for output in self.called.outputs}
@@ -380,7 +412,11 @@ class _Call:
         return _offset(found), (info.nv, info.l)
 
     def direction(self, k: int, given: str) -> str:
-        """C of a direction of input k, along the tangent."""
+        """Return C text of a direction vector for a derivative along input k. If input k is a vector q with
+        quaternions, the direction is converted from changes of q to rates.
+
+        given  C text of the direction that CasADi passes
+        """
         if not self.is_wide(k):
             return given
         place, to = self._map(k), self._room(self.of.info.nv)
@@ -395,7 +431,13 @@ class _Call:
         shown: Sequence[tuple[str, int, str]],
         seeds: Sequence[str] = (),
     ) -> External:
-        """prefix: of CasADi's name; shown: name for CasADi, place, pattern; seeds: C of what is read behind the inputs."""
+        """Return the external function of CasADi that makes the C call of this object.
+
+        prefix  beginning of CasADi's name for the function, such as jac_
+        inputs  all inputs of the CasADi function
+        shown   of each output: name, place in the work vector, and name of the sparsity pattern
+        seeds   C text of further arguments after the inputs of the generated function
+        """
         own = [self.read(k) for k in range(len(self.kernel.inputs))]
         theta = [f"given(arg[{len(own)}])"] * self.called.theta
         results = [f"w + {start}" for start in self.starts.values()]

@@ -1,7 +1,9 @@
-"""An FMU (FMI 3.0, model exchange and co-simulation): states q and qd, inputs tau, outputs accelerations.
+"""The adapter that writes an FMU, a model for simulation tools (FMI 3.0, model exchange and co-simulation). The states
+are q and qd, the inputs are torques, and the outputs are accelerations.
 
-The types of FMI that the C needs are declared in its template, so that the package keeps its licence. Values are one array
-of doubles; a value reference is a place in this array.
+The template declares the data types of the FMI standard itself. So the package contains no file of the standard and
+keeps its licence. All values are in one array of doubles, and the value reference of a variable is an index into this
+array.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ FILES = {
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Variables side by side: their name, place of the first one, number, and XML attributes that they share."""
+    """Several variables of the FMU with consecutive value references, such as all entries of q. The data are the name,
+    the index `at` of the first variable, the number of variables, and XML attributes that all of them share."""
 
     name: str
     at: int
@@ -58,7 +61,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable of the model description: its value reference, and its attributes as XML text."""
+    """One variable of the FMU's model description: its value reference, and its attributes as XML text."""
 
     reference: int
     attributes: str
@@ -70,7 +73,8 @@ def needed(functions: Sequence[str], wide: bool) -> list[str]:
 
 
 def files(package: PackageView) -> dict[str, str]:
-    """Path -> text of the FMU's sources; InputError if an FMU of this package is not possible."""
+    """Return the text of each file of the FMU's sources, by path. Raises InputError if the package cannot become an
+    FMU."""
     info, robot = package.info, package.robot
     kernels = {kernel.name: kernel for kernel in package.kernels}
     values = [parameter.value for parameter in info.parameters]

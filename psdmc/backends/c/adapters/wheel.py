@@ -1,7 +1,9 @@
-"""A Python module of the emitted functions: `pip install DIR` compiles it, and it then needs NumPy alone.
+"""The adapter that makes a Python module of the generated functions. `pip install DIR` compiles the module, which then
+needs NumPy only.
 
-An extension in CPython's stable ABI reads arrays as buffers. A module in Python converts arguments, checks shapes and
-allocates results. Only functions for many states are called: one state then has the same bits alone and in a batch.
+A compiled extension in CPython's stable ABI reads arrays as buffers. A Python file converts arguments, checks shapes
+and allocates results. The extension calls only the C functions for many states. So the result for one state has exactly
+equal bits, alone or as part of a batch.
 """
 
 from __future__ import annotations
@@ -29,13 +31,14 @@ FILES = {
 
 @dataclass(frozen=True, slots=True)
 class WheelKernel:
-    """A C function for many states, as the extension calls it.
+    """A generated C function for many states, as the Python extension module calls it.
 
-    name, call  of the kernel; C text of the call with arrays a[0], a[1], ...
-    fails       whether the call returns a status
-    sizes       reals per state of each array; of theta_b all reals
-    inputs      number of arrays that are read, which come first
-    theta       place of theta_b, whose reals are the same for all states; -1 if it is none of the arrays
+    name    name of the generated function with its variant
+    call    C text of the call, in which the arrays are a[0], a[1], ...
+    fails   whether the call returns a status
+    sizes   for each array, how many real numbers belong to one state; for theta_b, its whole length
+    inputs  number of input arrays, which precede the output arrays
+    theta   index of the array theta_b (base parameters), which is shared by all states; -1 if there is none
     """
 
     name: str
@@ -48,7 +51,8 @@ class WheelKernel:
 
 @dataclass(frozen=True, slots=True)
 class WheelArray:
-    """An array of a Python function: its trailing axes, also as a caller sees them after batch axes, and its meaning."""
+    """An input or output array of a Python function: its name, its meaning `means`, and its shape. `tail` is the shape
+    for one state. `shape` is text that shows users the shape, with leading axes for many states."""
 
     name: str
     tail: tuple[int, ...]
@@ -58,13 +62,14 @@ class WheelArray:
 
 @dataclass(frozen=True, slots=True)
 class WheelFunction:
-    """A function of the Python module.
+    """One function of the Python module.
 
-    meaning      a line of ASCII without quotation marks
-    result       class of several results; empty for one
-    kernels      Python text of the extension's functions without and with theta_b; None for one that does not exist
-    takes_theta  whether there is one with theta_b
-    positions    numbers of the inputs whose quaternions must have length one
+    meaning      description in one line of ASCII without quotation marks
+    result       name of the class that holds the outputs if there are several; else empty
+    kernels      Python text of the two C functions, without and with the input theta_b; None for a missing function
+    takes_theta  whether the package has the function with the input theta_b (base parameters)
+    needs_theta  whether the package has only the function with the input theta_b
+    positions    indices of the inputs that contain quaternions, which must have length one
     """
 
     name: str
@@ -79,7 +84,10 @@ class WheelFunction:
 
 
 def files(package: PackageView) -> dict[str, str]:
-    """Path -> text of the extension, the module and what pip reads. InputError for a name that Python takes itself."""
+    """Return the text of each file of the Python package (extension, module, files for pip), by path.
+
+    Raises InputError if Python already uses a name, such as a keyword.
+    """
     robot = package.robot
     if keyword.iskeyword(robot) or robot in {"numpy", *sys.stdlib_module_names}:
         raise InputError(f"a Python module cannot be called {robot!r}", "choose another name with --name")

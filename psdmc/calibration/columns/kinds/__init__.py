@@ -1,4 +1,4 @@
-"""The kinds of springs that a fit can have: one file of this folder each, described by its KIND."""
+"""The kinds of springs that a fit supports. Each file in this folder describes one kind, in its object KIND."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A gas spring between two points of two bodies: a pushing force, nearly constant, that grows as it is shortened."""
+"""A gas spring between two points of two links. Its nearly constant force pushes the points apart, and grows as the
+spring becomes shorter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A spring whose tension grows with its length: between two points of two bodies, or along joint coordinates."""
+"""A spring whose tension grows with its length. The length is the distance between two points of two links, or a sum of
+joint positions."""
 
 from __future__ import annotations
 

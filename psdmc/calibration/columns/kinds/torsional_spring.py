@@ -1,4 +1,4 @@
-"""A spring about (or along) one joint's own axis."""
+"""A spring about (or along) the axis of one joint."""
 
 from __future__ import annotations
 

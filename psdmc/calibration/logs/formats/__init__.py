@@ -1,4 +1,4 @@
-"""The kinds of log files that psdmc reads: one file of this folder each, described by its FORMAT."""
+"""The formats of log files that psdmc reads. Each file in this folder describes one format by an object FORMAT."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WRITTEN = tuple(
 
 
 def format_of(path: Path) -> LogFormat:
-    """Return the format that reads a path; InputError lists the known endings."""
+    """Return the format that reads a path. Raises InputError with the known suffixes if there is none."""
     for each in FORMATS:
         if each.sniff(path):
             return each
@@ -35,7 +35,7 @@ def format_of(path: Path) -> LogFormat:
 
 
 def table_of(path: Path) -> TableFormat:
-    """Return the kind of table that a path is; InputError lists the known endings."""
+    """Return the kind of table that reads a path. Raises InputError with the known suffixes if there is none."""
     for each in FORMATS:
         if isinstance(each, TableFormat) and each.sniff(path):
             return each
@@ -43,5 +43,5 @@ def table_of(path: Path) -> TableFormat:
 
 
 def has_topics(path: Path) -> bool:
-    """Return whether a path is a log with topics, such as a bag."""
+    """Return whether a path is a log with topics, such as a ROS bag."""
     return any(each.has_topics and each.sniff(path) for each in FORMATS)

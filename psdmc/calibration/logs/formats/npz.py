@@ -1,4 +1,5 @@
-"""NumPy's npz files: one array per column; where a log description names the columns, also arrays of several columns."""
+"""Reads NumPy's npz files with one array per column. If a log description names the columns, an array may also have
+several columns."""
 
 from __future__ import annotations
 
@@ -35,14 +36,15 @@ class NpzFormat(TableFormat):
     endings = (".npz",)
 
     def columns_of(self, file: BinaryIO, name: str, form: TextForm) -> Columns:
-        """Arrays of one dimension by name; column k of an array of two dimensions is NAME[k], k from 1."""
+        """Return columns by name: arrays of one dimension, and NAME[k] for column k (from 1) of an array with two
+        dimensions."""
         with decoding(name, "an npz file"), zipfile.ZipFile(file) as archive:
             members = _members(archive, file, name)
             arrays = {_column(m): _array(archive.read(m)) for m in members}
         return columns_of_arrays(arrays, name)
 
     def pieces(self, file: BinaryIO, name: str) -> Pieces:
-        """All columns are read next to each other, so that no more than a piece is in memory."""
+        """Return names and rows in pieces. All columns are read in parallel, so only one piece is in memory."""
         with decoding(name, "an npz file"):
             archive = zipfile.ZipFile(file)
             members = _members(archive, file, name)
@@ -56,7 +58,8 @@ class NpzFormat(TableFormat):
 
 
 def columns_of_arrays(arrays: Mapping[str, Any], name: str) -> Columns:
-    """Columns of arrays in memory: NAME, or NAME[k] of an array of two dimensions, k from 1; others are left out."""
+    """Return columns by name from arrays in memory: NAME, or NAME[k] for column k (from 1) of an array with two
+    dimensions. Other arrays are left out."""
     found: dict[str, Array] = {}
     for key, values in arrays.items():
         if values.dtype.kind not in NUMBERS or values.ndim not in (1, 2):

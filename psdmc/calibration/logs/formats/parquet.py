@@ -1,4 +1,4 @@
-"""Parquet files, through pyarrow; a missing value (null) is NaN."""
+"""Reads Parquet files through pyarrow. A missing value (null) becomes NaN."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ParquetFormat(TableFormat):
     endings = (".parquet",)
 
     def columns_of(self, file: BinaryIO, name: str, form: TextForm) -> Columns:
-        """All columns by name; those that hold anything but numbers are refused when they are asked for."""
+        """Return all columns by name. A column that is not numeric gives an error only when it is read."""
         stored, fields = _opened(file, name)
         require_size(0, len(fields), 0, name)
 

@@ -1,4 +1,4 @@
-"""ROS 1 bags (rosbag, format 2.0) through rosbags."""
+"""Reads ROS 1 bags (rosbag, format 2.0) through the package rosbags."""
 
 from __future__ import annotations
 

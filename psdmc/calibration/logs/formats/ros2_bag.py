@@ -1,4 +1,4 @@
-"""ROS 2 bags through rosbags, with or without the bag's metadata.yaml."""
+"""Reads ROS 2 bags through the package rosbags, with or without the bag's metadata.yaml."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Ros2BagFormat(BagFormat):
     what = "a ROS 2 bag"
 
     def sniff(self, path: Path) -> bool:
-        """A bag is a folder, or one file of it."""
+        """Return whether a path is a ROS 2 bag: a folder, or one of its files."""
         return super().sniff(path) or is_folder(path)
 
     def require_sizes(self, path: Path, held: int | None) -> None:
@@ -61,7 +61,7 @@ class Ros2BagFormat(BagFormat):
         return _sqlite_topics(path) if _is_bare(path) else any_reader_topics(_for_rosbags(path))
 
     def raw_messages(self, path: Path, topic: str) -> Iterator[bytes]:
-        """A bare .db3 is read as the SQLite file it is."""
+        """Yield the serialised joint states. A single .db3 file is read as the SQLite file that it is."""
         require_rosbags()
         return (
             _sqlite_messages(path, topic)

@@ -1,8 +1,8 @@
-"""Text tables of loggers and spreadsheets: CSV and its relatives, every fault with its line and column.
+"""Reads text tables of loggers and spreadsheets, such as CSV. Every error states line and column.
 
-Files are UTF-8, with or without a byte-order mark. Comma, semicolon, tab or spaces separate the cells. Where no comma
-separates them, numbers may have decimal commas. A table whose columns a log description names may lack a header, may
-begin with comment lines, and may hold anything in its other columns.
+Files are UTF-8, with or without a byte-order mark. Comma, semicolon, tab or spaces separate the cells. If the
+separator is not a comma, numbers may have decimal commas. A table whose columns a log description names may lack a
+header, may begin with comment lines, and may hold anything in its other columns.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class TextFormat(TableFormat):
         return Columns(name, table.names, table.width, table.rows)
 
     def pieces(self, file: BinaryIO, name: str) -> Pieces:
-        """Each piece ends with a line."""
+        """Return names and rows of a CSV file, in pieces that end with a line."""
         file = _with_line_ends(file, name)
         reader = CsvReader(name)
         names: list[str] = []
@@ -90,7 +90,8 @@ def _with_line_ends(file: BinaryIO, name: str) -> BinaryIO:
 
 
 class CsvReader:
-    """A CSV file piece by piece: its header, then whole lines in order; faults carry the line's number in the file."""
+    """Reads a CSV file in pieces: its header, then complete lines in order. Errors state the number of the line in the
+    file."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -100,7 +101,7 @@ class CsvReader:
         self._decimal = ""
 
     def header(self, line: bytes) -> list[str]:
-        """The column names of the next line; none where it is empty."""
+        """Return the column names in the next line, or none if it is empty."""
         self._line += 1
         text = plain_text(line, self.name, self._line - 1).strip("\n")
         if not text.strip():
@@ -113,7 +114,7 @@ class CsvReader:
         return self._names
 
     def rows(self, lines: bytes) -> Array:
-        """(rows, columns) of whole lines."""
+        """Return the numbers (rows, columns) in complete lines."""
         body = plain_text(lines, self.name, self._line)
         first, self._line = self._line + 1, self._line + body.count("\n")
         if not body.strip():
@@ -136,7 +137,7 @@ class CsvReader:
 
 
 def plain_text(data: bytes, name: str, before: int = 0) -> str:
-    """Bytes as text with plain line ends; `before` lines came before them."""
+    """Return bytes as text with plain line ends; `before` is the number of lines before them."""
     for mark, encoding in _OTHER_MARKS:
         if data.startswith(mark):
             raise InputError(f"{name}: is {encoding} text, expected UTF-8", "save it as CSV in UTF-8")
@@ -238,7 +239,7 @@ def _no_number(name: str, line: int, column: str, cell: str) -> InputError:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number as psdmc reads one: ASCII, without underscores."""
+    """Return whether psdmc reads a cell as a number: ASCII, without underscores."""
     if not cell.isascii() or "_" in cell:
         return False
     try:
@@ -251,7 +252,7 @@ def is_number(cell: str) -> bool:
 class TextTable:
     """An open text table.
 
-    names   of its columns, empty where it has no header
+    names   names of its columns, empty if it has no header
     width   number of columns
     """
 
@@ -304,9 +305,10 @@ class TextTable:
             return [cell.strip() for cell in next(csv.reader([line], delimiter=self._separator), [])]
 
     def rows(self, places: Sequence[int], dates: bool = False) -> Iterator[Array]:
-        """(k, len(places)) of these columns, in pieces; InputError names the line and column that is no number.
+        """Yield the numbers (k, len(places)) in these columns, in pieces. Raises InputError with the line and column
+        of a cell that is no number.
 
-        dates   whether the first of them holds dates, which become s since 1970
+        dates   whether the first of these columns holds dates, which become s since 1970
         """
         self._dated = places[0] if dates else None
         line, left = (self._line, self._first.encode() + b"\n") if self._first else (self._line + 1, b"")
@@ -366,8 +368,8 @@ class TextTable:
 
 
 def whole_lines(file: BinaryIO, name: str, left: bytes = b"") -> Iterator[bytes]:
-    """The rest of a text in pieces that end with a line, after what is `left` of it; InputError where a line is longer than
-    a piece."""
+    """Yield the rest of a text in pieces of complete lines, after the text `left`. Raises InputError if a line is
+    longer than a piece."""
     while chunk := file.read(PIECE_BYTES):
         end = chunk.rfind(b"\n") + 1
         if not end and len(left) + len(chunk) > PIECE_BYTES:
@@ -389,13 +391,14 @@ def _is_date(text: str) -> bool:
 
 
 def seconds_of(text: str) -> float:
-    """s since 1970 of a date in ISO 8601's form, UTC where it names no zone; ValueError where it is none."""
+    """Return the seconds since 1970 of a date in ISO 8601 format, UTC if it has no time zone. Raises ValueError for
+    other text."""
     date = datetime.fromisoformat(text.strip().strip('"'))
     return (date if date.tzinfo is not None else date.replace(tzinfo=UTC)).timestamp()
 
 
 def separator_of(line: str) -> str:
-    """The separator that gives most cells."""
+    """Return the separator that divides a line into most cells."""
     counts = {mark: line.count(mark) for mark in (",", ";", "\t")}
     counts[" "] = len(line.split()) - 1
     if counts[";"] or counts["\t"]:  # commas may then be decimal ones
