@@ -1,10 +1,13 @@
-"""The whole compiler: the functions `derive`, `emit_c` and `compile`. The table lists the steps in the order in which
-they run. Start to read the source code of psdmc here.
+"""The whole compiler: the functions `derive`, `emit_c` and `compile`. Start to read the source code of psdmc here.
+
+The table lists the steps in the order in which they run. E, P and theta_b are the model's exponents, coefficients and
+base parameters. A kernel is one generated function. A PROGRAM is the list of operations to generate. A lane is
+one slot of a SIMD vector, for one of several states.
 
 step         in                                         out
 robot        robot file, options                        LoadedRobot: a Mechanism and the file that it comes from
 derivation   Mechanism                                  DynamicsModel: E, P, theta_b, certificate (the MODEL)
-lower        DynamicsModel, names of functions, costs   Kernels: each function as a PROGRAM for one state and for lanes
+lower        DynamicsModel, names of functions, costs   Kernels: PROGRAMs of each function for one state and SIMD lanes
 backends     Emission: Kernels, facts, reference states the text of each file of a package, in C or another language
 toolchain    PackageView                                shared library with its Interface, then CompiledRobot
 """
@@ -204,10 +207,11 @@ def emit(
     target: str | Target = NATIVE,
     **own: Any,
 ) -> Changes:
-    """Write the package of a model in the language of a back end (psdmc.backends.protocol). Return what `emit_c`
-    returns.
+    """Write the package of a model in the language of a back end (psdmc.backends.protocol), such as C.
 
-    own  further options of `emit_c`, by their names on the command line
+    Returns the names of the files that psdmc wrote or removed, as `emit_c` does.
+
+    own  further options that the back end has, by their names on the command line
 
     Raises InputError for an option that the back end does not have.
     """
@@ -223,10 +227,11 @@ def compare_emitted(
     given: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Differences:
-    """Compare the package in a folder with the package that `emit` would write with the options in the folder's
-    manifest.
+    """Compare the package in a folder with the package that `emit` would write now with the same options.
 
-    given  options of `emit`, by their names on the command line, that must agree with the options in the manifest
+    The options are those in the manifest of the folder.
+
+    given  options that the user gives, by their names on the command line; they must agree with the manifest
 
     This function writes no file. Raises InputError if the folder holds no package, or if `given` contradicts the
     manifest.
@@ -390,7 +395,7 @@ class _Request:
 
     @property
     def key(self) -> str:
-        """Text that is the same for equal requests: a hash of the model and of the options of the compilation."""
+        """A text that is equal for two calls of `compile` with equal results: a hash of the model and of all options."""
         parts = (self.model_hash, self.lowering, self.functions, self.real, self.trig, self.target)
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 

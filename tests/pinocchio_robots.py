@@ -22,6 +22,7 @@ FILES = {
     "panda": "panda_description/urdf/panda.urdf",
     "ur10": "ur_description/urdf/ur10_robot.urdf",
     "baxter": "baxter_description/urdf/baxter.urdf",
+    "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
 }
 WIDE = {joint.pinocchio: joint for joint in (FREE, PLANAR, SPHERICAL, TRANSLATION)}
 EXACT = 1e-11

@@ -48,6 +48,7 @@ DECISIONS = {
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",
     "functions/tangent_map.py": "Pinocchio's side of a comparison",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",
+    "functions/frame_acceleration_derivatives.py": "Pinocchio's side of a comparison",
     "functions/frame_velocity_derivatives.py": "Pinocchio's side of a comparison",
     "lower/carriers.py": "thresholds with margins of decades",
     "lower/carrier_columns.py": "scales with margins of decades, and an inverse of zeros and ones",

@@ -46,10 +46,9 @@ def motors_with_load(
     given: Mapping[str, float] | None,
     progress: Progress,
 ) -> tuple[Motors, MotorResult]:
-    """Return the motors with the torque constants from logs without and with the load. Given constants apply to joints
-    for which the logs do not determine one.
+    """Return the torque constants of all motors from logs of currents without and with a known load.
 
-    given  N m/A by joint name
+    given  N m/A by joint name, for joints whose constant the logs do not determine
 
     Raises InputError if the logs hold no currents, or if a joint has neither constant.
     """
@@ -98,8 +97,11 @@ def _together(names: Sequence[str], found: MotorResult, given: Mapping[str, floa
 def with_loaded_logs(
     record: Calibration, loaded: LoadedLogs, found: MotorResult, options: LinearOptions
 ) -> Calibration:
-    """Return the record with the quality of the torque constants (column Motor of the report's accuracy table). The
-    quality is computed from the model's file after the file was written and read back."""
+    """Return the result of a calibration with the accuracy of the torque constants added.
+
+    The accuracy is the column Motor of the report's accuracy table. The torques are computed from the model's file
+    after the file was written and read back.
+    """
     load = loaded.load
     used = LoadUsed(
         float(load.mass),
@@ -126,8 +128,11 @@ def with_loaded_logs(
 
 
 def loaded_quality(model: DynamicsModel, loaded: LoadedLogs, options: LinearOptions) -> StepQuality:
-    """Return how well a calibrated model's file predicts the torque that the known load adds: the measured torque
-    minus the model's torque without load. Only joints on which the load has a noticeable effect are included."""
+    """Return how well a calibrated model predicts the additional torque of a known load, for each joint.
+
+    The measured additional torque is the measured torque minus the model's torque without load. Joints on which the
+    load's torque is small compared with the measured torque are left out.
+    """
     model = reread(model)
     chain = model.mechanism
     full = [checked(log, chain, options.filter.cutoff, options.check) for log in loaded.logs]

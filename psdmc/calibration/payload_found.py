@@ -60,7 +60,8 @@ class PayloadFound:
         ]
 
     def as_toml(self) -> str:
-        """Return the text of the load file. A standard deviation that is not known is written as inf."""
+        """Return the text of the load file (TOML). If the logs do not determine a number, its standard deviation is
+        inf."""
         return "\n".join(
             [
                 "# A load that psdmc payload identified. Lengths in m in the frame, inertia about the centre of mass:",
@@ -125,8 +126,11 @@ def _numbers(value: Any, count: int) -> Array | None:
 
 
 def load_numbers(load: Array) -> Array:
-    """Return mass, centre of mass and inertia about it (10,) from ten linear parameters. It serves to convert standard
-    deviations."""
+    """Return mass, centre of mass and inertia about the centre of mass (10,) of a load from its ten linear parameters.
+
+    The linear parameters are mass, first moments and inertia about the frame's origin. The function is used to convert
+    standard deviations.
+    """
     mass, h = float(load[0]), load[1:4]
     com = h / mass
     inertia = inertia_matrix(load[4:10]) - mass * (com @ com * np.eye(3) - np.outer(com, com))

@@ -22,10 +22,11 @@ from psdmc.progress import Progress
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogSources:
-    """Logs, and what their log description says about the fit.
+    """Logs for a calibration, and the options of the fit that their log description states.
 
+    logs       the logs
     linear     options of the linear fit
-    constants  N m/A by joint name, for logs of currents; empty: the description gives none
+    constants  torque constants, N m/A by joint name, for logs of currents; empty: the description gives none
     """
 
     logs: tuple[AnyLog, ...]
@@ -46,7 +47,7 @@ class LogNaming:
 
     @property
     def flags(self) -> list[str]:
-        """Options of the command line that correspond to these names."""
+        """Return the names of the command-line options that the user gave for topic or joint names."""
         return (["--topic"] if self.topic else []) + (["--joint-map"] if self.joints else [])
 
     def require_bag(self, paths: Sequence[Path]) -> None:
@@ -82,7 +83,7 @@ def campaign_of(paths: Sequence[Path]) -> Path | None:
 def plain_sources(
     paths: Sequence[Path], joint_names: tuple[str, ...], linear: LinearOptions, progress: Progress
 ) -> LogSources:
-    """Open the logs of a description or of plain files, all for the same use."""
+    """Open the logs of a log description or of plain files, without additional logs for validation."""
     return log_sources(paths, (), joint_names, linear, FitChoice(), LogNaming(), progress)
 
 

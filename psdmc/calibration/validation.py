@@ -1,8 +1,8 @@
-"""The function `psdmc.validate`: whether a calibrated model still predicts the torques of its robot, and if not, what
-changed.
+"""The function `psdmc.validate`: tests whether a calibrated model still predicts the torques of its robot in new logs.
 
-psdmc fits the columns of a calibration to the difference between measured and predicted torque. A chi-square test of
-these changes, with the covariances of the file and of the new logs, distinguishes a change of the robot from chance.
+psdmc fits changes of all calibrated values to the difference between measured and predicted torque. A chi-square test
+with the covariances of the file and of the new logs distinguishes a change of the robot from chance. If the robot has
+changed, psdmc determines which few values explain the difference.
 """
 
 from __future__ import annotations
@@ -83,12 +83,13 @@ class Bin:
 
 @dataclass(frozen=True, slots=True)
 class JointError:
-    """How well the model file predicts the torque of one joint; N m (N), and also A if a torque constant is known,
-    else NaN.
+    """How well a model file predicts the torque of one joint in new logs. Torques are in N m (N), and also in A if a
+    torque constant is known; else the values in A are NaN.
 
-    refitted_r2        R^2 of a fit of the same columns to these logs, on their last 30 %: what a new calibration could reach
-    forward, backward  mean error in either direction
-    by_speed, by_time  errors against signed speed (rad/s, m/s), and against time since a log's start (s)
+    refitted_r2        R^2 that a new calibration could reach: calibrated values are fitted to these logs, R^2 is that
+                       of the last 30 %
+    forward, backward  mean error in either direction of motion
+    by_speed, by_time  errors by signed speed (rad/s, m/s), and by time since a log's start (s)
     """
 
     joint: str
@@ -109,14 +110,18 @@ class JointError:
 class Validation:
     """The result of `validate`: whether a calibrated model is still valid, with all figures.
 
-    reasons        why the logs are not usable; empty if they are
-    doubts         what a user should know before relying on the verdict
-    named          the few changes that explain the logs, the most certain first; load: the one that does
-    changes        of every value, each by itself
-    chi2, freedom  of all changes, and of what the explanation leaves (left)
-    chance         probability of such changes if the robot is unchanged
-    logs, r2_by_log   names and lengths; R^2 by log and joint
-    quality        samples to plot, which JSON does not hold
+    word             the verdict: "still valid", "drifted", "changed load" or "log not usable"
+    reasons          why the logs are not usable; empty if they are
+    doubts           what a user should know before relying on the verdict
+    load             change of the load at the tip that explains the logs; None: no load does
+    named            the few changed values that explain the logs, the most certain first
+    joints           errors of the predicted torque by joint
+    changes          change of every calibrated value
+    chi2, freedom    chi-square and degrees of freedom of all changes
+    left             chi-square after subtraction of `load` and `named`
+    chance           probability of such changes if the robot is unchanged
+    logs, r2_by_log  names and lengths of the logs; R^2 by log and joint
+    quality          samples to plot, which JSON does not hold
     """
 
     robot: str
@@ -207,7 +212,10 @@ def validate(
 def opened_logs(
     found: Delivered, given: str | Path | Sequence[str | Path], naming: LogNaming, progress: Progress
 ) -> tuple[list[AnyLog], Mapping[str, float]]:
-    """Return the logs, and the torque constants of their log description."""
+    """Return the logs of the given paths, and the torque constants (N m/A by joint name) of their log description.
+
+    A path is a log, a log description, or a campaign folder, of which the exciting motions without a load are used.
+    """
     names = found.model.joint_names
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]
     campaign = campaign_of(paths)

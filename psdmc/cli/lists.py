@@ -44,8 +44,10 @@ def assignments(given: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def with_numbers_joined(words: Sequence[str]) -> list[str]:
-    """Return the command line with the numbers of some options joined: `--gravity 0 0 -9.81` becomes `--gravity
-    0,0,-9.81`."""
+    """Return the command line with the numbers after some options joined by commas.
+
+    For example, `--gravity 0 0 -9.81` becomes `--gravity 0,0,-9.81`.
+    """
     joined: list[str] = []
     rest = list(words)
     while rest:

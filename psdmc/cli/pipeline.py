@@ -170,7 +170,7 @@ def derive(
 
 
 def xacro_arguments(words: list[str] | None, options: list[str] | None) -> dict[str, str]:
-    """Return the xacro arguments by name, from the words after the robot's file and from --xacro-arg."""
+    """Return the values of xacro arguments by name, from the words after the robot's file and from --xacro-arg."""
     from psdmc.robot.xacro_file import parsed_arguments
 
     return parsed_arguments([*(words or ()), *(options or ())])

@@ -75,7 +75,7 @@ def in_words(seconds: float) -> str:
 
 
 class Lines:
-    """Progress without a terminal: print one line for each stage that takes long, and none in the first PATIENCE
+    """Shows the progress of a command without a terminal: one line for each long stage, none in the first PATIENCE
     seconds."""
 
     def __init__(self, say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
@@ -89,7 +89,7 @@ class Lines:
             self._estimate.tell(step)
 
     def look(self) -> None:
-        """Print the current stage if it has not been printed yet and the last line is PATIENCE seconds old."""
+        """Print the current stage of the command if it has not been printed yet, at most one line per PATIENCE seconds."""
         with self._lock:
             now, at = self._clock(), self._estimate
             if now - self._last < PATIENCE or at.stage == self._told:

@@ -65,8 +65,12 @@ def _sizes(found: Summary) -> list[str]:
 
 
 def joint_errors(robot: Mechanism, certificate: Sequence[float]) -> list[float | None]:
-    """Return, for each joint, the largest error in the certificate (nv,); None for a joint that has no rate, such as a
-    mimic joint."""
+    """Return, for each joint, its largest torque error in the model's certificate (nv,), which has one error per joint
+    rate.
+
+    The certificate compares the model's torques with those of the Newton-Euler algorithm. The result is None for a
+    joint that has no rate, such as a mimic joint.
+    """
     of_joint = [
         [error for k, error in zip(robot.rate_joints, certificate, strict=True) if k == i]
         for i in range(len(robot))
@@ -145,7 +149,7 @@ def position_range(lower: float, upper: float, unit: str) -> str:
 
 
 def followed(found: Mechanism, i: int) -> str:
-    """Describe on what a joint's position depends: "its own" coordinate, another joint's, or a fixed number."""
+    """Describe on what the position of joint i depends: on its own coordinate, on another joint, or on a fixed number."""
     coordinate = found.coordinates[i]
     if coordinate.leader is None:
         return f"{coordinate.offset:g}"
@@ -174,8 +178,11 @@ COSTS = ("mul", "add", "total", "div", "sincos", "fused")
 def cost_rows(
     model: DynamicsModel, lowerings: Sequence[Lowering]
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Return the operations of each function by lowering, for one state and per SIMD lane; and what is left out, with
-    the reason."""
+    """Return the number of operations of each function for each lowering, that is, each way to generate the arithmetic.
+
+    Counts are for one state, and per state in SIMD code. The second result has the functions that are left out, with
+    the reason.
+    """
     rows = []
     functions, notes = admitted(model)
     for lowering in lowerings:

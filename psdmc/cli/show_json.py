@@ -80,7 +80,8 @@ def mechanism_json(robot: Mechanism) -> dict[str, Any]:
 
 
 def terms_json(model: DynamicsModel) -> dict[str, Any]:
-    """Return the monomials y of the model, in the order of the columns of E."""
+    """Return the products of joint variables (monomials y) in a model's torques, as texts, in the order of matrix E's
+    columns."""
     return {"terms": list(term_texts(model))}
 
 

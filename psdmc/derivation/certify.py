@@ -1,5 +1,8 @@
-"""The certificate of a finished model: its torques are compared with recursive Newton-Euler, at random states that the
-derivation did not use."""
+"""Computes the certificate of a finished model: the largest relative error of each joint torque at random states.
+
+The errors are differences between the model's torques and those of the recursive Newton-Euler algorithm. The derivation
+did not use these states.
+"""
 
 from __future__ import annotations
 
@@ -52,15 +55,16 @@ PROMISED = 1e-11
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """A model's torque errors at random states, relative to each joint's largest torque, and the data to judge them.
+    """Torque errors of a model at random states, relative to each joint's largest torque, and the data to judge them.
 
-    model       the model whose errors these are
-    x           (11 n,) standard parameters that were used
+    model       the model
+    x           (11 n,) standard parameters of the n links (masses, first moments, inertias, drive inertias)
     states      q, qd, qdd
-    reference   (states, n) torques by Newton-Euler
-    errors      (n,) of the torques that the model computes, from E and P if it has them
-    plain       (n,) of torques from its base parameters alone; zero if they were not computed
-    last_digit  (n,) change by the last digit of the robot's own numbers; zero if below DOUBTFUL for all joints
+    reference   (states, n) torques by the Newton-Euler algorithm
+    errors      (n,) of the torques that the model computes, from E and P (exponents and coefficients) if it has them
+    plain       (n,) of torques computed from the regressor and base parameters alone; zero if they were not computed
+    last_digit  (n,) relative torque change if the last digits of the robot's numbers change; zero if below DOUBTFUL for
+                all joints
     """
 
     model: DynamicsModel
@@ -73,17 +77,17 @@ class Measured:
 
 
 def certificate(model: DynamicsModel) -> Array:
-    """Compute the certificate of a model: for each joint, the largest torque error divided by the joint's largest
-    torque, (n,).
+    """Return the certificate (n,) of a model: for each joint, the largest torque error divided by its largest torque.
 
-    The model's own parameters are used if they are known, else random ones from the parameter span. Raises
-    DerivationError or InternalError as `judged` does.
+    The error is the difference from the Newton-Euler algorithm at random states. If the robot's masses and inertias are
+    unknown, random values take their place. Raises DerivationError or InternalError if an error is too large.
     """
     return judged(measured(model))
 
 
 def measured(model: DynamicsModel) -> Measured:
-    """Compare the model's torques with Newton-Euler's at SAMPLES random states, and return the errors."""
+    """Compare the model's torques with those of the Newton-Euler algorithm at SAMPLES random states, and return the
+    errors."""
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
     chain, none = model.mechanism, np.zeros(model.nv)
@@ -102,11 +106,12 @@ def measured(model: DynamicsModel) -> Measured:
 
 
 def judged(found: Measured) -> Array:
-    """Return the certificate (n,) if the measured errors are small enough; otherwise raise an error.
+    """Return the certificate (n,), the largest relative torque error of each joint, or raise an error if one is too
+    large.
 
-    If an error exceeds WORST_ALLOWED, this is a DerivationError if the robot's own numbers are the cause (they
-    overflow, or a joint's torque is a small difference of large contributions), else an InternalError. Raises
-    DerivationError also if a robot that is sensitive to the last digits of its numbers exceeds PROMISED.
+    An error above WORST_ALLOWED raises DerivationError if the robot's own numbers are the cause, else InternalError.
+    Such numbers overflow, or make a joint's torque a small difference of large contributions. If the torques are
+    sensitive to the last digits of the robot's numbers, an error above PROMISED also raises DerivationError.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         worst = np.maximum(found.errors, found.plain)
@@ -222,11 +227,11 @@ linear in it."""
 
 
 class Numbers(NamedTuple):
-    """All numbers of a robot, in one floating-point precision.
+    """All numbers that describe a robot's geometry and masses, in one floating-point precision.
 
-    places, link_frames   n rotations (3, 3) and translations (3,) each, m: joint frames in their parents', and link
-                          frames in joint frames
-    parameters            (n, 11)
+    places       n pairs of rotation (3, 3) and translation (3,), m: joint frames in the frames of their parents
+    link_frames  n such pairs: link frames in joint frames
+    parameters   (n, 11) standard parameters of each link: mass, first moments, inertia, drive inertia
     """
 
     places: Sequence[tuple[Long, Long]]

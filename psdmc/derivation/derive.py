@@ -1,4 +1,4 @@
-"""The derivation of a MODEL (inverse dynamics as data) from a robot: all steps in their order."""
+"""Derives the dynamics model of a robot, that is, its inverse dynamics as matrices, in all steps."""
 
 from __future__ import annotations
 
@@ -59,17 +59,19 @@ def derive_model(
     provenance: Mapping[str, Any] | None = None,
     memory: int | None = None,
 ) -> DynamicsModel:
-    """Derive the robot's dynamics as E, P and theta_b, and certify them.
+    """Derive the robot's dynamics model: exponents E and coefficients P of the torques, and base parameters theta_b.
 
-    expand      False: without E and P, that is, base parameters alone, for robots of any size. None: the same for trees and
-                for joints of several coordinates
-    progress    called with the name of each step as it begins
+    The model is certified, that is, its torques are compared with those of the Newton-Euler algorithm.
+
+    expand      False: leave out E and P, for robots of any size. None: leave them out for trees, for robots with mimic
+                joints, and for joints of several coordinates
+    progress    function that is called with the name of each step as the step begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
-    memory      bytes that the expansion may take; default: most of the machine's free memory
+    memory      bytes that the computation of E and P may take; default: most of the machine's free memory
 
-    Raises InputError if a joint has no coordinate of its own. Raises DerivationError if the expansion would take too
-    much memory or time, if the robot has more joints than LARGEST_CHAIN, if its numbers exceed double precision, or if
-    no parameter has any effect.
+    Raises InputError if a joint has no coordinate of its own. Raises DerivationError if E and P would take too much
+    memory or time, or if the robot has more joints than LARGEST_CHAIN. Raises DerivationError also if numbers of the
+    robot exceed double precision, or if no parameter has any effect.
     """
     tell = progress or silent
     require_derivable(chain)
@@ -157,8 +159,12 @@ def _equation_noise(reduction: Reduction) -> float:
 
 
 def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
-    """Return the matrix B (l, 11 n) in SI units, which computes base parameters from standard parameters. Only the
-    leading rows of the span have columns that are not zero."""
+    """Return the matrix B (l, 11 n) in SI units, which computes l base parameters from the standard parameters of n
+    links.
+
+    Base parameters are the combinations of standard parameters that torques depend on. A column of B is zero if the
+    model's assumptions make its standard parameter zero or a combination of others.
+    """
     units = parameter_units(robot.types, robot.unit)[robot.leads]
     echelon = reduction.echelon * units[reduction.pivots][:, None] / units
     B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.types)))
@@ -168,7 +174,10 @@ def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
 
 
 def base_parameters(B: Array, chain: Mechanism) -> Array | None:
-    """Compute theta_b = B x. The result is None if theta_b depends on a parameter that is unknown."""
+    """Compute the base parameters theta_b = B x (l,) from the standard parameters x (11 n,) of the n links of `chain`.
+
+    The result is None if theta_b depends on a parameter that is unknown.
+    """
     x = chain.parameters.reshape(-1)
     unknown = np.isnan(x)
     if B[:, unknown].any():

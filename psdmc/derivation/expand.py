@@ -45,10 +45,11 @@ VALUE_NOISE = 1e-14
 
 
 class Precision(NamedTuple):
-    """The rounding errors that the expansion assumes, with lengths in the robot's unit.
+    """Rounding errors that the computation of the torque coefficients assumes, with lengths in the robot's unit.
 
-    zero   the largest coefficient that counts as an exact zero
-    noise  uncertainty of a coefficient of size one, relative for larger ones
+    zero   a coefficient with at most this magnitude counts as an exact zero
+    noise  uncertainty of a coefficient of size one; the uncertainty of larger coefficients is proportional to their
+           size
     """
 
     zero: float
@@ -68,8 +69,10 @@ Some coefficients of 1e-18 that are rounding are kept: they add monomials, but c
 def expand(
     scaled: Scaled, reduction: Reduction, precision: Precision, progress: Progress, memory: int | None = None
 ) -> Expansion:
-    """Compute E and P. Raises DerivationError if they do not fit into `memory` bytes (default: most of the free
-    memory)."""
+    """Compute the inverse dynamics as exponents E of products of joint variables, and their coefficients P.
+
+    Raises DerivationError if E and P do not fit into `memory` bytes (default: most of the free memory).
+    """
     types = scaled.types
     if precision is not IN_DOUBLE:
         scaled = extended(scaled)
@@ -97,7 +100,10 @@ def expand(
 
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
-    """Return the precision that a robot needs. Double is enough if every coefficient is either rounding or far larger."""
+    """Return the floating-point precision with which the torque coefficients of a robot must be computed.
+
+    Double precision is enough if no base parameter is nearly dependent on others, and no angle or length is tiny.
+    """
     if is_of_many_scales(scaled) and can_be_finest():
         return FINEST
     return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
@@ -126,11 +132,14 @@ def assembled(
     unit: float,
     value_noise: float = VALUE_NOISE,
 ) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
-    """Return E and P in SI units from torque terms (monomial: key, column: base parameter) in the robot's unit of
-    length.
+    """Return the exponents E and coefficients P in SI units from torque terms whose lengths are in the robot's unit.
+
+    Each term has a product of joint variables (monomial, numbered by its key), a base parameter (column) and a factor.
 
     units        (l,) one unit of each base parameter in SI
-    value_noise  uncertainty of a coefficient of size one, relative for larger ones
+    unit         m, the robot's unit of length
+    value_noise  uncertainty of a coefficient of size one; the uncertainty of larger coefficients is proportional to
+                 their size
     """
     keys, place = np.unique(terms.monomial, return_inverse=True)
     exponents = monomials.exponents(keys)
@@ -157,10 +166,12 @@ def gravity_terms(
     monomials: Monomials,
     tolerance: float,
 ) -> Terms:
-    """Compute the gravity torques' terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
+    """Return the terms of the gravity torques, for gravity of strength one and each standard parameter of the links.
 
     The potential of a unit mass at r in a link's frame is direction . r + height. Both are computed outward from joint
-    to joint. The height is the coefficient of a link's mass, and the direction that of its first moments mx, my, mz.
+    to joint. The height is the coefficient of the link's mass, the direction that of its first moments mx, my, mz.
+
+    up  unit vector against gravity in the base frame
     """
     parts: list[Terms] = []
     at_base: tuple[Vector, Array] = (

@@ -1,7 +1,8 @@
-"""A robot's geometry in extended precision, with rotations that are orthonormal to all digits of this precision.
+"""Computes a robot's geometry in extended precision, with rotations that are orthonormal to all digits.
 
-The rotations in a file are orthonormal to 1e-16 only. Terms that should cancel then leave a remainder of relative size
-1e-16. The effect of axes that are 1e-8 rad from parallel has the same size and would be hidden.
+The rotations in a file are orthonormal to 1e-16 only. Torque terms that should cancel then leave a remainder of
+relative size 1e-16. This remainder would hide the effect of a small angle, such as 1e-8 rad between two nearly parallel
+axes.
 """
 
 from __future__ import annotations
@@ -91,11 +92,10 @@ def has_small_entries(robot: Scaled) -> bool:
 
 
 def is_of_many_scales(robot: Scaled) -> bool:
-    """Whether some joint only moves lengths that are tiny compared with the robot, such as a finger of millimetres on
-    an arm of metres.
+    """Return whether some joint moves only lengths that are tiny compared with the robot, but not all zero.
 
-    All lengths after this joint must be small, but not all zero. True also if all lengths are small compared with the
-    motion of sliding joints.
+    An example is a finger of millimetres on an arm of metres. The result is also true if all lengths are tiny compared
+    with the motion of sliding joints.
     """
     if robot.unit < MANY_SCALES and any(joint.length_order for joint in robot.types):
         return True

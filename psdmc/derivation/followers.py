@@ -1,13 +1,12 @@
-"""Base parameters of robots with mimic joints (followers), which have fewer of them than the same robot without
-mimicry.
+"""Finds the base parameters of robots with mimic joints, whose positions follow that of a leader.
 
-All torques of the robot without mimicry depend on its base parameters alone. A mimic joint's torque is added to its
-leader's, so some of these parameters then appear only in sums: two fingers that close together show the sum of their
-masses. Which parameters stay separate is found from sampled rows of the regressor, one column per parameter.
+Without mimicry, the robot has more base parameters. The torque of a mimic joint is added to its leader's, so some of
+these parameters then appear only in sums. For example, two fingers that close together show the sum of their masses.
+The parameters that stay separate are found from sampled rows of the regressor, one column per parameter.
 
-Rows are doubles if the robot is of one scale and no column is nearly dependent. Otherwise, they are in extended
-precision, each coordinate's rows relative to its own torque. All columns are then eliminated together, the largest
-first: the rest of a column after elimination is its own rounding, which can hide an effect of 1e-14.
+Rows are doubles if no lengths are tiny compared with others and no column is nearly dependent. Otherwise, they are in
+extended precision, each coordinate's rows relative to its own torque. All columns are then eliminated together, the
+largest first. What remains of a column after elimination is rounding, which can hide an effect of 1e-14.
 """
 
 from __future__ import annotations
@@ -34,7 +33,10 @@ STATES = 32
 
 
 def reduction_for(scaled: Scaled) -> Reduction:
-    """Return the base parameters within the span's columns, for robots with and without mimic joints."""
+    """Return the base parameters of a robot, with or without mimic joints, as combinations of its remaining parameters.
+
+    These are the standard parameters that the model's assumptions leave (the columns of `scaled.span`).
+    """
     return _of_followers(scaled) if any_follows(scaled.frames) else reduction_of(scaled)
 
 
@@ -82,8 +84,8 @@ SAMPLED_JOINTS = 10
 def reduction_of(scaled: Scaled) -> Reduction:
     """Return the base parameters of a robot without mimic joints.
 
-    They are found from sampled rows of doubles for short robots whose joints have one coordinate each, if the robot is
-    of one scale, the squares of its angles and lengths are larger than rounding, and no column is nearly dependent.
+    They are found from sampled rows of the regressor in double precision if the robot has few joints, of one coordinate
+    each. Its lengths and angles must also satisfy `is_plain`, and no column may be nearly dependent on others.
     Otherwise, they are found link by link in extended precision.
     """
     if (
@@ -98,20 +100,29 @@ def reduction_of(scaled: Scaled) -> Reduction:
 
 
 def is_plain(scaled: Scaled) -> bool:
-    """Whether the robot is of one scale, and no angle or length is so small that its square is lost in rounding."""
+    """Return whether the squares of all angles and lengths of the robot are larger than rounding.
+
+    The result is also false if some joint moves only lengths that are tiny compared with the robot.
+    """
     return not is_of_many_scales(scaled) and not has_small_entries(scaled)
 
 
 def sampled_reduction(scaled: Scaled) -> Reduction:
-    """Return the base parameters, found from samples of the regressor in double precision, within the span's columns."""
+    """Return the base parameters of a robot, from the regressor at random states in double precision.
+
+    They are combinations of the standard parameters that the model's assumptions leave (the columns of `scaled.span`).
+    """
     n = len(scaled.types)
     rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
     return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
-    """(count, nv, 11 n) the regressor at random states, with gravity of strength one. Lengths are in the robot's unit,
-    and the floating-point precision is that of `scaled.up`."""
+    """Return the regressor (count, nv, 11 n) at random states: torques of nv coordinates per standard parameter of n
+    links.
+
+    Gravity has strength one, lengths are in the robot's unit, and the floating-point precision is that of `scaled.up`.
+    """
     n, nv = len(scaled.types), first_rates(scaled.frames)[-1]
     rng, real = np.random.default_rng(SEED), np.asarray(scaled.up).dtype
     drawn, qd, qdd = (

@@ -1,8 +1,9 @@
-"""Derivation of E, P and B from a user's own torque function, by sampling alone: the general method of PSDM-2021.
+"""Derives the matrices E, P and B of a model from a user's own torque function by sampling, as PSDM-2021 does.
 
-The function's torques must be the inverse dynamics of a serial chain, linear in its parameters: gravity of first order
-in every joint, acceleration and velocity terms of second. Each term is sampled on the tensor grid of all joints and
-interpolated axis by axis. The cost grows as 5^n, so the method suits robots of a few joints.
+The function's torques must be the inverse dynamics of a serial chain, linear in its parameters. The gravity terms are
+of first degree in every joint's sine and cosine (or position), the others of second. Each term is sampled on a grid
+with several positions of every joint, and interpolated joint by joint. The cost grows as 5^n with the number of joints
+n, so the method suits robots of a few joints.
 """
 
 from __future__ import annotations
@@ -37,14 +38,16 @@ PROBES = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledModel:
-    """A torque function as monomials times constants: tau[i] = y(state) @ P[i] @ B @ X.
+    """A user's torque function in the form tau[i] = y(q, qd, qdd) @ P[i] @ B @ X, with parameters X (k,).
 
-    E            (5n, p) uint8   as in DynamicsModel; monomials without rates contain gravity_scale
-    P            n x (p, l)      reduction matrices
-    B            (l, k)          base parameters from the function's own parameters
-    parameters   k               their names
-    pivots       (l,)            index of the first parameter of each base parameter, which has the factor one
-    certificate  (n,)            largest error against the function at random states, relative to the joint's largest torque
+    The monomials y (p,) are products of joint variables.
+
+    E            (5n, p) uint8, exponents of the monomials; monomials without rates also contain gravity_scale
+    P            n matrices (p, l), coefficients of the monomials for each base parameter
+    B            (l, k) base parameters from the function's parameters X
+    parameters   k names of the parameters
+    pivots       (l,) for each base parameter, the first parameter in its combination, which has the factor one
+    certificate  (n,) largest error of the torques at random states, relative to the joint's largest torque
     """
 
     E: NDArray[np.uint8]
@@ -73,17 +76,19 @@ def derive_from_callable(
     length: float = 1.0,
     memory: int | None = None,
 ) -> SampledModel:
-    """E, P and B of tau = f(q, qd, qdd, X, gravity_scale).
+    """Derive exponents E, coefficients P and base parameters B X of a torque function tau = f(q, qd, qdd, X,
+    gravity_scale).
 
-    f                takes q, qd, qdd (n,), parameters X (k,), in which it is linear, and gravity_scale, which multiplies
-                     gravity, 1 being its full strength; returns (n,). With `vectorised`, states (m, n) to torques (m, n)
-    kinds            of the n joints, base to tip: "revolute" or "prismatic"
-    parameter_names  k, in the order of X, which is also the order in which pivots are chosen
+    f                function of q, qd, qdd (n,), parameters X (k,), in which it is linear, and gravity_scale, by which
+                     it multiplies gravity; returns torques (n,). With `vectorised`, q, qd, qdd and the torques are (m,
+                     n) for m states
+    kinds            "revolute" or "prismatic" for each of n joints, base to tip
+    parameter_names  k names, in the order of X. Earlier parameters are preferred as the leading ones of base parameters
     length           m, the robot's size: prismatic joints are sampled at -length, 0 and length
-    memory           bytes that the grids may take; default: most of what the machine has free
+    memory           bytes that the samples may take; default: most of the machine's free memory
 
     Raises InputError if f returns another shape or is not the inverse dynamics of a serial chain. Raises
-    DerivationError if the grids exceed the memory.
+    DerivationError if the samples exceed the memory.
     """
     unknown = [kind for kind in kinds if kind not in JOINT_TYPES]
     if unknown:
@@ -118,7 +123,7 @@ class _Sampler:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.monomials.n)
 
     def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float) -> Array:
-        """(m, n) torques of the user's function at (m, n) states, whether or not the function is vectorised."""
+        """Return the torques (m, n) of the user's function at m states q, qd, qdd (m, n)."""
         if self.vectorised:
             values = np.asarray(self.f(q, qd, qdd, X, gravity_scale), dtype=np.float64)
         else:
@@ -132,7 +137,11 @@ class _Sampler:
         return values
 
     def per_parameter(self, qd: Array, qdd: Array, gravity_scale: float) -> Array:
-        """Sample the torques on the grid at fixed rates, for each parameter alone: (parameters, n, cells)."""
+        """Return the torques (parameters, n, cells) of n joints for each parameter alone, at all sampled positions
+        (cells).
+
+        qd, qdd  (n,) speeds and accelerations, which are equal at all positions
+        """
         q = self.grid()
         speeds, accelerations = np.broadcast_to(qd, q.shape), np.broadcast_to(qdd, q.shape)
         return np.stack(
@@ -143,7 +152,12 @@ class _Sampler:
         )
 
     def terms(self, values: Array, rate: int) -> Terms:
-        """Return the torque terms that give these values on the grid, for each parameter."""
+        """Return the products of joint variables and their coefficients that interpolate given torques at the sampled
+        positions.
+
+        values  (parameters, n, cells) torques for each parameter alone
+        rate    number of the product of joint rates that these torques contain (monomials.py)
+        """
         types = self.monomials.types
         joints, sizes = range(len(types)), quadratic_sizes(types)
         batch = values.reshape(-1, values.shape[-1])

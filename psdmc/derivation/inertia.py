@@ -1,9 +1,9 @@
-"""Coefficients of the mass matrix as polynomials in the joint variables, for each standard parameter separately.
+"""Computes the mass matrix as polynomials in the joint variables, for each standard parameter of the links separately.
 
-The part of M_ij that one parameter of link k contributes (i, then j, on the path from the base to that link) is a
-bilinear form in the twists that the two joints give to that link's frame. Joint i's twist is a polynomial of degree one
-in the q of each joint after i on the path. The product has degree one in the q of joints up to j, because joint j's
-twist does not depend on them, and degree two in the q of joints after j. Only the latter need a grid.
+The part of M_ij that one parameter of link k contributes is bilinear in two twists of that link's frame. They are the
+twists for unit rates of joints i and j, both on the path from the base to link k, i before j. The twist by joint i is a
+polynomial of degree one in q (or sin q, cos q) of each joint after i. The product has degree one in the variables of
+joints up to j, and degree two in those of joints after j. Only the latter must be sampled on a grid.
 """
 
 from __future__ import annotations
@@ -39,8 +39,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FormalAngle:
-    """An angle that is given by values for its sine and cosine at several formal points. These values need not be those
-    of a real angle. The algorithms of psdmc.dynamics use it as a scalar."""
+    """An angle given by arrays of values for its sine and cosine, which need not be those of a real angle.
+
+    The algorithms of psdmc.dynamics use it as a scalar. From such values, coefficients of polynomials in the sine and
+    cosine are exact differences (see `formal_coordinate`).
+    """
 
     sine: Array
     cosine: Array
@@ -58,25 +61,28 @@ class Moving(NamedTuple):
 
 
 def moving(frame: Frame) -> Moving:
-    """Return a joint with its state at the formal points of its coordinate, one point for each factor of degree one."""
+    """Return a joint with its rotation and offset at the values of its coordinate that `formal_coordinate` returns."""
     q = formal_coordinate(frame.joint.basis)
     state = JointState(joint_angle(frame, q).turn(), joint_offset(frame, q))
     return Moving(frame.joint.basis, frame, state)
 
 
 def formal_coordinate(basis: Basis) -> Scalar:
-    """Return a coordinate at several formal points, one for each factor of degree one (such as 1, sin q, cos q).
+    """Return values of a joint coordinate from which coefficients of degree-one polynomials are exact differences.
 
-    At the first point all factors except the constant are zero. At each other point, exactly one of them is one.
-    Differences of values at these points are then exact coefficients.
+    The polynomial is a sum of the factors 1, sin q and cos q, or 1 and q. At the first value, all factors except 1 are
+    zero. At each other value, one further factor is one. No real angle has sine and cosine zero.
     """
     q, sine, cosine = np.array(basis.exponents[: basis.linear], dtype=np.float64).T
     return FormalAngle(sine, cosine) if basis.has_sincos else q
 
 
 def coefficients(at_points: Scalar, count: int, basis: Basis) -> Array:
-    """Compute coefficients of degree one from values at the formal points; the axis of the new joint is the last one.
-    Shape (count * linear,)."""
+    """Return the coefficients (count * linear,) of `count` polynomials of degree one in one joint's variables.
+
+    at_points  their values at the `linear` coordinates that `formal_coordinate` returns
+    basis      the factors of the joint, such as 1, sin q, cos q
+    """
     found = np.asarray(at_points)
     values = np.broadcast_to(
         np.asarray(found, dtype=np.result_type(found, np.float64)), (count, basis.linear)
@@ -85,18 +91,27 @@ def coefficients(at_points: Scalar, count: int, basis: Basis) -> Array:
 
 
 def column(v: Vector) -> Vector:
-    """Return coefficient vectors with a further axis for the next joint."""
+    """Return a vector's three arrays of coefficients (count,) as (count, 1), so that values of the next joint can vary
+    along the new axis."""
     return (v[0][:, None], v[1][:, None], v[2][:, None])
 
 
 def expanded(v: Vector, count: int, basis: Basis) -> Vector:
-    """Return the coefficients of a vector's three entries in the joint's basis, from the entries at the formal points."""
+    """Return a vector's entries as coefficients of polynomials in one joint's variables, from values of the entries.
+
+    v      three entries, each with values at the coordinates that `formal_coordinate` returns
+    count  number of polynomials per entry
+    basis  the factors of the joint, such as 1, sin q, cos q
+    """
     x, y, z = (coefficients(entry, count, basis) for entry in v)
     return (x, y, z)
 
 
 def carried_twist(joint: Moving, twist: Twist) -> Twist:
-    """Return the coefficients of a twist in the frame of the next joint."""
+    """Return a twist (linear and angular velocity) in the frame of the next joint, as coefficients of polynomials.
+
+    The polynomials are in the variables of all joints so far, including this joint.
+    """
     linear, angular = twist
     moved = carried(joint.frame, joint.state, (column(linear), column(angular)))
     count = len(linear[0])
@@ -110,10 +125,11 @@ def _as_arrays(v: Vector) -> Vector:
 def mass_matrix_terms(
     frames: Sequence[Frame], link_frames: Sequence[Placed], monomials: Monomials, tolerance: float
 ) -> dict[tuple[int, int], Terms]:
-    """Compute the terms of M_ij, for i on the path to j, in codes and standard parameters (11 per link); `row` is the
-    link. Other entries with i < j are zero.
+    """Compute the polynomials of the mass matrix entries M_ij, for joints i on the path from the base to joint j.
 
-    Lengths are in a unit near the robot's size. Coefficients below the absolute `tolerance` are zero.
+    Each term has a product of joint functions (monomial, numbered by a code) and a factor for a standard parameter, 11
+    per link. Other entries with i < j are zero. Lengths are in a unit near the robot's size. Coefficients with a
+    magnitude below `tolerance` are zero.
     """
     paths = [path_to(frames, k) for k in range(len(frames))]
     pairs = sorted((i, j) for j, path in enumerate(paths) for i in path)
@@ -173,10 +189,11 @@ def _interpolated(products: Array, inner: Sequence[JointType]) -> Array:
 
 
 def mass_features(first: Array, second: Array) -> Array:
-    """(10, ...): for each standard parameter of a body, its factor in the entry of the mass matrix that belongs to two
-    twists.
+    """Return the factor (10, ...) of each of a body's standard parameters in the mass matrix entry of two twists.
 
-    first, second   (6, ...) linear velocity of the frame's origin and angular velocity; broadcast
+    The standard parameters are mass, first moments and inertia.
+
+    first, second  (6, ...) linear velocity of the frame's origin, and angular velocity, for unit rates of two joints
     """
     v, w = first[:3], first[3:]
     u, o = second[:3], second[3:]

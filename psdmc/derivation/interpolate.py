@@ -1,9 +1,10 @@
-"""Products of polynomials in the joint variables: evaluated on a tensor grid, multiplied, interpolated axis by axis.
+"""Multiplies polynomials in joint variables: evaluates them on a grid of positions, multiplies, and interpolates.
 
-Each joint type has a basis (robot/joints/basis.py). It contains the factors of polynomials of degree one, such as {1,
-s, c} or {1, q}, and those of their products, such as {1, s, c, s c, c^2} or {1, q, q^2}, with s = sin q and c = cos q.
-The search space is the tensor product over the joints. PSDM-2021 solves one dense system for the coefficients. Here
-this system is a Kronecker product, so one small inverse along each axis is enough.
+Each joint type has functions that occur in torques, its basis (robot/joints/basis.py). They are the factors of
+polynomials of degree one, {1, s, c} or {1, q} with s = sin q and c = cos q. For degree two, they are {1, s, c, s c,
+c^2} or {1, q, q^2}. A polynomial in several joints has one coefficient for each choice of one function per joint.
+PSDM-2021 solves one dense system for all coefficients. Here this system is a Kronecker product, so one small inverse
+for each joint is enough.
 """
 
 from __future__ import annotations
@@ -27,22 +28,25 @@ LAST_DIGIT = 5e-16
 
 
 def linear_sizes(joints: Iterable[JointType]) -> list[int]:
-    """For each joint, the number of basis factors for polynomials of degree one."""
+    """Return, for each joint, the number of functions in polynomials of degree one: 3 (1, sin q, cos q) or 2 (1, q)."""
     return [joint.basis.linear for joint in joints]
 
 
 def quadratic_sizes(joints: Iterable[JointType]) -> list[int]:
-    """For each joint, the number of basis factors for polynomials of degree two."""
+    """Return, for each joint, the number of functions in polynomials of degree two, such as 3 for 1, q, q^2."""
     return [joint.basis.size for joint in joints]
 
 
 def nodes(joint: JointType) -> Array:
-    """The values of q at which products are sampled, for a joint with this basis."""
+    """Return the values of q at which polynomials in this joint's variable are sampled."""
     return np.array(joint.basis.nodes)
 
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
-    """Evaluate the factors of degree two of a joint's basis at each q: (len(q), size)."""
+    """Return (len(q), size) the values at each position q of the `size` functions in a joint's degree-two polynomials.
+
+    An example is 1, q, q^2.
+    """
     rows = (q, sine(q), cosine(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
 
@@ -57,24 +61,31 @@ def _product(powers: Sequence[int], rows: Sequence[Array]) -> Array:
 
 @cache
 def evaluation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(size, linear) matrix that computes the values at the nodes from coefficients of degree one."""
+    """Return the matrix (size, linear) that evaluates a joint's degree-one polynomials at the sampled positions.
+
+    It multiplies the `linear` coefficients and returns values at `size` positions.
+    """
     return quadratic_basis(joint, nodes(joint).astype(precision))[:, : joint.basis.linear]
 
 
 @cache
 def interpolation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(size, size) matrix that computes coefficients of degree two from the values at the nodes."""
+    """Return the matrix (size, size) that interpolates a joint's degree-two polynomials.
+
+    It multiplies values at `size` sampled positions and returns as many coefficients.
+    """
     found = inverse(quadratic_basis(joint, nodes(joint).astype(np.longdouble))).astype(precision)
     return np.where(np.abs(found) < LAST_DIGIT, 0.0, found) if precision == DOUBLE else found
 
 
 def along_axes(matrices: Sequence[Array], values: Array) -> Array:
-    """Multiply an array by one matrix along each of its axes except the last.
+    """Multiply an array by one matrix along each of its axes except the last. Zeros in the matrices are skipped.
 
-    values   (d_1 ... d_m, batch) as any shape with that many entries in that order
-    returns  (batch, e_1 ... e_m) flattened to (batch, e_1 * ... * e_m), matrices[a] being (e_a, d_a)
+    matrices  matrix a is (e_a, d_a)
+    values    (d_1 ... d_m, batch), in any shape with that many entries in that order
+    returns   (batch, e_1 ... e_m), with all axes but the first flattened
 
-    Each step takes the first axis and puts its result last. Half of the matrices' entries are zero and are skipped.
+    Each step takes the first axis of the array and puts its result last.
     """
     for matrix in matrices:
         rows = values.reshape(matrix.shape[1], -1)

@@ -1,7 +1,7 @@
-"""Base parameters found link by link in extended precision, for long chains and for axes that are nearly parallel.
+"""Finds base parameters link by link in extended precision, for long chains and for axes that are nearly parallel.
 
-They are found from rows that all torques are combinations of. dynamics/torque_rows.py computes these rows joint by
-joint, and decides there which effects are larger than rounding.
+dynamics/torque_rows.py computes regressor rows of which all torques are combinations, joint by joint. That module also
+decides which effects are larger than rounding. Here the dependent columns (parameters) of these rows are eliminated.
 """
 
 from __future__ import annotations
@@ -27,8 +27,10 @@ column of a long chain has a length of a thousand, and its rounding grows alike.
 
 
 def reduction_link_by_link(robot: Scaled) -> Reduction:
-    """Return the base parameters within the span's columns, by eliminating columns from rows that span the row space of
-    all torques."""
+    """Return the base parameters of a robot by elimination of columns from rows that span all possible torques.
+
+    A column stands for one of the standard parameters that the model's assumptions leave (see `robot.span`).
+    """
     long = extended(robot)
     rows = torque_rows(long.frames, long.link_frames, long.up)
     links = links_together(robot)[robot.leads // PARAMETERS_PER_LINK]
@@ -36,11 +38,11 @@ def reduction_link_by_link(robot: Scaled) -> Reduction:
 
 
 def links_together(robot: Scaled) -> NDArray[np.int64]:
-    """(n,) for each link, the first of the links whose columns are eliminated together with its own.
+    """Return (n,) for each link, the first of the links whose parameters are compared with the link's own.
 
-    Any effect of a link on the joints before it could also come from the link that carries it. If that carrying link
-    has all its parameters, later links add nothing there, and links are eliminated one by one. Links attached to a link
-    with fewer parameters are treated alike: one of them may have in full what another has only a small part of.
+    Any torque of a link on the joints before it can also come from the link that carries it. If that carrying link has
+    all its parameters, they replace those of the later links, and links are treated one by one. Links attached to a
+    link with fewer parameters are treated together. One of them may have in full what another has only a small part of.
     """
     parents = [frame.parent for frame in robot.frames]
     own = robot.leads[robot.leads % PARAMETERS_PER_LINK != DRIVE] // PARAMETERS_PER_LINK
@@ -53,14 +55,16 @@ def links_together(robot: Scaled) -> NDArray[np.int64]:
 
 
 def reduced_to_digits(rows: Long, links: NDArray[np.int64]) -> Reduction:
-    """Return the base parameters from rows. Columns are compared by their remaining absolute size, not relative to
-    their original size.
+    """Return the base parameters from rows whose columns stand for parameters, preferring large columns as leading
+    ones.
 
-    A small column then becomes a pivot late. If it were a pivot earlier, its torque would be a large parameter times
-    small numbers, which loses digits. All columns of a link, small or not, come before those of the next link.
-    Otherwise, a parameter of a heavy link could be combined into one of a light link farther out, whose torque would
-    then be a small difference of large numbers.
+    A leading parameter (pivot) has the factor one in its base parameter. Columns are compared by the absolute size that
+    elimination leaves, not relative to their original size. A small column as an early pivot would give a large
+    parameter times small numbers, which loses digits. All columns of a link, small or not, come before those of the
+    next link. Otherwise, a parameter of a heavy link could be combined into that of a light link farther out. The
+    torque of the light link would then be a small difference of large numbers.
 
+    rows   (m, k) torque rows
     links  (k,) the link to which each column belongs
     """
     work = np.array(rows, order="C")

@@ -40,7 +40,8 @@ HEADROOM = 0.75
 
 
 def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tuple[tuple[JointType, ...], ...]:
-    """Return the joint types on the path from the base to each leaf body. A serial chain has one such path."""
+    """Return the joint types on the path from the base to each body that carries no other body. A serial chain has one
+    path."""
     ways: list[tuple[JointType, ...]] = []
     for joint, parent in zip(types, parents, strict=True):
         ways.append((*(ways[parent] if parent != BASE else ()), joint))
@@ -48,7 +49,8 @@ def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tupl
 
 
 def refuse_uncountable(types: Sequence[JointType]) -> None:
-    """Raise DerivationError if there are too many monomials to be numbered in 64 bits."""
+    """Raise DerivationError if the torques can have more monomials (products of joint variables) than 64 bits can
+    number."""
     monomials = Monomials(tuple(types))
     if len(monomials.rate_exponents()) * monomials.codes < 2**63:
         return
@@ -59,11 +61,11 @@ def refuse_uncountable(types: Sequence[JointType]) -> None:
 
 
 def largest_monomial_count(types: Sequence[JointType]) -> int:
-    """Return the number of monomials p of a chain of these joints with axes in general position. No other chain of
-    these joints has more.
+    """Return the number of products of joint variables (monomials) in the torques of a serial chain.
 
-    M_0j has degree one in q_1 ... q_j and two in the following joints; every rate product qd_j qd_k (k >= j) has at
-    most these degrees.
+    The count is for axes in general position, with which the number is largest. The mass matrix entry M_0j has degree
+    one in the variables of joints 1 to j, and two in those of later joints. The factors of rate products qd_j qd_k (k
+    >= j) have at most these degrees.
     """
     n, linear, quadratic = len(types), linear_sizes(types), quadratic_sizes(types)
     total, gravity = 0, 1
@@ -78,7 +80,7 @@ def largest_monomial_count(types: Sequence[JointType]) -> int:
 
 
 def grid_bytes(types: Sequence[JointType]) -> int:
-    """Estimate the bytes of the largest grid on which the mass matrix is sampled."""
+    """Return the estimated number of bytes of the largest grid of joint positions on which the mass matrix is sampled."""
     size = 10 * 8 * _GRID_COPIES
     for points in quadratic_sizes(types[1:]):
         size *= points
@@ -88,8 +90,10 @@ def grid_bytes(types: Sequence[JointType]) -> int:
 def velocity_bytes(
     mass_matrix: Mapping[tuple[int, int], Terms], monomials: Monomials, carried: Sequence[Sequence[int]]
 ) -> tuple[int, int]:
-    """Count the velocity terms before equal ones are summed, and estimate their memory: (terms, bytes). `carried` is as
-    in velocity_terms."""
+    """Return the number of velocity terms in all torques before equal terms are summed, and an estimate of their bytes.
+
+    carried  for each joint, the joints that it moves
+    """
     count = 0
     for (a, b), terms in mass_matrix.items():
         slopes = sum(slope_count(terms, monomials, d) for d in carried[a])
@@ -98,7 +102,12 @@ def velocity_bytes(
 
 
 def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
-    """Raise DerivationError if the expansion needs more memory than there is. The message names p and the memory."""
+    """Raise DerivationError if the computation of E and P needs more memory than is available.
+
+    needed, available  bytes
+    monomials          number of columns of E, for the message
+    n                  number of joints, for the message
+    """
     if needed <= available:
         return
     raise DerivationError(
@@ -109,10 +118,15 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
 
 
 def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None:
-    """Raise DerivationError if an expansion of n joints would take more than about a minute.
+    """Raise DerivationError if the computation of E and P (exponents and coefficients) would take more than about a
+    minute.
 
-    That is so if it has too many velocity terms or, while their number is unknown (0), too large a grid along one of
-    the paths from the base to the robot's ends.
+    The reason is too many velocity terms. While their number is unknown (0), the size of the grid of joint positions
+    for the mass matrix is tested instead.
+
+    terms  number of velocity terms, or 0
+    ways   joint types on each path from the base to an end of the robot
+    n      number of joints, for the message
     """
     grid = max(int(np.prod(quadratic_sizes(way[1:]), dtype=float)) for way in ways)
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:

@@ -38,8 +38,10 @@ SAMPLES = 256
 
 
 def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
-    """(nv,) the largest torque change at random states, N m or N, that results from snapping, the replacement of
-    rounded angles by exact ones. None if parameters are unknown."""
+    """Return (nv,) the largest torque change at random states, N m or N, from replacing rounded angles by exact ones.
+
+    An example is 1.5708 rad, which is replaced by a right angle. The result is None if parameters are unknown.
+    """
     if np.isnan(snapped.parameters).any() or np.isnan(unsnapped.parameters).any():
         return None
     return np.asarray(np.max(np.abs(_torques(snapped) - _torques(unsnapped)), axis=1))

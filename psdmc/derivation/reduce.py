@@ -1,8 +1,7 @@
-"""Base parameters from the reduced row echelon form of the coefficients. Pivots are chosen in the parameters' own
-order.
+"""Finds base parameters by elimination: the independent columns of a robot's torques, and combinations of the others.
 
-Velocity terms are derivatives of the mass matrix. Their coefficients are combinations of the mass matrix's
-coefficients, so mass matrix and gravity alone span the row space.
+The columns stand for standard parameters, such as masses, and are tried in the order of these parameters. The
+coefficients of velocity terms are combinations of those of the mass matrix. So the mass matrix and gravity are enough.
 """
 
 from __future__ import annotations
@@ -43,11 +42,11 @@ _BLOCK_ROWS = 8192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduction:
-    """The columns that are base parameters, and the combinations of columns that they represent.
+    """The parameters that lead base parameters, and the combinations of parameters that the base parameters are.
 
-    pivots    (l,)     column indices, ascending
-    echelon   (l, k)   base parameters = echelon @ columns' parameters; a unit vector at each pivot
-    is_clear           True if no column was nearly dependent, so that double precision is enough
+    pivots    (l,) ascending indices of the leading parameters, which have the factor one
+    echelon   (l, k) matrix that computes l base parameters from k parameters; a unit vector at each leading one
+    is_clear  True: no column was nearly dependent on others, so that double precision is enough
     """
 
     pivots: NDArray[np.int64]
@@ -56,7 +55,11 @@ class Reduction:
 
 
 def row_space(blocks: Iterable[Terms], columns: int) -> Array:
-    """Return the (k, k) triangular factor R of all rows (row, monomial) of the blocks: R^T R = A^T A, by blocked QR."""
+    """Return the triangular factor R (k, k) of a tall matrix A with k columns of torque coefficients: R^T R = A^T A.
+
+    A has one row for each torque row and monomial of the blocks. It is factorized block by block, so it need not fit
+    into memory.
+    """
     factor: Array = np.zeros((0, columns))
     for block in blocks:
         for rows in _dense_rows(block, columns):
@@ -85,10 +88,10 @@ def _dense_rows(terms: Terms, columns: int) -> Iterable[Array]:
 
 
 def reduced(rows: Array) -> Reduction:
-    """Return the reduced row echelon form of rows (m, k). The next column in order becomes a pivot if its residual is
-    large enough.
+    """Return the base parameters from torque rows (m, k), the reduced row echelon form of these rows.
 
-    The column with the largest residual is not taken first, because rounding would decide between equal residuals.
+    Columns become leading ones in their order, if elimination leaves enough of them. The largest remaining column is
+    not taken first, because rounding would decide between equal columns.
     """
     work = np.array(rows, order="C")
     norms = lengths(work)

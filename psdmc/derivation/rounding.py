@@ -1,7 +1,8 @@
-"""Numbers that differ only by rounding are replaced by one number, the simplest one within the rounding error.
+"""Replaces numbers that differ only by rounding by one number, the simplest one within the rounding error.
 
-The same product of link lengths enters P in several places, with different last bits. The expanded lowering shares
-sub-expressions only if coefficients are equal. Numbers are rounded here, before certification, and nowhere else.
+The same product of link lengths enters P, the torque coefficients, in several places with different last digits. The
+generated code for expanded torques shares sub-expressions only if coefficients are equal. Numbers are rounded here,
+before the model is compared with Newton-Euler, and nowhere else.
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ the noise of larger coefficients, it would cost digits of the torque."""
 
 
 def merged(values: Array, noise: Array) -> Array:
-    """Return the numbers, with those that are equal up to `noise` made equal in magnitude. No number changes by more
-    than its noise.
+    """Return the numbers with those that differ only by rounding made equal in magnitude. Signs stay.
 
-    values, noise   (count,), noise the absolute uncertainty of each value
+    No number changes by more than its noise.
+
+    values  (count,)
+    noise   (count,) absolute uncertainty of each value
     """
     if not len(values):
         return values

@@ -14,12 +14,13 @@ Integers = NDArray[np.int64]
 
 
 class Terms(NamedTuple):
-    """Terms value * monomial * parameter as four arrays of one length.
+    """Torque terms value * monomial * parameter, as four arrays of one length. A monomial is a product of joint
+    variables.
 
-    row       joint, or the row of another quantity
-    monomial  code or key (monomials.py)
-    column    parameter
-    value
+    row       index of the joint whose torque has the term, or of the row of another quantity
+    monomial  number of the monomial: its code (functions of q) or key (with rates), see monomials.py
+    column    index of the parameter
+    value     factor
     """
 
     row: Integers
@@ -42,14 +43,16 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
-    """Return the terms that a mask or a list of indices chooses."""
+    """Return some of the torque terms, chosen by a boolean mask or by a list of indices."""
     row, monomial, column, value = terms
     return Terms(row[chosen], monomial[chosen], column[chosen], value[chosen])
 
 
 def summed(terms: Terms, tolerance: float) -> Terms:
-    """Return the terms sorted by row, monomial and column, with equal ones added. Sums within the tolerance of zero are
-    left out."""
+    """Return the terms sorted by row, monomial and column, with the values of equal positions added.
+
+    Sums whose magnitude is at most `tolerance` are left out.
+    """
     if not len(terms.value):
         return terms
     columns = int(terms.column.max()) + 1
@@ -66,7 +69,11 @@ def summed(terms: Terms, tolerance: float) -> Terms:
 
 
 def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
-    """Return the terms in other parameters: each column is replaced by its combination in `matrix` (old, new)."""
+    """Return torque terms in new parameters, of which the old parameters are linear combinations.
+
+    matrix     (old, new) factors of the new parameters in each old parameter
+    tolerance  largest magnitude of a coefficient that counts as zero
+    """
     right = sparse.csr_array(matrix)
     counts = np.diff(right.indptr)[terms.column]
     source = np.repeat(np.arange(len(counts)), counts)

@@ -1,6 +1,6 @@
-"""A unit of length near the robot's size. One absolute tolerance then means the same for every coefficient.
+"""Converts a robot to a unit of length near the robot's size, so that one tolerance fits all torque coefficients.
 
-The unit is a power of two, so converting to it and back changes no bit of any number.
+The unit is a power of two in metres, so converting to it and back changes no bit of any number.
 """
 
 from __future__ import annotations
@@ -43,8 +43,12 @@ def in_unit(placement: Placement, unit: float) -> Placement:
 
 
 def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
-    """Return the frames in another unit of length: their translations, and the ratios and offsets of mimic joints that
-    slide or follow a sliding joint."""
+    """Return the joint frames with lengths in another unit: translations, and the data of mimic joints.
+
+    These data are the ratio and offset to the leader's position, if either joint slides.
+
+    unit  m
+    """
     found = []
     for frame in frames:
         x, y, z = frame.translation
@@ -71,7 +75,13 @@ def torque_units(types: Sequence[JointType], unit: float) -> Array:
 
 
 def monomial_units(exponents: NDArray[np.uint8], types: Sequence[JointType], unit: float) -> Array:
-    """(p,) the value of one unit of each monomial of E in SI; monomials without rates contain |g|."""
+    """Return (p,) the value in SI of one unit of each monomial (product of joint variables) in the columns of E.
+
+    Monomials without rates contain the strength of gravity |g|.
+
+    exponents  (5n, p) E: exponents of the joint variables
+    unit       m, the unit of length
+    """
     n = len(types)
     orders = np.array([joint.length_order for joint in types])
     blocks = exponents.reshape(5, n, -1).astype(np.int64)
@@ -83,11 +93,15 @@ def monomial_units(exponents: NDArray[np.uint8], types: Sequence[JointType], uni
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scaled:
-    """A robot in the form that derivation uses: lengths in `unit`, parameters within their span.
+    """A robot in the form that the derivation uses: lengths in a unit near the robot's size.
 
-    span    (11 n, k)  parameters from the span's coordinates, both in the robot's unit
-    leads   (k,)       the row of the leading one in each column of the span
-    up      unit vector against gravity in the base frame; zero if there is no gravity
+    types, frames  joint types and joint frames
+    link_frames    link frames in joint frames
+    unit           m, the unit of length
+    span           (11 n, k) matrix that computes the standard parameters of n links from the k parameters that the
+                   assumptions leave
+    leads          (k,) for each column of the span, the row of its leading one
+    up             unit vector against gravity in the base frame; zero if there is no gravity
     """
 
     types: tuple[JointType, ...]
@@ -100,7 +114,7 @@ class Scaled:
 
 
 def scaled(chain: Mechanism) -> Scaled:
-    """Return the robot in a unit of length near its size, for derivation."""
+    """Return the robot in the form that the derivation uses: lengths in a unit near the size of the robot."""
     unit = length_unit(chain)
     units = parameter_units(chain.types, unit)
     leads = leading_rows(chain.parameter_span)

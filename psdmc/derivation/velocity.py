@@ -14,7 +14,10 @@ from psdmc.derivation.terms import Integers, Terms, joined, selected, summed
 
 
 def derivative(terms: Terms, monomials: Monomials, joint: int) -> Terms:
-    """Return the derivative of the terms by q of one joint; monomials are codes."""
+    """Return the derivative of mass matrix terms by the position q of one joint.
+
+    A term has a product of functions of q (numbered by its code, see monomials.py) and a factor.
+    """
     digits = monomials.digit(terms.monomial, joint)
     weight = monomials.weight(joint)
     parts: list[Terms] = []
@@ -32,9 +35,12 @@ def velocity_terms(
     carried: Sequence[Sequence[int]],
     tolerance: float,
 ) -> Terms:
-    """Return the torque terms (row the joint, monomial the key) of all products of joint rates.
+    """Return the torque terms with all products of joint rates, from the terms of the mass matrix.
 
-    carried   for each joint, the joints that it carries; its row of the mass matrix depends on no others
+    In the result, the row is the joint, and the monomial includes the rates (its key, see monomials.py).
+
+    carried    for each joint, the joints that it moves; its row of the mass matrix depends on no others
+    tolerance  largest magnitude of a coefficient that counts as zero
     """
     parts: list[Terms] = []
     for (a, b), terms in mass_matrix.items():

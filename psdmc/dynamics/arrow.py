@@ -1,12 +1,13 @@
-"""Block elimination of symmetric matrices for robots with equal limbs, such as legs, on a core, such as a trunk. The
-computation is written for one limb of each group, and holds for all of them.
+"""Eliminates symmetric matrices block by block, for robots with equal limbs (such as legs) on a core (such as a trunk).
 
-Two different limbs have no common entries in the matrix. With the rows l of a limb and c of the core,
+The operations are written for one limb of each group of equal limbs, and hold for all limbs of the group. Entries of
+the matrix that belong to two different limbs are zero. With the rows l of a limb and c of the core, the following
+matrices give the solution.
 
     Q = M_ll^-1        T = Q M_lc        V = (M_cc - sum over all limbs of M_cl T)^-1
 
-solve M x = y by x_c = V (y_c - sum T^T y_l) and x_l = Q y_l - T x_c. Nothing else is summed over limbs. The pivots are
-those of an elimination row by row from the last one up (solve.py).
+M x = y is solved by x_c = V (y_c - sum T^T y_l) and x_l = Q y_l - T x_c. Nothing else is summed over limbs. The pivots
+are those of an elimination row by row from the last one up (solve.py).
 """
 
 from __future__ import annotations
@@ -24,13 +25,14 @@ Matrix = Sequence[Sequence[Scalar]]
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """One limb of a group of equal limbs, after its rows of a symmetric matrix M were eliminated.
+    """One limb (such as a leg) of a group of equal limbs, after elimination of its rows of a symmetric matrix M.
 
-    rates     its rows
-    carriers  rows of the core that have entries in common with it
-    total     returns the sum over the group's limbs of a scalar that each limb has
-    factors   of its diagonal block
-    shares    T = M_ll^-1 M_lc, the block's inverse times its entries with the core: a row per rate, a column per carrier
+    rates     indices of the limb's joint rates, which are its rows of M
+    carriers  indices of rows of the core (the rest of the robot) that have entries in common with the limb
+    total     function that returns the sum of a scalar over the limbs of the group
+    factors   factors of the limb's diagonal block M_ll
+    shares    T = M_ll^-1 M_lc, with the limb's entries M_lc in columns of the core: a row per rate, a column per
+              carrier
     """
 
     rates: tuple[int, ...]
@@ -40,7 +42,12 @@ class Limb:
     shares: Matrix
 
     def reduced(self, right: Sequence[Scalar]) -> list[Scalar]:
-        """Return y_c - T^T y_l and Q y_l (see the module) for a right side y of this limb alone."""
+        """Eliminate the rows of one limb (such as a leg) from a right side y of M x = y, and return the result.
+
+        With the symbols of the module, rows of the core become y_c - T^T y_l, and rows of the limb become Q y_l.
+
+        right  y, whose entries in rows of other limbs are zero
+        """
         own, found = [right[k] for k in self.rates], list(right)
         for k, column in zip(self.carriers, zip(*self.shares, strict=True), strict=True):
             found[k] = found[k] - inner_product(column, own)
@@ -51,12 +58,12 @@ class Limb:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A symmetric matrix M of a robot with limbs on a core (such as legs on a trunk), after elimination.
+    """A symmetric matrix M of a robot with equal limbs (such as legs) on a core (such as a trunk), after elimination.
 
-    core     rows of the core
-    limbs    one of each group
-    factors  of the core's block minus what elimination of the limbs subtracts from it
-    pivots   of all rows
+    core     indices of the core's rows
+    limbs    one limb of each group of equal limbs
+    factors  factors of the core's block minus what elimination of the limbs subtracts from it
+    pivots   pivots of all rows
     """
 
     core: tuple[int, ...]
@@ -67,7 +74,10 @@ class Arrow:
     def solved(
         self, right: Sequence[Scalar], matrix: Matrix | None = None, vector: Sequence[Scalar] = ()
     ) -> list[Scalar]:
-        """Solve M x = right, or M x = right - matrix vector. In `matrix`, no two limbs may have common entries."""
+        """Solve M x = right or, if `matrix` is given, M x = right - matrix vector, and return x.
+
+        Entries of `matrix` that belong to two different limbs (such as legs) must be zero.
+        """
         found = self._reduced(right) if matrix is None else self._reduced_by(right, matrix, vector)
         above = [found[k] for k in self.core]
         for k, value in zip(self.core, solve(self.factors, above), strict=True):
@@ -110,11 +120,12 @@ class Arrow:
         return found
 
     def thin(self, matrix: Matrix) -> list[list[Scalar]]:
-        """Return two factors of - M^-1 D: E in the rows of the core, and Y in those of limbs. No two limbs may have
-        common entries in D.
+        """Return two factors of -M^-1 D in one matrix: E in the rows of the core, and Y in those of limbs (such as
+        legs).
 
-        - M^-1 D is then x = - V E in the rows of the core, and Y - T x in those of a limb. Y is zero in other limbs'
-        columns.
+        For a column of E and Y, -M^-1 D is x = -V E in rows of the core, and Y - T x in rows of a limb. The module
+        defines V and T. Y is zero in columns of other limbs. Entries of D that belong to two different limbs must be
+        zero.
         """
         columns = [list(column) for column in zip(*matrix, strict=True)]
         found = columns[:]
@@ -134,8 +145,10 @@ class Arrow:
 
     @property
     def thin_factors(self) -> list[list[Scalar]]:
-        """Two factors of M^-1 in one matrix: V in the rows of the core, and T in those of limbs. Both are in the
-        columns of the core."""
+        """Return two factors of M^-1 in one matrix: V in the rows of the core, and T in those of limbs such as legs.
+
+        Both have the columns of the core, and are defined in the module.
+        """
         n = len(self.pivots)
         found: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
         for k, row in zip(self.core, inverse(self.factors), strict=True):
@@ -149,8 +162,11 @@ class Arrow:
 
 
 def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
-    """Factorize a symmetric matrix over the rates of these frames, limb by limb. Raises SingularMatrix if a pivot is a
-    constant not above 0."""
+    """Factorize a symmetric matrix M with one row per joint rate, such as the mass matrix, limb by limb.
+
+    A limb is a branch of the robot that equals other branches, such as a leg. Raises SingularMatrix if a pivot is a
+    constant that is not positive.
+    """
     core, groups = limbs_of(frames)
     rest = {(i, j): matrix[i][j] for i in core for j in core if j <= i}
     pivots: list[Scalar] = [0.0] * len(matrix)
@@ -203,15 +219,18 @@ def _is_zero(value: Scalar) -> bool:
 
 
 def any_limbs(frames: Sequence[Frame]) -> bool:
-    """Whether some frame represents the corresponding frames of several equal limbs, such as legs."""
+    """Return whether some frames stand for several equal limbs, such as legs, in equations written for one limb only."""
     return any(frame.limbs is not None for frame in frames)
 
 
 def limbs_of(
     frames: Sequence[Frame],
 ) -> tuple[tuple[int, ...], list[tuple[tuple[int, ...], Callable[[Scalar], Scalar]]]]:
-    """Return the rates of the core, and for one limb of each group its rates and a function that sums over the group's
-    limbs."""
+    """Return the joint rates of the core, and those of one limb of each group of equal limbs, such as legs.
+
+    The core is the rest of the robot. For each limb, the function that sums a scalar over the limbs of the group is
+    also returned.
+    """
     roots: list[int] = []
     for i, frame in enumerate(frames):
         above = BASE if frame.parent == BASE else roots[frame.parent]

@@ -10,7 +10,7 @@ from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, multiply, rotated
 
 
 class Body(NamedTuple):
-    """A rigid body about some frame as its pseudo-inertia: integrals of 1, r and r r^T over its mass.
+    """The mass and the moments of a rigid body, relative to a frame: integrals of 1, r and r r^T over the mass.
 
     mass    kg
     moment  kg m, (hx, hy, hz) = mass times centre of mass
@@ -26,18 +26,21 @@ class Body(NamedTuple):
 
 
 def body_from_parameters(x: Sequence[Scalar]) -> Body:
-    """Return a Body from its ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about the same
-    frame."""
+    """Return a Body from ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz). The frame stays the
+    same."""
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = x[:10]
     half_trace = 0.5 * (ixx + iyy + izz)
     return Body(m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz))
 
 
 def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None) -> Body:
-    """Rotate a body from a frame to the frame before that frame's rotation (about z, or any): R h, R S R^T.
+    """Return a body, given in a joint's rotated frame, along the axes before the rotation: moments R h, R S R^T.
 
-    The second moment xx decreases by s^2 (xx - yy) + 2 s c xy, and yy increases by the same. With `double`, half the
-    difference of xx and yy and the product xy are rotated by twice the angle instead.
+    The second moment xx decreases by s^2 (xx - yy) + 2 s c xy, and yy increases by as much (s, c: sine and cosine).
+
+    turn    the joint's rotation; None: no rotation
+    double  rotation by twice the angle, for the difference of xx and yy and the product xy; None: `turn` is used for
+            them
     """
     if turn is None:
         return body
@@ -58,10 +61,10 @@ def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None)
 
 
 def spun(body: Body, turn: Turn | None) -> Body:
-    """Compute the same as `turned` with nested products, which take four operations fewer, but in a longer dependency
-    chain.
+    """Return a body, given in a joint's rotated frame, along the axes before the rotation about z, like `turned`.
 
-    With t = s (xx - yy) + 2 c xy, xx decreases by s t, and xy becomes c t - xy.
+    Nested products take four operations fewer than in `turned`, but depend on each other in a longer chain. With t = s
+    (xx - yy) + 2 c xy, xx decreases by s t, and xy becomes c t - xy (s, c: sine and cosine).
     """
     if turn is None:
         return body
@@ -74,7 +77,10 @@ def spun(body: Body, turn: Turn | None) -> Body:
 
 
 def in_previous(frame: Frame, body: Body) -> Body:
-    """Rotate a body from a frame, before the joint's rotation, to the axes of the parent's frame. The origin stays."""
+    """Return a body along the axes of the parent's frame, given along the axes of `frame` before the joint's rotation.
+
+    The reference point, the frame's origin, stays.
+    """
     if frame.is_parallel:
         return body
     moment = to_previous(frame, body.moment)
@@ -100,8 +106,10 @@ def _rotated(body: Body, rows: Matrix) -> Body:
 
 
 def shifted(body: Body, offset: Vector) -> Body:
-    """Move the reference point of a body from `offset` p to the origin. The moments become h + m p and S + h p^T + p
-    h^T + m p p^T."""
+    """Return a body relative to another point, from which `offset` p (m) leads to the present reference point.
+
+    The first moments become h + m p, the second moments S + h p^T + p h^T + m p p^T.
+    """
     px, py, pz = offset
     hx, hy, hz = body.moment
     xx, yy, zz, xy, xz, yz = body.second
@@ -124,7 +132,9 @@ def joined(a: Body, b: Body) -> Body:
 
 
 def handed_body(frame: Frame, body: Body) -> Body:
-    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that the
-    frame represents."""
+    """Return the body that a frame passes to its parent, relative to the parent's frame.
+
+    If the frame stands for several equal limbs, such as legs, the result is the sum of their bodies.
+    """
     (mass,), moment = handed_on(frame, [body.mass]), handed_vector(frame, body.moment)
     return Body(mass, moment, tuple(handed_on(frame, body.second)))

@@ -1,4 +1,4 @@
-"""Choices in the arrangement of the recursions. They change the number of operations, but not the result."""
+"""Options for the arrangement of the recursions. They change the number of operations, but not the result."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import Generic, TypeVar, cast
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The arrangement of a recursion. w and dw are a body's angular velocity and its derivative; a body's point at r
-    accelerates with a + U r.
+    """Options for the arrangement of the Newton-Euler recursion and of forward dynamics.
 
-    compound           consecutive parallel axes rotate w and dw once, by the sum of their angles, from the frame before the
-                       first
-    fold               a leaf (a body that carries no other) is described in the frame before its joint's rotation, where U
+    w and dw are a body's angular velocity and its derivative. A point of the body at r accelerates with a + U r.
+
+    compound           consecutive joints with parallel axes rotate w and dw once, by the sum of their angles
+    fold               a body that carries no other is described in the frame before its joint's rotation. There U
                        differs from its parent's in six entries only; the body's parameters are rotated instead
-    fold_double_angle  a folded body's second moments are rotated with a separate sincos(2 q), not with products of sincos(q)
-    add_sines          the sine and cosine of a sum of angles are computed from those of its parts
+    fold_double_angle  second moments of such a body are rotated with a separate sincos(2 q), not with products of
+                       sincos(q)
+    add_sines          the sine and cosine of a sum of angles are computed from those of the angles
     articulated        accelerations are computed by articulated bodies, not by a factorized mass matrix
     """
 

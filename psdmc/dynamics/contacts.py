@@ -1,5 +1,8 @@
-"""Contacts, that is, named frames whose accelerations the world prescribes, and the contact forces that result
-(Featherstone 2008, chapters 8 and 11; Carpentier, Budhiraja and Mansard 2021)."""
+"""Computes contact forces of a robot. A contact is a named frame whose acceleration the world prescribes, such as a
+foot.
+
+Sources: Featherstone 2008, chapters 8 and 11; Carpentier, Budhiraja and Mansard 2021.
+"""
 
 from __future__ import annotations
 
@@ -49,12 +52,12 @@ def contact_drift(
 
 
 class Constrained(NamedTuple):
-    """The solution of M x = load + J^T f for a robot with contacts.
+    """The accelerations and contact forces that solve M x = load + J^T f for a robot with contacts.
 
-    motion   x (nv)
-    forces   f, one per row of J
-    matrix   A, the matrix of the equations for f, both triangles
-    factors  of A
+    motion   x, nv entries
+    forces   f, one entry per row of the contact Jacobian J
+    matrix   matrix A of the linear equations for f, both triangles
+    factors  factors of A
     """
 
     motion: list[Scalar]
@@ -72,15 +75,19 @@ def constrained(
     shift: Sequence[Scalar],
     one: Sequence[Scalar],
 ) -> Constrained:
-    """Solve M x = load + J^T f for x and f, with J x + shift f = wanted in active rows, and f = 0 in the others.
+    """Solve M x = load + J^T f for the motion x and the contact forces f of a robot with mass matrix M.
 
-    factors  of M
-    active   for each row, 0 or 1
-    shift    for each row, added to the diagonal if the row is active
-    one      for each row, the diagonal entry in its unit if the row is not active
+    J is the Jacobian of the contacts. Active rows satisfy J x + shift f = wanted. In the other rows, f is zero.
 
-    The matrix A is J M^-1 J^T + shift in active rows and the unit matrix in the others. Every choice of active rows
-    executes the same operations.
+    factors  factors of M
+    load     (nv) right side without contacts
+    wanted   for each row of J, the prescribed value, such as an acceleration
+    active   for each row of J, 1 if the contact acts, else 0
+    shift    for each row, a compliance, added to the diagonal of the equations for f if the row is active
+    one      for each row, the diagonal entry if the row is not active; it has the value 1 in the unit of the diagonal
+
+    The matrix of the equations for f is J M^-1 J^T + shift in active rows, and a unit matrix in the others. Every
+    choice of active rows executes the same operations.
     """
     halves = [half_solved(factors, row) for row in jacobian]
     free = half_solved(factors, load)

@@ -1,34 +1,37 @@
-"""Derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and also M = d tau / d qdd.
+"""Computes derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and M = d tau / d qdd.
 
-When joint j turns by a small angle, every point of the bodies that it carries moves along t_j = z_j x r. Relative to
-these bodies, the motion of the link before the joint turns by the opposite angle. With z' = w x z and z'' = U z of that
-link and a the acceleration of the joint's origin, a joint i that j carries (or j itself) needs the additional torque
+When joint j turns by a small angle, each point of the bodies that it carries moves along t_j = z_j x r. Here z_j is the
+joint's axis, and r leads from its origin to the point. Relative to these bodies, the link before the joint turns by the
+opposite angle. The axis as a vector fixed in that link has the derivatives z' = w x z and z'' = U z. Here w is the
+link's angular velocity, and U r the part of its points' acceleration that depends on r. With the acceleration a_j of
+the joint's origin, a joint i that j carries (or j itself) has
 
     d tau_i / d q_j   = A_i . z_j'' + B_i . z_j' + C_i . (a_j x z_j)
     d tau_i / d qd_j  = 2 A_i . z_j' + B_i . z_j
     M_ij              = A_i . z_j
 
-where A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm over the bodies that joint i carries, r
-from the origin of joint j as a point of the link before it. If joint j slides, C_i takes the place of A_i, and there
-are no other terms. The torques of joints before i by the motion of joint i are the components along their axes of two
-wrenches, those that this motion requires on the bodies after joint i. Rows and wrenches are carried from each joint to
-the base.
+A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm are integrals over the bodies that joint i
+carries. Here r leads from the origin of joint j as a point of the link before it. If joint j slides, C_i takes the
+place of A_i, and there are no other terms. For joints before i, the derivatives by the motion of joint i follow from
+two wrenches. They are the additional wrenches that this motion requires on the bodies after joint i. Their components
+along a joint's axis are the torques. The vectors A, B, C and the wrenches are carried from each joint to the base.
 
 Carpentier, Mansard 2018 and Singh, Russell, Wensing 2022 have the same derivatives in spatial vectors. Here they are
-written on the pseudo-inertia, and on composites that move (moving_composite.py): when a composite turns about z as a
-whole, z x h takes the place of h in its wrench, and so on. All quantities of a joint are in the orientation before it
-turns; those of parallel neighbours (`compound`) before the first of them turns.
+written on the pseudo-inertia, and on composite bodies that move (moving_composite.py). When a composite body turns
+about z, z x h takes the place of its first moments h in the wrench, and so on. All quantities of a joint are in the
+orientation before the joint turns. Those of joints with parallel axes (`compound`) are in the orientation before the
+first of them turns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, about_z, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, about_z, inward, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -41,7 +44,9 @@ from psdmc.dynamics.moving_composite import (
     driven_freely,
     handed_composite,
     moved_to,
+    relieved,
 )
+from psdmc.dynamics.newton_euler import NO_WRENCHES
 from psdmc.dynamics.own_axes import (
     accelerating,
     axis_along,
@@ -88,26 +93,21 @@ def inverse_dynamics_derivatives(
     qdd: Sequence[Scalar],
     base_acceleration: Vector,
     choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> Derivatives:
-    """Compute the derivatives of the joint torques by q, qd and qdd. Arguments are those of `inverse_dynamics`.
+    """Compute the derivatives of the joint torques by q, qd and qdd. Arguments are those of `inverse_dynamics`; external
+    wrenches move with their links.
 
     For joints of several coordinates, derivatives by q are along the tangent: by a small motion along each of the
     joint's rates, while the rates stay constant along the moved frame's own axes. Entries of two joints are exact zeros
     if neither joint carries the other.
     """
-    n, first = len(frames), first_rates(frames)
-    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
-    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
-    axes: list[Axis] = []
-    steps: list[Step] = []
-    for i in range(n):
-        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
-        axes.append(axis)
-        steps.append(step)
+    axes, steps, composites = swept(frames, bodies, q, qd, qdd, base_acceleration, choices, external)
+    first, qd = first_rates(frames), rates(frames, qd)
     nv = first[-1]
     by_q, by_qd, by_qdd = ([[0.0] * nv for _ in range(nv)] for _ in range(3))
     gravity: list[Scalar] = [0.0] * nv
-    for i, composite in _composites(frames, bodies, q, qd, qdd, forward, choices, steps):
+    for i, composite in composites:
         for k, row in enumerate(torque_rows(frames[i], axes[i], composite), start=first[i]):
             gravity[k] = dot(row.c, axes[i].up)
             _fill_row((i, k), frames, axes, steps, row, qd, by_q, by_qd, by_qdd)
@@ -120,6 +120,28 @@ def inverse_dynamics_derivatives(
     return Derivatives(rows, slopes, mass, tuple(gravity))
 
 
+def swept(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base_acceleration: Vector,
+    choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+) -> tuple[list[Axis], list[Step], list[tuple[int, Composite]]]:
+    """Return each joint's axis, each joint's step to its parent, and the result of `_composites`."""
+    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
+    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
+    axes: list[Axis] = []
+    steps: list[Step] = []
+    for i in range(len(frames)):
+        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
+        axes.append(axis)
+        steps.append(step)
+    return axes, steps, _composites(frames, bodies, q, qd, qdd, forward, choices, steps, external)
+
+
 def _composites(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
@@ -129,6 +151,7 @@ def _composites(
     forward: Forward,
     choices: Choices,
     steps: Sequence[Step],
+    external: Mapping[int, Wrench],
 ) -> list[tuple[int, Composite]]:
     """For each joint its number and the composite beyond it, in the joint's orientation about its origin; children
     before parents."""
@@ -146,7 +169,11 @@ def _composites(
             double = (angle + angle).turn() if choices.fold_double_angle else None
             body = spun(body, turn) if double is None else turned(body, turn, double)
             whole = at_rest(spun(body, step.turn) if step.joins else body)
+            if i in external:
+                whole = relieved(whole, *(inward(forward.compound_turns[i], v) for v in external[i]))
         else:
+            if i in external:
+                whole = relieved(whole, *external[i])
             for child in hung[i]:
                 whole = both(whole, child)
             if frame.joint.about_z:
@@ -218,7 +245,11 @@ def _fill_column(
 
 # Wrenches between a joint and the bodies beyond it: its own row A, B, C, and those that its motion requires.
 def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
-    """Return A, B and C (see the module) for each of a joint's rates, about the joint's own origin."""
+    """Return the vectors A, B and C, from which the derivatives of torques follow (see the module), for each rate of a
+    joint.
+
+    They are relative to the origin of the joint.
+    """
     if frame.joint.about_z:
         return [torque_row(frame, axis, composite)]
     found = []
@@ -230,7 +261,10 @@ def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
 
 
 def torque_row(frame: Frame, axis: Axis, composite: Composite) -> Row:
-    """Return A, B and C (see the module) of a joint with one rate, about its own origin."""
+    """Return the vectors A, B and C, from which the derivatives of the joint's torque follow (see the module).
+
+    The joint has one rate. The vectors are relative to the origin of the joint.
+    """
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:
@@ -266,7 +300,10 @@ def _sliding_row(axis: Axis, composite: Composite) -> Row:
 def wrenches_of_motions(
     frame: Frame, axis: Axis, composite: Composite, rates: Scalar
 ) -> list[tuple[Wrench, Wrench]]:
-    """For each of a joint's rates, return the wrenches that `wrenches_of_motion` returns for a single rate."""
+    """Return, for each rate of a joint, the two wrenches that `wrenches_of_motion` returns for a joint with one rate.
+
+    rates  rates of the joint
+    """
     if frame.joint.about_z:
         return [wrenches_of_motion(frame, axis, composite)]
     found = []
@@ -281,7 +318,10 @@ def wrenches_of_motions(
 
 
 def wrenches_of_motion(frame: Frame, axis: Axis, composite: Composite) -> tuple[Wrench, Wrench]:
-    """Return the wrenches on the composite body that a joint's motion requires, per unit of q and per unit of qd."""
+    """Return the wrenches on all bodies that a joint carries, per unit change of the joint's q and of its qd.
+
+    They are the derivatives of the wrench that the bodies' motion requires.
+    """
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:

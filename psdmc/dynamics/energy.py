@@ -20,9 +20,9 @@ def kinetic_energy(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
 ) -> Scalar:
-    """Compute the kinetic energy qd^T M(q) qd / 2 in J, with drive inertias.
+    """Return the kinetic energy qd^T M(q) qd / 2 of all bodies, J, with drive inertias.
 
-    The bodies need not be the real ones: any bodies with the same torques give the same energy.
+    The bodies may be other ones with the same joint torques as the robot's, such as bodies made from base parameters.
     """
     twice: Scalar = 0.0
     for twist, body in zip(twists(frames, q, qd), bodies, strict=True):
@@ -38,11 +38,12 @@ def kinetic_energy(
 def potential_energy(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base_acceleration: Vector
 ) -> Scalar:
-    """Compute the potential energy in J, which is zero at q = 0. `base_acceleration` is minus gravity, m/s^2 in the
-    base frame.
+    """Return the potential energy of all bodies, J, relative to that at q = 0.
 
-    Torques do not depend on the constant of this energy. Any bodies with the same torques as the real ones therefore
-    give the same result.
+    The bodies may be other ones with the same joint torques as the robot's, because torques do not depend on a constant
+    energy.
+
+    base_acceleration  m/s^2 in the base frame, minus gravity
     """
     here = dot(base_acceleration, first_moment(frames, bodies, q))
     return here - dot(base_acceleration, first_moment(frames, bodies, neutral(frames)))

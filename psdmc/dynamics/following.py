@@ -1,9 +1,9 @@
-"""Mimic joints (followers). Algorithms compute with the values of all joints; their callers see the coordinates of the
-robot, which mimic joints do not have.
+"""Converts between joints and coordinates of robots with mimic joints, whose positions follow that of a leader.
 
-A follower's q is ratio q_leader + offset. The power of all joint torques equals the power of the coordinates' torques.
-A follower's torque is therefore multiplied by its ratio and added to its leader's. The same holds for all quantities
-with an axis of torques, for columns of Jacobians, and for derivatives by q.
+Algorithms compute with one value per joint. Callers give and get values of the robot's coordinates, without mimic
+joints. A mimic joint's q is ratio q_leader + offset. The power of all joint torques equals the power of the
+coordinates' torques. A mimic joint's torque is therefore multiplied by its ratio and added to its leader's. The same
+holds for columns of Jacobians, for derivatives by q, and for any other quantity with one entry per torque.
 """
 
 from __future__ import annotations
@@ -33,10 +33,14 @@ def any_follows(frames: Sequence[Frame]) -> bool:
 
 
 def on_coordinates(gather: Gather | None = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorator that makes an algorithm on all joints an algorithm on the robot's coordinates, without mimic joints.
+    """Decorator that makes an algorithm with one value per joint an algorithm on the robot's coordinates, without mimic
+    joints.
 
-    The first argument of the algorithm are frames. `gather` converts its result from joints to coordinates; None: the
-    result has no axis of joints. Robots without mimic joints call the algorithm directly.
+    The first argument of the algorithm must be the joint frames.
+
+    gather  function that converts the result from joints to coordinates; None: the result has no axis of joints
+
+    For robots without mimic joints, the algorithm runs unchanged.
     """
 
     def wrap(algorithm: Callable[P, R]) -> Callable[P, R]:

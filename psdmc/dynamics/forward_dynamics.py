@@ -1,9 +1,10 @@
-"""Joint accelerations from torques by articulated bodies (Featherstone 2008, 7.3), with the sweeps of Newton-Euler.
+"""Computes joint accelerations from torques by articulated bodies (Featherstone 2008, 7.3).
 
-The first sweep, outward, computes each body's motion for zero joint accelerations. The second, inward, computes two
-quantities: the wrench that this motion requires, and the articulated inertia, which is the wrench per acceleration of
-the body's frame, with all bodies that it carries. Each joint takes the components along its axis; the rest goes to the
-parent. The third sweep, outward, computes the joints' accelerations.
+The articulated inertia of a body is the wrench per unit acceleration that it needs if the joints after it are free to
+move. A first sweep from the base outward computes each body's motion for zero joint accelerations. A second sweep,
+inward, computes the wrench that this motion requires, and the articulated inertia of each body with all bodies that it
+carries. Each joint torque balances the part of the wrench along its axis, and the rest acts on the parent. A third
+sweep, outward, computes the joint accelerations.
 
 The number of operations per joint is fixed. With a factorized mass matrix, it grows with the square of the number of
 joints that carry a body. Articulated bodies take fewer operations on long limbs.
@@ -50,10 +51,11 @@ def forward_dynamics(
     choices: Choices = PLAIN,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> Accelerations:
-    """Compute joint accelerations from torques, and the mass matrix's pivots as `factorize` has them.
+    """Compute joint accelerations from torques, and the pivots of the mass matrix.
 
-    All pivots are positive if the mass matrix is positive definite. Arguments are those of `inverse_dynamics`; there
-    may be no mimic joints. Raises SingularMatrix if a pivot is a constant not above 0.
+    The pivots are those of a factorization of the mass matrix. All are positive if the matrix is positive definite. The
+    other arguments are those of `inverse_dynamics`. There may be no mimic joints. Raises SingularMatrix if a pivot is a
+    constant that is not positive.
     """
     if any_follows(frames):
         raise ValueError("a joint that follows another: its acceleration is not its own")
@@ -99,8 +101,11 @@ class _Inward:
         return [self.found[i] for i in range(len(self.frames))]
 
     def yielded(self, i: int, needed: Sequence[Scalar]) -> Wrench:
-        """Return the wrench that joint i passes to its parent because its torques differ from `needed`, the torques
-        that keep all rates constant."""
+        """Return the wrench on the parent that results from the acceleration of joint i, and store what the next sweep
+        needs.
+
+        The joint accelerates because its torques differ from `needed`, the torques for constant joint rates.
+        """
         frame, whole = self.frames[i], rigid(self.bodies[i])
         if i in self.beyond:
             whole = both(whole, self.beyond[i])
@@ -222,12 +227,14 @@ _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Articulated(NamedTuple):
-    """The articulated inertia of a frame. For the accelerations a and alpha of the frame, force = linear a + mixed
-    alpha, and moment = mixed^T a + angular alpha.
+    """The articulated inertia of a body: the wrench that accelerates it while the joints after it are free to move.
 
-    linear   kg, symmetric
-    mixed    kg m
-    angular  kg m^2, symmetric
+    The body's frame has the linear acceleration a and the angular acceleration alpha. The wrench consists of force =
+    linear a + mixed alpha, and moment = mixed^T a + angular alpha.
+
+    linear   kg, symmetric matrix (xx, yy, zz, xy, xz, yz)
+    mixed    kg m, 3 x 3 matrix
+    angular  kg m^2, symmetric matrix (xx, yy, zz, xy, xz, yz)
     """
 
     linear: Six
@@ -255,8 +262,12 @@ def both(a: Articulated, b: Articulated) -> Articulated:
 
 
 def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
-    """Return the inertia about another point; `offset` p leads from that point to the present one. With G = mixed -
-    linear [p], angular increases by [p] G + ([p] mixed)^T."""
+    """Return the articulated inertia relative to another point, from which `offset` p leads to the present reference
+    point.
+
+    With G = mixed - linear [p], mixed becomes G, and angular increases by [p] G + ([p] mixed)^T. [p] is the matrix of
+    the cross product with p.
+    """
     x, y, z = offset
     skew: Matrix = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     pushed = multiply(full(inertia.linear), skew)
@@ -272,15 +283,17 @@ def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
 
 
 def handed(frame: Frame, inertia: Articulated) -> Articulated:
-    """Return what a frame passes to its parent, about the parent's frame: the articulated inertia, summed over all
-    limbs that the frame represents."""
+    """Return the articulated inertia that a frame passes to its parent, relative to the parent's frame.
+
+    If the frame stands for several equal limbs, such as legs, the result is the sum over them.
+    """
     rows = tuple(handed_vector(frame, row) for row in inertia.mixed)
     linear, angular = (tuple(handed_on(frame, part)) for part in (inertia.linear, inertia.angular))
     return Articulated(linear, rows, angular)  # type: ignore[arg-type]
 
 
 def along_parent(frame: Frame, inertia: Articulated) -> Articulated:
-    """Rotate an inertia from the axes before a joint's motion to the axes of the frame that carries the joint."""
+    """Return an articulated inertia along the axes of the parent's frame, given along a joint's axes before its motion."""
     return inertia if frame.is_parallel else rotated(inertia, frame.rotation)
 
 
@@ -302,7 +315,10 @@ def before_turn(inertia: Articulated, turn: Turn | Rotation | None) -> Articulat
 
 
 def rotated(inertia: Articulated, rows: Matrix) -> Articulated:
-    """Return the inertia along other axes; `rows` gives the present axes in the new ones."""
+    """Return an articulated inertia along other axes.
+
+    rows  rotation matrix from the present axes to the new ones
+    """
     back = transpose(rows)
     linear, mixed, angular = (
         multiply(multiply(rows, part), back)

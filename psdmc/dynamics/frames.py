@@ -1,10 +1,11 @@
 """Joint frames in a tree, and the rotation of each joint: the input of every algorithm in this folder.
 
-The placement of frame i in its parent's frame is   rotation @ Rz(turn + offset), translation + rotation @ z slide
-Here turn and slide follow from q by the type of the joint. For a joint of several coordinates, the placement is
-rotation @ rotation(q), translation + rotation @ way(q). Each frame has one rigid body, whose parameters are about the
-frame itself. Parents come before their children. Multiples of 90 degrees in the offset are stored separately: they
-exchange sine and cosine exactly and cost nothing.
+The placement of frame i in its parent's frame has the rotation and translation rotation @ Rz(turn + offset),
+translation + rotation @ z slide. The angle `turn` and the displacement `slide` follow from q by the type of the joint.
+For a joint of several coordinates, the placement is rotation @ rotation(q), translation + rotation @ way(q), with the
+functions of the joint type. Each frame has one rigid body, whose parameters are relative to the frame. Parents come
+before their children. Multiples of 90 degrees in the offset are stored separately, because they exchange sine and
+cosine exactly and need no operations.
 """
 
 from __future__ import annotations
@@ -37,16 +38,17 @@ class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
 
     parent       index of the parent's frame; BASE: the base frame
-    rotation     3 x 3, this frame's axes in the parent's, without the rotation about z
-    translation  m, origin of this frame at q = 0 in the parent's
-    offset       rad, rotation about z at q = 0, without the multiples of 90 degrees
+    rotation     3 x 3, axes of this frame in the parent's frame, without the rotation about z
+    translation  m, origin of this frame at q = 0 in the parent's frame
+    offset       rad, rotation about z at q = 0, without multiples of 90 degrees
     quarters     number of 90-degree rotations in addition to the offset, 0 to 3
-    follows      for a mimic joint, leader, ratio and offset: its q is ratio q_leader + offset (following.py)
-    limbs        for the first frame of a limb that represents several equal limbs: returns the sum over them of a scalar;
-                 None: the frame represents itself only
+    follows      for a mimic joint: its leader, ratio and offset, with q = ratio q_leader + offset; None: not a mimic
+                 joint
+    limbs        function that returns the sum of a scalar over equal limbs, such as legs. Only the first frame of a
+                 limb that stands for several has it; None for other frames
 
-    Computed from these: whether the joint's axis is parallel to that of the parent joint (`is_parallel`), and the
-    rotation and its transpose without their zeros (`inward_rows`, `outward_rows`).
+    Two fields are computed from these. `is_parallel` says whether the joint's axis is parallel to that of the parent
+    joint. `inward_rows` and `outward_rows` are the rotation and its transpose without their zeros.
     """
 
     joint: JointType
@@ -68,7 +70,7 @@ class Frame:
 
 
 class Angle(NamedTuple):
-    """A rotation about z: `value` rad and `quarters` times 90 degrees; a value of None is zero."""
+    """A rotation about z by the angle `value` (rad) plus `quarters` times 90 degrees. None as `value` stands for zero."""
 
     value: Scalar | None
     quarters: int
@@ -92,7 +94,7 @@ NO_TURN = Angle(None, 0)
 
 
 class Turn(NamedTuple):
-    """A rotation about z by its sine and cosine; None stands for no rotation."""
+    """The sine and cosine of a rotation about z. In place of a Turn, None stands for no rotation."""
 
     sine: Scalar
     cosine: Scalar
@@ -103,12 +105,12 @@ class Turn(NamedTuple):
         return Turn(s * other.cosine + c * other.sine, c * other.cosine - s * other.sine)
 
     def outward(self, v: Vector) -> Vector:
-        """Compute Rz^T v: a vector, rotated from the frame before this rotation to the frame after it."""
+        """Return a vector along the axes after this rotation about z, given along the axes before it: Rz^T v."""
         s, c = self.sine, self.cosine
         return (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
 
     def inward(self, v: Vector) -> Vector:
-        """Compute Rz v: a vector, rotated from the frame after this rotation to the frame before it."""
+        """Return a vector along the axes before this rotation about z, given along the axes after it: Rz v."""
         s, c = self.sine, self.cosine
         return (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
 
@@ -119,11 +121,11 @@ class Rotation(NamedTuple):
     rows: Matrix
 
     def outward(self, v: Vector) -> Vector:
-        """Rotate a vector from the frame before the joint's rotation into the frame after it."""
+        """Return a vector along the axes after this rotation, given along the axes before it."""
         return transform(transpose(self.rows), v)
 
     def inward(self, v: Vector) -> Vector:
-        """Rotate a vector from the frame after the joint's rotation into the frame before it."""
+        """Return a vector along the axes before this rotation, given along the axes after it."""
         return transform(self.rows, v)
 
 
@@ -134,7 +136,7 @@ def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
 
 
 def as_vector(values: Sequence[Scalar]) -> Vector:
-    """Return three numbers as a vector. The numbers are Python floats, which symbols take as constants, or symbols."""
+    """Return three entries, Python floats or symbols, as a vector. Operations with symbols treat floats as constants."""
     x, y, z = values
     return (x, y, z)
 
@@ -161,8 +163,10 @@ def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, 
 
 
 def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
-    """Return the frames of the joints in `kept`, renumbered. `kept` must include all joints that carry or lead one of
-    them."""
+    """Return the frames of the joints in `kept`, with parents and leaders renumbered by their places in `kept`.
+
+    `kept` must include all joints that carry or lead one of the joints in it.
+    """
     number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
     own = (frames[joint] for joint in kept)
     return tuple(
@@ -172,7 +176,10 @@ def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
 
 
 def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
-    """Return leader, ratio and offset of joint i, if it is a mimic joint. None if it has its own coordinate."""
+    """Return leader, ratio and offset of joint i if it is a mimic joint, whose position follows that of its leader.
+
+    The result is None if the joint has its own coordinate.
+    """
     coordinate = chain.coordinates[i]
     if coordinate.leader is None or coordinate.leader == i:
         return None
@@ -198,12 +205,12 @@ def base_acceleration(chain: Mechanism) -> Vector:
 
 
 def outward(turn: Turn | Rotation | None, v: Vector) -> Vector:
-    """Rotate a vector from the axes before a joint's rotation to the axes after it; None: no rotation."""
+    """Return a vector along the axes after a joint's rotation, given along the axes before it; None: no rotation."""
     return v if turn is None else turn.outward(v)
 
 
 def inward(turn: Turn | Rotation | None, v: Vector) -> Vector:
-    """Rotate a vector from the axes after a joint's rotation to the axes before it; None: no rotation."""
+    """Return a vector along the axes before a joint's rotation, given along the axes after it; None: no rotation."""
     return v if turn is None else turn.inward(v)
 
 
@@ -251,8 +258,8 @@ def joint_offset(frame: Frame, q: Scalar) -> Vector:
 
 
 def handed_on(frame: Frame, values: Iterable[Scalar]) -> Iterator[Scalar]:
-    """Return what a frame passes to its parent: the values themselves, or their sums over all limbs that the frame
-    represents."""
+    """Return the values that a frame passes to its parent. If the frame stands for several equal limbs, they are
+    summed."""
     return iter(values) if frame.limbs is None else map(frame.limbs, values)
 
 
@@ -263,7 +270,10 @@ def handed_vector(frame: Frame, v: Vector) -> Vector:
 
 
 def to_previous(frame: Frame, v: Vector) -> Vector:
-    """Rotate a vector from a frame, before its joint's rotation, to its parent's axes. This rotation is constant."""
+    """Return a vector along the axes of the parent's frame, given along those of `frame` before its joint's rotation.
+
+    This rotation is constant: it does not depend on q.
+    """
     return v if frame.is_parallel else rotated(frame.inward_rows, v)
 
 

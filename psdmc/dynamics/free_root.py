@@ -1,9 +1,9 @@
 """Derivatives of forward dynamics by the motion of a floating base, which are known without computing any dynamics.
 
-The position, the orientation and the linear rate v of a floating base enter the equations of motion through one vector
-only, along the base's own axes: a = dv/dt + w x v + R^T up, with up = minus gravity. If these quantities change and the
-torques do not, then a and all other accelerations stay the same. dv/dt therefore changes by minus the change of w x v +
-R^T up.
+The position, orientation and linear velocity v of a floating base enter the equations of motion through one vector
+only. Along the axes of the base, this vector is a = dv/dt + w x v + R^T up. Here w is the angular velocity, R the
+orientation, and up minus gravity. If position, orientation and v change and the torques do not, then a and all other
+accelerations stay the same. dv/dt therefore changes by minus the change of w x v + R^T up.
 """
 
 from __future__ import annotations
@@ -20,16 +20,20 @@ KNOWN_BY_Q, KNOWN_BY_QD = 6, 3
 
 
 def has_free_root(frames: Sequence[Frame]) -> bool:
-    """Whether a floating joint, with rates along its own axes, carries the whole robot."""
+    """Return whether a floating joint carries the whole robot, with linear and angular rates along the axes of its
+    body."""
     return frames[0].joint.twists == (*SLIDES, *TURNS) and all(frame.parent != BASE for frame in frames[1:])
 
 
 def known_derivatives(
     frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], up: Vector
 ) -> tuple[Matrix, Matrix]:
-    """Return the derivatives of the floating base's linear accelerations by its orientation and by its linear rates, 3
-    x 3 each. Their derivatives by its position are zero, and so are all derivatives of other accelerations by its
-    position, orientation and linear rates."""
+    """Return the derivatives (3 x 3 each) of a floating base's linear acceleration by its orientation and linear
+    velocity.
+
+    The accelerations do not depend on the position of the base. The accelerations of all other joint rates do not
+    depend on the orientation and linear velocity either.
+    """
     root = frames[0]
     turned = outward(joint_turn(root, positions(frames, q)[0]), from_previous(root, up))
     own = rates(frames, qd)[0]

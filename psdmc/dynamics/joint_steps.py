@@ -1,5 +1,7 @@
-"""For each joint, the motion of the link before it, and the step from the joint to its parent. The recursion of
-derivatives (derivatives.py) needs both."""
+"""For each joint, computes the motion of the link before it, and the change of axes and origin to the parent joint.
+
+The recursion of derivatives (derivatives.py), which runs from the tips to the base, needs both.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,15 @@ Wrench = tuple[Vector, Vector]
 
 
 class Axis(NamedTuple):
-    """The motion of the link before a joint, along the axes before the joint's rotation. For a joint of several
-    coordinates, the axes are those after the rotation.
+    """The motion of the link before a joint, along the joint's axes before its rotation.
 
-    w, dw         rad/s, the link's angular velocity; rad/s^2, its derivative
-    spin          the matrix U of the link, so that its points at r accelerate with acceleration + U r
+    For a joint of several coordinates, the axes are those after the rotation.
+
+    w, dw         rad/s, angular velocity of the link; rad/s^2, its derivative
+    spin          has the matrix U: a point at r from the joint's origin accelerates with acceleration + U r
     acceleration  m/s^2, of the joint's origin as a point of the link
-    rate, twice   z' = w x z and 2 z'
-    up            m/s^2, the base's acceleration, minus gravity
+    rate, twice   w x z for the joint's axis z, and twice this vector
+    up            m/s^2, acceleration of the base, minus gravity
     """
 
     w: Vector
@@ -58,8 +61,10 @@ class Axis(NamedTuple):
 
 
 class Row(NamedTuple):
-    """The vectors A, B and C that give the derivatives of a joint's torque (derivatives.py), about the current origin
-    of the recursion."""
+    """The vectors A, B and C that give the derivatives of a joint's torque (derivatives.py).
+
+    They are relative to the origin of the joint that the recursion towards the base has reached.
+    """
 
     a: Vector
     b: Vector
@@ -68,14 +73,18 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The step from a joint's orientation and origin to those of its parent.
+    """The change of axes and origin from a joint to its parent, in the recursion towards the base.
 
-    joins     whether both share an orientation, as parallel neighbours may
-    offset    m, this origin from the parent's
-    velocity  m/s, twice the velocity of that point of the parent's link about the parent's origin; both are in the shared
-              orientation, or else along the axes of the parent's link
-    turn      the rotation of the parent, or of its group of parallel axes up to it; None if the parent has several
-              coordinates: its orientation is after its rotation
+    The orientation of a joint is the set of axes in which its quantities are given (see derivatives.py). Joints with
+    parallel axes can share one.
+
+    joins     True: the joint and its parent share an orientation
+    offset    m, this joint's origin relative to the parent's
+    velocity  m/s, twice the velocity of this joint's origin as a point of the parent's link, relative to the parent's
+              origin. `offset` and `velocity` are along the shared orientation, or else along the axes of the parent's
+              link
+    turn      rotation of the parent and of earlier joints with parallel axes; None if the parent has several
+              coordinates, because its orientation is after its rotation
     slide     m/s, twice the rate at which the parent slides; None if it does not slide
     own       this joint's rotation, if the joint has several coordinates
     drift     m/s, twice the linear rates of the parent, if the parent has several coordinates
@@ -91,16 +100,22 @@ class Step:
     drift: Vector | None = None
 
     def to_link(self, v: Vector) -> Vector:
-        """Rotate a vector from the joint's orientation to the axes in which `offset` is given."""
+        """Return a vector along the axes of `offset` and `velocity`, given along this joint's orientation (see the
+        class)."""
         return v if self.joins else to_previous(self.frame, inward(self.own, v))
 
     def to_orientation(self, v: Vector) -> Vector:
-        """Rotate a vector from the axes in which `offset` is given to the parent's orientation."""
+        """Return a vector along the parent's orientation (see the class), given along the axes of `offset` and
+        `velocity`."""
         return v if self.joins else inward(self.turn, v)
 
-    def carried(self, wrench: Wrench) -> Wrench:
+    def to_parent(self, wrench: Wrench) -> Wrench:
+        """Return a wrench about the parent's origin, along the axes in which `offset` is given."""
         force = self.to_link(wrench[0])
-        moment = add(self.to_link(wrench[1]), cross(self.offset, force))
+        return force, add(self.to_link(wrench[1]), cross(self.offset, force))
+
+    def carried(self, wrench: Wrench) -> Wrench:
+        force, moment = self.to_parent(wrench)
         return self.to_orientation(force), self.to_orientation(moment)
 
     def carried_row(self, row: Row) -> Row:
@@ -124,8 +139,12 @@ def axis_and_step(
     forward: Forward,
     axes: Sequence[Axis],
 ) -> tuple[Axis, Step]:
-    """Return the motion before joint i, and the step from joint i to its parent. qd and qdd have one value or tuple per
-    joint."""
+    """Return the motion of the link before joint i, and the change of axes and origin from joint i to its parent.
+
+    qd, qdd            one value per joint; for a joint of several coordinates, a tuple
+    base_acceleration  m/s^2, minus gravity
+    axes               results for the joints before i
+    """
     frame, offset, parent = frames[i], forward.states[i].offset, frames[i].parent
     own = None if frame.joint.about_z else forward.states[i].turn
     if parent == BASE:
@@ -166,7 +185,12 @@ def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tupl
 
 
 def axis_of(w: Vector, dw: Vector, acceleration: Vector, up: Vector) -> Axis:
-    """Return an Axis from the motion of the link before the joint, given along the joint's axes."""
+    """Return an Axis, the motion of the link before a joint, from vectors along the joint's axes.
+
+    w, dw         rad/s, rad/s^2, angular velocity of the link, and its derivative
+    acceleration  m/s^2, of the joint's origin as a point of the link
+    up            m/s^2, acceleration of the base, minus gravity
+    """
     wx, wy, _ = w
     twice = (wy + wy, -(wx + wx), 0.0)
     return Axis(w, dw, spin_of(Rates(w, dw)), acceleration, (wy, -wx, 0.0), twice, up)

@@ -70,8 +70,15 @@ def jacobian(
 def columns_at(
     frames: Sequence[Frame], body: int, placed: Sequence[tuple[Matrix, Vector]], point: Vector
 ) -> list[tuple[Scalar, ...]]:
-    """Return, for each of the nv unit joint rates, the velocity of a point of a body and the body's angular velocity.
-    They are zero for rates that do not carry the body."""
+    """Return, for each of the nv joint rates, the velocity of a point of a body and the body's angular velocity at unit
+    rate.
+
+    They are zero for joints that do not carry the body.
+
+    body    index of the body
+    placed  rotation and origin of each joint frame in the base frame
+    point   m, in the base frame
+    """
     first = first_rates(frames)
     columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
     for i in path_to(frames, body):
@@ -81,7 +88,13 @@ def columns_at(
 
 
 def column(twist: Twist, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
-    """Return the velocity of a point, and the angular velocity, of a body that moves with a constant twist of a frame."""
+    """Return the velocity of a point, and the angular velocity, of a body that moves with a given twist, in the base
+    frame.
+
+    twist   linear velocity of a frame's origin and angular velocity, along the frame's axes
+    placed  rotation and origin (m) of the frame in the base frame
+    point   m, in the base frame
+    """
     rotation, origin = placed
     along, about = twist
     linear, angular = turned(rotation, along), turned(rotation, about)

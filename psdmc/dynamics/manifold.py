@@ -1,8 +1,8 @@
-"""The position after motion at constant rates, and the rates that lead from one position to another, joint by joint.
-The values can be numbers or symbols.
+"""Computes the position after motion at constant joint rates, and the constant rates between two positions.
 
-If a joint has several coordinates, its q is a point on a manifold: a quaternion has length one. Its tangents are the
-rates, nv in total, along the axes of the moved frame.
+The values can be numbers or symbols. If a joint has several coordinates, such as a quaternion, its nq coordinates q
+must satisfy a condition: the length of a quaternion is one. Its rates, fewer in number (nv), are along the axes of the
+frame that the joint moves.
 """
 
 from __future__ import annotations
@@ -27,22 +27,29 @@ def difference(frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Sca
 
 
 def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
-    """Return the changes per second of the nq coordinates at these nv rates."""
+    """Return the changes per second of the nq coordinates q, such as quaternions, at nv joint rates `rates`."""
     return [x for joint, here, own in _joints(frames, q, rates) for x in joint.coordinate_rates(here, own)]
 
 
 def rates_bent(
     frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
 ) -> list[Scalar]:
-    """Return the changes per second of `coordinate_rates`, for constant joint rates `rates`, while q moves at the joint
-    rates `way`."""
+    """Return the changes per second (nq) of the result of `coordinate_rates` at constant joint rates, while q moves.
+
+    rates  (nv) the constant joint rates
+    way    (nv) joint rates at which q moves
+    """
     both = zip(_joints(frames, q, rates), _joints(frames, q, way), strict=True)
     return [x for (joint, here, own), (_, _, moved) in both for x in joint.rates_bent(here, own, moved)]
 
 
 def tangent(frames: Sequence[Frame], q: Sequence[Scalar], moved: Sequence[Scalar]) -> list[Scalar]:
-    """Return the nv rates of `restored(q)` while the coordinates q change by the nq values `moved` per second.
-    Quaternions in q may have any length."""
+    """Return the nv joint rates that correspond to given changes per second of the nq coordinates q.
+
+    Quaternions in q may have any length. Their coordinates are scaled to length one before the rates are computed.
+
+    moved  (nq) changes per second of the coordinates
+    """
     return [x for joint, here, own in _coordinates(frames, q, moved) for x in joint.tangent(here, own)]
 
 
@@ -52,7 +59,8 @@ def restored(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
 
 
 def pulled_back(frames: Sequence[Frame], q: Sequence[Scalar], gradient: Sequence[Scalar]) -> list[Scalar]:
-    """Convert nq derivatives of a quantity by the coordinates to its nv derivatives along the tangent at q."""
+    """Return the nv derivatives of a quantity by motion at the joint rates, from its nq derivatives by the coordinates
+    q."""
     found: list[Scalar] = []
     for joint, here, own in _coordinates(frames, q, gradient):
         for k in range(joint.nv):

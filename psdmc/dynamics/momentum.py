@@ -8,7 +8,8 @@ from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
 from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import forward_kinematics
-from psdmc.dynamics.motion import JointState
+from psdmc.dynamics.motion import JointState, sweep_outward
+from psdmc.dynamics.newton_euler import wrench
 from psdmc.dynamics.regressor import Twist, carried
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform
 from psdmc.dynamics.slices import positions, rates
@@ -28,7 +29,11 @@ def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -
 
 
 def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Compute a body's momentum m v + w x h, and its angular momentum h x v + I w about the frame's origin."""
+    """Return a body's momentum m v + w x h, and its angular momentum h x v + I w about the origin of a frame.
+
+    The frame has velocity v and angular velocity w. The body has mass m, first moments h and inertia I about its
+    origin.
+    """
     linear, (wx, wy, wz) = twist
     xx, yy, zz, xy, xz, yz = body.second
     own = (
@@ -44,10 +49,35 @@ def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
 def total_momentum(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], qd: Sequence[Scalar]
 ) -> tuple[Vector, Vector]:
-    """Compute the momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, in the base frame of the joint
-    frames. The bodies must be the real ones: others with the same torques have another momentum."""
+    """Compute the momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, about the origin of the base frame.
+
+    The bodies must be the robot's real ones: bodies made from base parameters have the same torques, but another
+    momentum.
+    """
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
-    states, total = _states(frames, q), (ZERO, ZERO)
+    return _at_base(frames, _states(frames, q), moving)
+
+
+@on_coordinates()
+def total_momentum_rate(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+) -> tuple[Vector, Vector]:
+    """Compute the derivative of `total_momentum` by time: the sums of all external forces (N) and of their moments (N m)."""
+    forward = sweep_outward(frames, q, qd, None, qdd, ZERO)
+    moving = [wrench(motion, body) for motion, body in zip(forward.motions, bodies, strict=True)]
+    return _at_base(frames, forward.states, moving)
+
+
+def _at_base(
+    frames: Sequence[Frame], states: Sequence[JointState], moving: list[tuple[Vector, Vector]]
+) -> tuple[Vector, Vector]:
+    """Sum forces, and moments about each joint frame's origin, along and about the frame that the first joint frame turns
+    from. Momenta are summed likewise."""
+    total = (ZERO, ZERO)
     for i in reversed(range(len(frames))):
         frame, (linear, angular) = frames[i], moving[i]
         linear = to_previous(frame, inward(states[i].turn, linear))
@@ -64,8 +94,11 @@ def total_momentum(
 def momentum_matrix(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]
 ) -> list[list[Scalar]]:
-    """Compute the 6 x nv matrix whose columns are `total_momentum` at unit rate of each joint, by composite bodies. The
-    bodies must be the real ones."""
+    """Compute the 6 x nv matrix whose products with joint rates are the momentum and angular momentum of all bodies.
+
+    The method is that of composite bodies, which join each body with all bodies that it carries. The bodies must be the
+    robot's real ones, not bodies made from base parameters.
+    """
     found: list[list[tuple[Vector, Vector]]] = [[] for _ in frames]
     placed, states, composites = forward_kinematics(frames, q), _states(frames, q), list(bodies)
     for i in reversed(range(len(frames))):

@@ -65,6 +65,15 @@ def at_rest(body: Body) -> Composite:
     return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
 
 
+def relieved(composite: Composite, force: Vector, moment: Vector) -> Composite:
+    """Return the composite with an external wrench subtracted from the wrench that its motion needs. The external wrench is
+    constant along the link's axes."""
+    own_force, own_moment = composite.wrench
+    return composite._replace(
+        wrench=(add(own_force, scale(force, -1.0)), add(own_moment, scale(moment, -1.0)))
+    )
+
+
 def both(a: Composite, b: Composite) -> Composite:
     """Add two composites (several bodies as one), both about one point and relative to one link."""
     second = tuple(add(x, y) for x, y in zip(a.momenta.second, b.momenta.second, strict=True))

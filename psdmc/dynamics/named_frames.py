@@ -4,13 +4,26 @@ the velocities."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from psdmc.dynamics.following import matrices_summed, on_coordinates
-from psdmc.dynamics.frames import Frame, as_matrix, as_vector
+from psdmc.dynamics.frames import Frame, as_matrix, as_vector, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import AT_BASE, columns_at, forward_kinematics, path_to
 from psdmc.dynamics.motion import sweep_outward
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transform
-from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    multiply,
+    scale,
+    transform,
+    transpose,
+)
+from psdmc.dynamics.slices import first_rates, positions
+from psdmc.dynamics.twist import turned
 from psdmc.robot.mechanism import NamedFrame
 
 Root = tuple[Matrix, Vector]
@@ -43,7 +56,29 @@ def frame_jacobians(
     return found
 
 
-@on_coordinates()
+@on_coordinates(matrices_summed)
+def local_jacobians(
+    frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar]
+) -> list[list[list[Scalar]]]:
+    """Compute the 6 x nv Jacobian of each named frame along the frame's own axes. The sweep carries these axes and the
+    frame's origin from joint to joint towards the base."""
+    first, own, found = first_rates(frames), positions(frames, q), []
+    for each in named:
+        columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
+        rows, arm = transpose(_rotation(each)), as_vector(each.placement.translation.tolist())
+        for i in reversed(path_to(frames, each.joint)):
+            frame, turn = frames[i], joint_turn(frames[i], own[i])
+            for k, (along, about) in enumerate(frame.joint.twists, start=first[i]):
+                linear = turned(rows, along)
+                if any(about):
+                    linear = add(linear, transform(rows, cross(about, arm)))
+                columns[k] = (*linear, *turned(rows, about))
+            x, y, z = (to_previous(frame, inward(turn, row)) for row in rows)
+            rows, arm = (x, y, z), add(joint_offset(frame, own[i]), to_previous(frame, inward(turn, arm)))
+        found.append([[column[row] for column in columns] for row in range(6)])
+    return found
+
+
 def frame_drifts(
     frames: Sequence[Frame],
     named: Sequence[NamedFrame],
@@ -51,10 +86,24 @@ def frame_drifts(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[tuple[Scalar, ...]]:
-    """Compute the drift of each named frame, that is, the accelerations of the frame at constant joint rates. Each
-    drift has six values along the base's axes: acceleration of the origin, then angular acceleration."""
+    """Compute six values per named frame: acceleration of its origin, then angular acceleration, at constant joint
+    rates, along the base's axes."""
+    return frame_accelerations(frames, named, q, qd, [0.0] * len(qd), root)
+
+
+@on_coordinates()
+def frame_accelerations(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[tuple[Scalar, ...]]:
+    """Compute six values per named frame: acceleration of its origin, without gravity, then angular acceleration, along
+    the base's axes."""
     joints = _in_base(frames, q, root)
-    forward = sweep_outward(frames, q, qd, None, [0.0] * first_rates(frames)[-1], ZERO)
+    forward = sweep_outward(frames, q, qd, None, qdd, ZERO)
     found = []
     for each in named:
         rotation, motion = joints[each.joint][0], forward.motions[each.joint]
@@ -87,12 +136,7 @@ def frame_velocity_slopes(
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
         columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
         path = path_to(frames, each.joint)
-        own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
-        twists = {
-            k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))
-            for j in path
-            for k in own[j]
-        }
+        own, twists = _twists_along(path, frames, first, rows)
         turning = [_sum(scale(twists[k][1], qd[k]) for k in own[j]) for j in path]
         before = dict(zip(path, _running(turning), strict=True))
         linear, angular = ZERO, ZERO
@@ -106,6 +150,86 @@ def frame_velocity_slopes(
                 columns[k] = (*moved, *cross(about, angular))
         found.append([[column[row] for column in columns] for row in range(6)])
     return found
+
+
+class FrameSlopes(NamedTuple):
+    """Derivatives of the acceleration of each named frame, 6 x nv each: by q, along its tangent, by qd and by qdd."""
+
+    by_q: list[list[list[Scalar]]]
+    by_qd: list[list[list[Scalar]]]
+    by_qdd: list[list[list[Scalar]]]
+
+
+def _slopes_summed(frames: Sequence[Frame], found: FrameSlopes) -> FrameSlopes:
+    return FrameSlopes(*(matrices_summed(frames, block) for block in found))
+
+
+@on_coordinates(_slopes_summed)
+def frame_acceleration_slopes(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> FrameSlopes:
+    """Compute the derivatives of `frame_accelerations`, along the base's axes.
+
+    As in `frame_velocity_slopes`, joint j moves what it carries along the twists (v, z) of its columns. The link before it
+    has the angular velocity w, and dw is the derivative of w. Relative to that link, joints from j on give the frame the
+    velocity (u, s) and the acceleration (b, c).
+
+    By q, these are turned, and the frame's origin moves in the field of the link before:
+        dw x v + w x (w x v) + 2 w x (z x u) + z x b,   w x (z x s) + z x c.
+    By qd, with the joint's own velocity (V, Z), which is along (v, z) where the joint has one rate:
+        2 (w x v + z x u) + Z x v - z x V,   w x z + z x s - z x Z.
+    """
+    by_qdd = frame_jacobians(frames, named, q, root)
+    first, by_q, by_qd = first_rates(frames), [], []
+    for each, rows in zip(named, by_qdd, strict=True):
+        path = path_to(frames, each.joint)
+        own, twists = _twists_along(path, frames, first, rows)
+        links, w, dw = {}, ZERO, ZERO
+        for j in path:
+            links[j] = w, dw
+            about = _sum(scale(twists[k][1], qd[k]) for k in own[j])
+            dw = add(add(dw, cross(w, about)), _sum(scale(twists[k][1], qdd[k]) for k in own[j]))
+            w = add(w, about)
+        positions_by, rates_by = ([(0.0,) * 6] * first[-1] for _ in range(2))
+        u, s, b, c = ZERO, ZERO, ZERO, ZERO
+        for j in reversed(path):
+            w, dw = links[j]
+            along, about = (_sum(scale(twists[k][part], qd[k]) for k in own[j]) for part in range(2))
+            b = add(b, cross(about, add(along, scale(u, 2.0))))
+            c = add(c, cross(about, s))
+            u, s = add(u, along), add(s, about)
+            for k in own[j]:
+                b, c = add(b, scale(twists[k][0], qdd[k])), add(c, scale(twists[k][1], qdd[k]))
+            for k in own[j]:
+                v, z = twists[k]
+                swung, carried, spun = cross(z, u), cross(w, v), cross(z, s)
+                moved = add(cross(dw, v), cross(w, add(carried, scale(swung, 2.0))))
+                positions_by[k] = (*add(moved, cross(z, b)), *add(cross(w, spun), cross(z, c)))
+                linear, angular = scale(add(carried, swung), 2.0), add(cross(w, z), spun)
+                if len(own[j]) > 1:  # a joint's own rates bend each other
+                    linear = add(linear, add(cross(about, v), cross(along, z)))
+                    angular = add(angular, cross(about, z))
+                rates_by[k] = (*linear, *angular)
+        by_q.append([[column[row] for column in positions_by] for row in range(6)])
+        by_qd.append([[column[row] for column in rates_by] for row in range(6)])
+    return FrameSlopes(by_q, by_qd, by_qdd)
+
+
+def _twists_along(
+    path: Sequence[int], frames: Sequence[Frame], first: Sequence[int], rows: Sequence[Sequence[Scalar]]
+) -> tuple[dict[int, range], dict[int, tuple[Vector, Vector]]]:
+    """Return the numbers of the rates of each joint of a path, and the columns of these rates, linear and angular."""
+    own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
+    return own, {
+        k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))
+        for j in path
+        for k in own[j]
+    }
 
 
 def _sum(parts: Iterable[Vector]) -> Vector:

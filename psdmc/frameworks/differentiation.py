@@ -69,6 +69,9 @@ def rule_of(function: str) -> Rule | None:
         return _gradient(function)
     if "A" in (output.name for output in _outputs(f"{function}_derivatives")):
         return _step(function)
+    blocks = {f"d{out.name}_d{by.name}" for out in _outputs(function) for by in SIGNATURES[function].inputs}
+    if blocks and blocks == {output.name for output in _outputs(f"{function}_derivatives")}:
+        return _OTHERS.get(function) or _blocks(function)
     return _OTHERS.get(function)
 
 
@@ -113,27 +116,52 @@ def _times(f: Framework, matrix: Array, vector: Array) -> Array:
 
 
 def _gradient(name: str) -> Rule:
-    """Of inverse and forward dynamics, which have functions for both modes. Torques are linear in theta_b: the regressor
-    gives their change, and at fixed torques accelerations change as by the opposite torques."""
+    """Of inverse and forward dynamics, with wrenches or without, which have functions for both modes. Torques are linear in
+    theta_b: the regressor gives their change, and at fixed torques accelerations change as by the opposite torques."""
+    is_inverse = name.startswith("inverse_dynamics")
 
     def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
-        if name == "inverse_dynamics":
+        if is_inverse:
             (found,) = f.call(f"{name}_jvp", *inputs, *tangents)[1:]
             if dtheta is not None:
-                found = found + _times(f, f.call("regressor", *inputs)[0], dtheta)
+                found = found + _times(f, f.call("regressor", *inputs[:3])[0], dtheta)
             return (found,)
         if dtheta is not None:
             (qdd,) = f.call(name, *inputs)
             (regressor,) = f.call("regressor", *inputs[:2], qdd)
-            tangents = (*tangents[:2], tangents[2] - _times(f, regressor, dtheta))
+            dq, dqd, dtau, *others = tangents
+            tangents = (dq, dqd, dtau - _times(f, regressor, dtheta), *others)
         return f.call(f"{name}_jvp", *inputs, *tangents)[1:]
 
     def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
-        called = f"{name}_vjp_parameters" if by_theta else f"{name}_vjp"
-        _, *found = f.call(called, *inputs, *cotangents)
-        return tuple(found[:3]), found[3] if by_theta else None
+        has_own = f"{name}_vjp_parameters" in SIGNATURES
+        called = f"{name}_vjp_parameters" if by_theta and has_own else f"{name}_vjp"
+        value, *found = f.call(called, *inputs, *cotangents)
+        gradients, last = tuple(found[: len(inputs)]), found[len(inputs) :]
+        if not by_theta or has_own:
+            return gradients, last[0] if by_theta else None
+        weights, qdd = (cotangents[0], inputs[2]) if is_inverse else (-gradients[2], value)
+        return gradients, _weighted(f, weights, f.call("regressor", *inputs[:2], qdd)[0])
 
     return Rule(along, back, parameters=True)
+
+
+def _blocks(name: str) -> Rule:
+    """Return the rule of a function of vectors along nv, if another function computes all of its derivatives."""
+    ((*axes,),) = (output.axes for output in _outputs(name))
+    rows = "abc"[: len(axes)]
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        pairs = zip(f.call(f"{name}_derivatives", *inputs), tangents, strict=True)
+        first, *others = (f.arrays.einsum(f"...{rows}j,...j->...{rows}", *pair) for pair in pairs)
+        return (sum(others, start=first),)
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        found = f.call(f"{name}_derivatives", *inputs)
+        (weights,) = cotangents
+        return tuple(f.arrays.einsum(f"...{rows},...{rows}j->...j", weights, block) for block in found), None
+
+    return Rule(along, back)
 
 
 def _step(name: str) -> Rule:

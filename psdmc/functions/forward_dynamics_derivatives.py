@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from psdmc.dynamics.arrow import Matrix, any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
@@ -33,15 +34,21 @@ def trace(g: Ingredients) -> Outputs:
     M^-1 after these operations, by matrix products. The derivative by qd comes first, because its entries are known
     first.
     """
-    if any_limbs(g.frames):
-        return _in_limbs(g)
+    return _in_limbs(g) if any_limbs(g.frames) else traced(g, g.inputs["tau"])
+
+
+def traced(
+    g: Ingredients, torques: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> Outputs:
+    """Trace without limbs, also for other functions. `torques` are the sums of joint torques and of those of external
+    wrenches on the links."""
     at_rest = _torque_derivatives(g, g.still)
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
     bias = [0.5 * inner_product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
-    load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
+    load = [tau - h for tau, h in zip(torques, bias, strict=True)]
     accelerations = solve(factors, load)
-    moving = _torque_derivatives(g, accelerations)
+    moving = _torque_derivatives(g, accelerations, external)
     by_tau = inverse(factors)
     return {
         "dtau_dqd": list(zip(*at_rest.by_qd, strict=True)),
@@ -103,10 +110,12 @@ def multiplied(g: Ingredients) -> Outputs:
     return {"qdd": found["qdd"], **blocks, "dqdd_dtau": by_tau, "pivot": found["pivot"]}
 
 
-def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
+def _torque_derivatives(
+    g: Ingredients, qdd: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> Derivatives:
     q, qd = g.inputs["q"], g.inputs["qd"]
     return inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
+        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices, external
     )
 
 

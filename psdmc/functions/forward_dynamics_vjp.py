@@ -34,7 +34,7 @@ def trace(g: Ingredients) -> Outputs:
     """
     qdd, factors = accelerations(g, g.inputs["tau"])
     weights = factors.solved(g.inputs[COTANGENT.name])
-    by_q, by_qd = torque_gradients(g, qdd, weights)
+    by_q, by_qd, _ = torque_gradients(g, qdd, weights)
     return {
         "qdd": qdd,
         "grad_q": [-value for value in by_q],

@@ -279,11 +279,26 @@ TAU = Quantity(
 def jacobian_of(output: str, by: str) -> Quantity:
     """Return the description (Quantity) of a matrix (nv, nv) of derivatives. `output`, such as joint torques, is
     differentiated by `by`, such as joint rates; nv is the number of joint rates."""
-    of_q = "q[j] (with a ball joint or floating base: for v[j] of a small displacement integrate(q, v))"
-    entry = of_q if by == "q" else f"{by}[j]"
     known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}
-    above, below = known.get(output, TAU), known[by]
-    unit = str(times(above.dimension, below.dimension, -1))
-    powers = (above.powers[0], -below.powers[0])
-    means = f"derivatives of {output} by {by}: row i for {output}[i], column j for {entry}"
-    return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means, unit=unit, powers=powers)
+    return derivative_of(replace(known.get(output, TAU), name=output), known[by])
+
+
+def derivative_of(above: Quantity, below: Quantity) -> Quantity:
+    """Return the Quantity of the derivatives of one quantity by another. Its axes are those of the first, then those of
+    the second, or nv if the second is q."""
+    of_q = "q[j] (with a ball joint or floating base: for v[j] of a small displacement integrate(q, v))"
+    entry = of_q if below.name == Q.name else f"{below.name}[j]"
+    axes = ("nv",) if below.axes == Q.axes else below.axes
+    rows = f"row i for {above.name}[i]" if len(above.axes) == 1 else f"the axes of {above.name}"
+    columns = f"column j for {entry}" if len(axes) == 1 else f"then the axes of {below.name}"
+    return Quantity(
+        f"d{above.name}_d{below.name}",
+        (*above.axes, *axes),
+        means=f"derivatives of {above.name} by {below.name}: {rows}, {columns}",
+        unit=str(times(above.dimension, below.dimension, -1)),
+        powers=(*_powers(above), *(-power for power in _powers(below))),
+    )
+
+
+def _powers(quantity: Quantity) -> tuple[int, ...]:
+    return quantity.powers or (0,) * len(quantity.axes)

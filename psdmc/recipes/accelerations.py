@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from psdmc.dynamics.arrow import Arrow, eliminated
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.forward_dynamics import forward_dynamics
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.recipes.recipe import Ingredients
@@ -24,20 +25,21 @@ MASS_MATRIX = SymmetricMatrix(
 """M(q), which functions solve or invert."""
 
 
-def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Arrow]:
-    """Return the n joint accelerations M^-1 (tau - h), where M is the mass matrix and h the torque at zero
-    acceleration. Return the factors of M, too.
+def accelerations(
+    g: Ingredients, tau: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> tuple[list[Scalar], Arrow]:
+    """Return n accelerations M^-1 (tau - h), and the factors of M. The bias h contains external wrenches on the links.
 
     M is factorized before h is computed. The divisions of the factorization must wait for each other, and the processor
     computes h meanwhile.
     """
     factors = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
-    bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
+    bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration, external=external)
     return factors.solved([given - h for given, h in zip(tau, bias, strict=True)]), factors
 
 
 def accelerations_and_pivots(
-    g: Ingredients, tau: Sequence[Scalar]
+    g: Ingredients, tau: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
 ) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
     """Return the nv joint accelerations M^-1 (tau - h), and the nv pivots (divisors in the factorization) of the mass
     matrix M. Here h is the torque at zero acceleration.
@@ -45,7 +47,9 @@ def accelerations_and_pivots(
     `choices` selects the algorithm: factorization of M, or articulated bodies.
     """
     if not g.choices.articulated:
-        found, factors = accelerations(g, tau)
+        found, factors = accelerations(g, tau, external)
         return found, factors.pivots
     q, qd = g.inputs["q"], g.inputs["qd"]
-    return forward_dynamics(g.frames, g.bodies, g.drives, q, qd, tau, g.base_acceleration, g.choices)
+    return forward_dynamics(
+        g.frames, g.bodies, g.drives, q, qd, tau, g.base_acceleration, g.choices, external
+    )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from psdmc import reproducible
 from psdmc.dynamics.manifold import coordinate_rates, pulled_back
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program import dimensions
 from psdmc.program.replay import substituted
@@ -66,17 +67,23 @@ _FREE = "free_qdd"
 
 
 def torque_gradients(
-    g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
-) -> tuple[list[Scalar], list[Scalar]]:
+    g: Ingredients,
+    qdd: Sequence[Scalar],
+    weights: Sequence[Scalar],
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+    others: Sequence[Any] = (),
+) -> tuple[list[Scalar], list[Scalar], list[Scalar]]:
     """Return the gradients of the weighted sum of torques, sum of weights[i] tau[i], by q and by qd, nv entries each.
     The accelerations `qdd` count as constants.
 
     The entries for q are for small motions along the joint rates; a quaternion moves by small rotations.
     """
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
-    by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
-    found = substituted([*by_q, *by_qd], free, qdd)
-    return pulled_back(g.frames, q, found[: len(q)]), found[len(q) :]
+    tau = torques(g, qd, free, g.base_acceleration, external=external)
+    by_q, by_qd, by_others = gradients(tau, weights, (q, qd, others))
+    found = substituted([*by_q, *by_qd, *by_others], free, qdd)
+    by_q, by_qd, by_others = found[: len(q)], found[len(q) : len(q) + len(qd)], found[len(q) + len(qd) :]
+    return pulled_back(g.frames, q, by_q), by_qd, by_others
 
 
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
@@ -88,12 +95,19 @@ def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[
     return substituted(found, free, qdd)
 
 
-def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
+def torque_slopes(
+    g: Ingredients,
+    qdd: Sequence[Scalar],
+    external: Mapping[int, Wrench] = NO_WRENCHES,
+    others: Sequence[Any] = (),
+    along: Sequence[Scalar] = (),
+) -> list[Scalar]:
     """Return the derivatives of the joint torques along the changes dq of q and dqd of qd. The accelerations `qdd`
     count as constants."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
-    along = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name]]
-    return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
+    tau = torques(g, qd, free, g.base_acceleration, external=external)
+    way = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name], *along]
+    return substituted(slopes(tau, [*q, *qd, *others], way), free, qdd)
 
 
 def _free(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
@@ -108,8 +122,10 @@ def solved(matrices: Array, right: Array) -> Array:
 
 
 def weighted(weights: Array, matrices: Array) -> Array:
-    """(k, n) weights^T matrix, state by state."""
-    return np.asarray(times(weights[:, None], matrices)[:, 0])
+    """(k, ...) weights^T matrix (k, n, ...), state by state."""
+    count, rows, *others = matrices.shape
+    found = times(weights[:, None], matrices.reshape(count, rows, -1))[:, 0]
+    return np.asarray(found.reshape(count, *others))
 
 
 def along(matrices: Array, direction: Array) -> Array:

@@ -93,12 +93,14 @@ class RobotOnArrays:
         )
         return columns(torques, len(q))
 
-    def torque_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+    def torque_derivatives(
+        self, q: Array, qd: Array, qdd: Array, external: Mapping[int, Wrench] = NO_WRENCHES
+    ) -> tuple[Array, Array, Array]:
         """Return the derivatives of the joint torques by q, by qd and by qdd, an array (k, n, n) each, for k states.
         Row i has the derivatives of tau[i]."""
         given = (list(q.T), list(qd.T), list(qdd.T))
         found = inverse_dynamics_derivatives(
-            self.frames, self.bodies, self.drives, *given, self.base_acceleration
+            self.frames, self.bodies, self.drives, *given, self.base_acceleration, external=external
         )
         by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
         return by_q, by_qd, by_qdd

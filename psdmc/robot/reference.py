@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -25,7 +26,8 @@ DIFFERENCE = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n) with n joints, SI.
+    """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n) with n joints, and wrenches
+    (..., frames, 6), SI.
 
     tip_name     name of the frame of which `jacobian` returns the Jacobian
     frame_names  the named frames; empty: the tip alone
@@ -58,11 +60,11 @@ class Reference:
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
-    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        return self.each(pinocchio.rnea, q, qd, qdd)
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, wrenches: Array | None = None) -> Array:
+        return self._loaded(pinocchio.rnea, wrenches, q, qd, qdd)
 
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
-        return self.each(pinocchio.aba, q, qd, tau)
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array, wrenches: Array | None = None) -> Array:
+        return self._loaded(pinocchio.aba, wrenches, q, qd, tau)
 
     def mass_matrix(self, q: Array) -> Array:
         """Return the mass matrices (..., n, n) at positions q, with both triangles."""
@@ -79,29 +81,21 @@ class Reference:
         """Return the Coriolis matrices (..., n, n)."""
         return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
-    def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+    def inverse_dynamics_derivatives(
+        self, q: Array, qd: Array, qdd: Array, wrenches: Array | None = None
+    ) -> tuple[Array, Array, Array]:
         """Return the derivatives of the joint torques by q, qd and qdd, an array (..., n, n) each. Row i belongs to
         tau[i]."""
-
-        def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
-            by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
-            return np.stack([by_q, by_qd, np.triu(by_qdd) + np.triu(by_qdd, 1).T])
-
-        by_q, by_qd, by_qdd = np.moveaxis(self.each(derivatives, q, qd, qdd), -3, 0)
+        by_q, by_qd, by_qdd = np.moveaxis(self._loaded(torque_derivatives, wrenches, q, qd, qdd), -3, 0)
         return by_q, by_qd, by_qdd
 
     def forward_dynamics_derivatives(
-        self, q: Array, qd: Array, tau: Array
+        self, q: Array, qd: Array, tau: Array, wrenches: Array | None = None
     ) -> tuple[Array, Array, Array, Array]:
         """Return the joint accelerations (..., n), and their derivatives by q, qd and tau, an array (..., n, n) each.
         Row i belongs to qdd[i]."""
-
-        def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
-            by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
-            return np.stack([by_q, by_qd, np.triu(by_tau) + np.triu(by_tau, 1).T])
-
-        by_q, by_qd, by_tau = np.moveaxis(self.each(derivatives, q, qd, tau), -3, 0)
-        return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
+        by_q, by_qd, by_tau = np.moveaxis(self._loaded(acceleration_derivatives, wrenches, q, qd, tau), -3, 0)
+        return self.forward_dynamics(q, qd, tau, wrenches), by_q, by_qd, by_tau
 
     def integrated(self, q: Array, way: Array) -> Array:
         """Return the positions (..., nq) after a motion from q at constant rates. `way` is the rates multiplied by the
@@ -158,6 +152,16 @@ class Reference:
 
         return self.each(of_tip, q)
 
+    def local_frame_jacobians(self, q: Array) -> Array:
+        """Return the Jacobians (..., frames, 6, n) of the named frames, along their own axes."""
+        ids, local = self.frame_ids, pinocchio.LOCAL
+
+        def of_frames(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
+            found = [pinocchio.computeFrameJacobian(model, data, q, frame, local) for frame in ids]
+            return np.reshape(found, (-1, 6, model.nv))
+
+        return self.each(of_frames, q)
+
     def poses(self, q: Array, link_names: Sequence[str]) -> Array:
         """Return the poses (..., number of links + 1, 4, 4) of all links' frames and of the tip in the base frame."""
         kind = pinocchio.FrameType.BODY
@@ -187,6 +191,22 @@ class Reference:
         tip = model.getFrameId(self.tip_name)
         return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
 
+    def _loaded(self, function: Callable[..., Array], wrenches: Array | None, *states: Array) -> Array:
+        """Return what `each` returns, with external forces as the function's last argument if wrenches (..., frames, 6) at
+        the named frames are given. Pinocchio's forces are about the joints' origins, along the joints' axes."""
+        if wrenches is None:
+            return self.each(function, *states)
+        ids = self.frame_ids
+
+        def loaded(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
+            forces = [pinocchio.Force.Zero() for _ in range(model.njoints)]
+            for number, wrench in zip(ids, state[-1].reshape(-1, 6), strict=True):
+                frame = model.frames[number]
+                forces[frame.parentJoint] += frame.placement.act(pinocchio.Force(wrench))
+            return function(model, data, *state[:-1], forces)
+
+        return self.each(loaded, *states, np.reshape(wrenches, (*wrenches.shape[:-2], -1)))
+
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
         """Return the values of a Pinocchio function of (model, data, state ...) at every state. The leading axes of the
         states broadcast as in NumPy."""
@@ -196,6 +216,22 @@ class Reference:
         flat = [np.broadcast_to(row, (*lead, row.shape[-1])).reshape(-1, row.shape[-1]) for row in rows]
         results = [np.array(function(self.model, data, *row)) for row in zip(*flat, strict=True)]
         return np.array(results).reshape(*lead, *results[0].shape)
+
+
+def torque_derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Any) -> Array:
+    """Return the derivatives (3, n, n) by q, qd and qdd; `state` is these three, and external forces if there are any."""
+    return _whole(pinocchio.computeRNEADerivatives(model, data, *state))
+
+
+def acceleration_derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Any) -> Array:
+    """Return the derivatives (3, n, n) by q, qd and tau; `state` is these three, and external forces if there are any."""
+    return _whole(pinocchio.computeABADerivatives(model, data, *state))
+
+
+def _whole(blocks: Sequence[Array]) -> Array:
+    """Return the blocks as one array. Pinocchio fills only the upper triangle of the last one, which is symmetric."""
+    *others, symmetric = blocks
+    return np.stack([*others, np.triu(symmetric) + np.triu(symmetric, 1).T])
 
 
 def _way_to(frame: int, model: pinocchio.Model, data: pinocchio.Data) -> float:

@@ -91,6 +91,64 @@ class Impulse(NamedTuple, Generic[RealT]):
     qd_after: NDArray[RealT]
     impulses: NDArray[RealT]
 
+class FrameAccelerationDerivatives(NamedTuple, Generic[RealT]):
+    da_dq: NDArray[RealT]
+    da_dqd: NDArray[RealT]
+    da_dqdd: NDArray[RealT]
+
+class ComVelocityDerivatives(NamedTuple, Generic[RealT]):
+    dv_dq: NDArray[RealT]
+    dv_dqd: NDArray[RealT]
+
+class ComAccelerationDerivatives(NamedTuple, Generic[RealT]):
+    da_dq: NDArray[RealT]
+    da_dqd: NDArray[RealT]
+    da_dqdd: NDArray[RealT]
+
+class CentroidalMomentumDerivatives(NamedTuple, Generic[RealT]):
+    dh_dq: NDArray[RealT]
+    dh_dqd: NDArray[RealT]
+
+class CentroidalMomentumRateDerivatives(NamedTuple, Generic[RealT]):
+    dhdot_dq: NDArray[RealT]
+    dhdot_dqd: NDArray[RealT]
+    dhdot_dqdd: NDArray[RealT]
+
+class ForwardDynamicsWithWrenchesDerivatives(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    dqdd_dq: NDArray[RealT]
+    dqdd_dqd: NDArray[RealT]
+    dqdd_dtau: NDArray[RealT]
+    dqdd_dwrenches: NDArray[RealT]
+
+class ForwardDynamicsWithWrenchesVjp(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    grad_q: NDArray[RealT]
+    grad_qd: NDArray[RealT]
+    grad_tau: NDArray[RealT]
+    grad_wrenches: NDArray[RealT]
+
+class ForwardDynamicsWithWrenchesJvp(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    dqdd: NDArray[RealT]
+
+class InverseDynamicsWithWrenchesDerivatives(NamedTuple, Generic[RealT]):
+    dtau_dq: NDArray[RealT]
+    dtau_dqd: NDArray[RealT]
+    dtau_dqdd: NDArray[RealT]
+    dtau_dwrenches: NDArray[RealT]
+
+class InverseDynamicsWithWrenchesVjp(NamedTuple, Generic[RealT]):
+    tau: NDArray[RealT]
+    grad_q: NDArray[RealT]
+    grad_qd: NDArray[RealT]
+    grad_qdd: NDArray[RealT]
+    grad_wrenches: NDArray[RealT]
+
+class InverseDynamicsWithWrenchesJvp(NamedTuple, Generic[RealT]):
+    tau: NDArray[RealT]
+    dtau: NDArray[RealT]
+
 class CompiledRobot(CompiledFunctions, Generic[RealT]):
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def inverse_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsDerivatives[RealT]: ...
@@ -138,3 +196,21 @@ class CompiledRobot(CompiledFunctions, Generic[RealT]):
     def delassus(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def constrained_forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamics[RealT]: ...
     def impulse(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> Impulse[RealT]: ...
+    def frame_jacobian_local(self, q: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def frame_acceleration(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def frame_acceleration_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> FrameAccelerationDerivatives[RealT]: ...
+    def com_velocity(self, q: ArrayLike, qd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def com_velocity_derivatives(self, q: ArrayLike, qd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> ComVelocityDerivatives[RealT]: ...
+    def com_acceleration(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def com_acceleration_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> ComAccelerationDerivatives[RealT]: ...
+    def centroidal_momentum(self, q: ArrayLike, qd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def centroidal_momentum_derivatives(self, q: ArrayLike, qd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> CentroidalMomentumDerivatives[RealT]: ...
+    def centroidal_momentum_rate(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def centroidal_momentum_rate_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> CentroidalMomentumRateDerivatives[RealT]: ...
+    def forward_dynamics_with_wrenches(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, wrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
+    def forward_dynamics_with_wrenches_derivatives(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, wrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ForwardDynamicsWithWrenchesDerivatives[RealT]: ...
+    def forward_dynamics_with_wrenches_vjp(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, wrenches: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ForwardDynamicsWithWrenchesVjp[RealT]: ...
+    def forward_dynamics_with_wrenches_jvp(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, wrenches: ArrayLike, dq: ArrayLike, dqd: ArrayLike, dtau: ArrayLike, dwrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ForwardDynamicsWithWrenchesJvp[RealT]: ...
+    def inverse_dynamics_with_wrenches_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsWithWrenchesDerivatives[RealT]: ...
+    def inverse_dynamics_with_wrenches_vjp(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsWithWrenchesVjp[RealT]: ...
+    def inverse_dynamics_with_wrenches_jvp(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, dq: ArrayLike, dqd: ArrayLike, dqdd: ArrayLike, dwrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsWithWrenchesJvp[RealT]: ...

@@ -18,8 +18,16 @@ from psdmc.toolchain.call import CompiledRobot
 EXACT, SOLVED = 1e-10, 1e-8
 """Of each output's largest entry; SOLVED where the mass matrix is inverted."""
 
-INVERTING = {"forward_dynamics", "mass_matrix_inverse", "semi_implicit_euler", "rk4_step"}
+INVERTING = {
+    "forward_dynamics",
+    "forward_dynamics_with_wrenches",
+    "mass_matrix_inverse",
+    "semi_implicit_euler",
+    "rk4_step",
+}
 COUNT = 4
+BY_THETA = ("inverse_dynamics", "forward_dynamics", "mass_matrix", "kinetic_energy")
+BY_THETA += ("inverse_dynamics_with_wrenches", "forward_dynamics_with_wrenches")
 QUICK = [("hopper", name) for name in RULED if name != "rk4_step"]
 
 
@@ -66,7 +74,7 @@ def by_state(pairs: Any) -> Array:
     return sum((a * b).reshape(COUNT, -1).sum(1) for a, b in pairs)
 
 
-@pytest.mark.parametrize("name", ["inverse_dynamics", "forward_dynamics", "mass_matrix", "kinetic_energy"])
+@pytest.mark.parametrize("name", BY_THETA)
 def test_slopes_by_theta_b(name: str) -> None:
     """Of the function itself, by central differences, along a random direction."""
     own, function, rule = differentiated("hopper"), SIGNATURES[name], require_rule(name)

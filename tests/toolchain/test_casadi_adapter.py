@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from bundled import ROBOTS, bundled_model, bundled_robot
+from bundled import ROBOTS, bundled_model, bundled_robot, robot_path
 from command_line import typed
 from pinocchio_in_casadi import acceleration, inverse_dynamics
 from random_trees import RandomTree
@@ -173,6 +173,34 @@ def test_reverse_mode_takes_the_gradient_function_where_it_is_emitted(tmp_path: 
         close(gradient, block[0].T @ [1, -2, 3, 0.5])
 
 
+def test_wrenches_are_an_input_with_derivatives(tmp_path: Path) -> None:
+    """Of two frames; the Jacobian, and the reverse mode of the emitted gradient."""
+    model = psdmc.derive(robot_path("kr6"), frames=["link4", "link6"])
+    functions = ["forward_dynamics_with_wrenches", "forward_dynamics_with_wrenches_vjp", "frame_acceleration"]
+    called = external("kr6", tmp_path / "kr6", functions, model)
+    f, frame = called("forward_dynamics_with_wrenches"), called("frame_acceleration")
+    rng = np.random.default_rng(3)
+    given = [*state(5, 6), rng.uniform(-20.0, 20.0, (2, 6))]
+    given[3] = given[3].T  # CasADi has a column per frame
+    blocks = f.jacobian()(*given, 0)
+    at = [casadi.MX.sym(f"x{k}", *np.shape(np.atleast_2d(value.T).T)) for k, value in enumerate(given)]
+    weights = np.array([1, -2, 3, 0.5, -1, 2])
+    slopes = [casadi.gradient(casadi.dot(casadi.DM(weights), f(*at)), one) for one in at]
+    found = casadi.Function("slopes", at, slopes)(*given)
+    for k, (block, gradient) in enumerate(zip(blocks, found, strict=True)):
+        flat = given[k].reshape(-1, order="F")
+        for j in range(flat.size):
+            ahead, behind = ([*given], [*given])
+            for side, sign in ((ahead, 1e-5), (behind, -1e-5)):
+                side[k] = (flat + sign * np.eye(flat.size)[j]).reshape(given[k].shape, order="F")
+            slope = (np.array(f(*ahead)) - np.array(f(*behind)))[:, 0] / 2e-5
+            assert np.abs(np.array(block)[:, j] - slope).max() <= 1e-6 * np.abs(np.array(block)).max()
+        column = np.array(gradient).reshape(-1, order="F")
+        close(column, np.array(block).T @ weights)
+    with pytest.raises(RuntimeError, match="Derivatives cannot be calculated"):
+        frame.jacobian()
+
+
 def test_missing_inputs_are_zero_and_unwanted_outputs_are_not_written(scara: External) -> None:
     """CasADi hands over null pointers for both."""
     f = scara("inverse_dynamics")
@@ -224,6 +252,25 @@ def free_state() -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def floating(tmp_path_factory: pytest.TempPathFactory) -> External:
     return external("floating", tmp_path_factory.mktemp("casadi") / "floating", ON_FLOATING, free_model())
+
+
+def test_momenta_and_wrenches_differentiate_by_every_entry_of_q(tmp_path: Path) -> None:
+    """Against difference quotients of CasADi's functions, which divide the quaternion by its length."""
+    names = ["centroidal_momentum_rate", "inverse_dynamics_with_wrenches"]
+    called = external("floating", tmp_path / "floating", names, free_model())
+    rng = np.random.default_rng(6)
+    for name in names:
+        f = called(name)
+        given = [rng.uniform(-1.0, 1.0, f.size_in(k)) for k in range(f.n_in())]
+        for k, block in enumerate(f.jacobian()(*given, 0)):
+            for j in range(given[k].size):
+                ends = []
+                for step in (1e-5, -1e-5):
+                    there = [value.copy(order="F") for value in given]
+                    there[k].reshape(-1, order="F")[j] += step
+                    ends.append(np.array(f(*there))[:, 0])
+                slope = (ends[0] - ends[1]) / 2e-5
+                assert np.abs(np.array(block)[:, j] - slope).max() <= 1e-6 * np.abs(np.array(block)).max()
 
 
 @pytest.mark.parametrize("name", ON_FLOATING)

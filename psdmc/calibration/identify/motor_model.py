@@ -13,10 +13,11 @@ from psdmc.calibration.logs.log import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motors:
-    """The torque per logged unit of each motor: the torque constant for currents, one for torques.
+    """The factors from logged effort to motor torque: torque constants if currents are logged, all one if torques are
+    logged.
 
-    torque_constant  (n,)  N m/A; one if torque is logged
-    relative_std     (n,)  relative standard deviation
+    torque_constant  (n,) N m/A, one per joint; 1 if torques are logged
+    relative_std     (n,) relative standard deviation of each constant
     """
 
     torque_constant: Array
@@ -24,11 +25,12 @@ class Motors:
 
     @staticmethod
     def torques(n: int) -> Motors:
-        """Return the motors for logs of torques: all constants are one."""
+        """Return conversion factors of one for n motors, for logs whose effort is motor torque instead of current."""
         return Motors(np.ones(n), np.zeros(n))
 
     def torque(self, effort: Array) -> Array:
-        """Return the motor torque (..., n) for logged effort."""
+        """Return the motor torque (..., n), N m: the logged effort (..., n) times the torque constant of each of n
+        joints."""
         return np.asarray(effort * self.torque_constant)
 
     @property
@@ -39,9 +41,13 @@ class Motors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsByMotors:
-    """The rows of a problem, with the change of the torque per relative error of each torque constant.
+    """The rows of a linear fit of joint torques, each with its derivatives by the relative errors of the torque
+    constants.
 
-    torque  (N, n) N m, of the problem
+    A motor's torque is proportional to its torque constant, so the derivative by the relative error is the torque.
+
+    rows    blocks of regressor rows
+    torque  (N, n) N m, measured torques of N samples and n joints
     """
 
     rows: Rows

@@ -1,9 +1,9 @@
 """Finds physically consistent parameters: every link's pseudo-inertia is positive definite, and every drive inertia is
 positive.
 
-Parameters belong to a distribution of mass if and only if the 4 x 4 matrix of its integrals of 1, r and r r^T is
-positive (Wensing, Kim, Slotine 2018). Then the mass matrix is positive definite everywhere, and forward dynamics
-exist.
+The pseudo-inertia is the 4 x 4 matrix of the integrals of 1, r and r r^T over a link's mass. It is positive if and only
+if the link's parameters belong to a distribution of mass (Wensing, Kim, Slotine 2018). Then the mass matrix is positive
+definite everywhere, and forward dynamics exist.
 """
 
 from __future__ import annotations
@@ -29,9 +29,13 @@ it determines what theta_b leaves open and changes nothing that theta_b fixes.""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounds:
-    """Linear bounds R x >= r of standard parameters x, with rows R (k, 11 n) and right sides r (k,).
+    """Lower limits R x >= r on linear combinations of standard parameters x, such as a smallest mass of a link.
 
-    names  names of the k bounds, for messages
+    The standard parameters are mass, first moments, inertia and drive inertia of each of n links, 11 per link.
+
+    rows   (k, 11 n) R, one row per limit
+    sides  (k,) r, the limits
+    names  k names of the limits, for messages
     """
 
     rows: Array
@@ -42,7 +46,7 @@ class Bounds:
         return len(self.names)
 
     def reached(self, x: Array) -> tuple[str, ...]:
-        """Return the names of the bounds that x (11 n,) fulfils without margin."""
+        """Return the names of the limits at which the standard parameters x (11 n,) lie: R x equals r up to rounding."""
         if not self.names:
             return ()
         room = self.rows @ x - self.sides
@@ -61,9 +65,11 @@ class NotPhysical(InputError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Physical:
-    """All values of a fit, theta_b first, with theta_b = B x for physically possible standard parameters x (11 n,).
+    """The physically possible parameters nearest to an estimate.
 
-    distance  distance from the unconstrained values, in standard deviations
+    x         (11 n,) standard parameters (masses, first moments, inertias, drive inertias of n links)
+    values    (l + k,) the corresponding l base parameters theta_b = B x, then k friction values and offsets
+    distance  distance of `values` from the estimate, in standard deviations
     """
 
     x: Array
@@ -81,16 +87,18 @@ def nearest_physical(
     fixed: NDArray[np.bool_] | None = None,
     bounds: Bounds = NO_BOUNDS,
 ) -> Physical:
-    """Return the physically possible parameters that are nearest to an estimate of the whole vector.
+    """Return the physically possible parameters that are nearest to an estimate of base parameters and friction.
 
-    values          (l + k,)  theta_b and the friction and offsets that were estimated with it
-    whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
-    never_negative  (l + k,)  entries that may not be negative
-    limits          (m, l + k)  rows whose products with the vector may not be negative either
-    fixed           (l + k,)  entries that stay as they are
-    bounds          bounds of standard parameters
+    An estimate has l base parameters theta_b, followed by k friction values and offsets.
 
-    For a linear fit the cost is what v adds to the sum of squares, plus the prior in directions that the data do not
+    values          (l + k,) the estimate
+    whitening       (l + k, l + k) W: the cost of a candidate v is |W (v - values)|^2 in variances (Estimate.whitening)
+    never_negative  (l + k,) True: this entry of the result may not be negative
+    limits          (m, l + k) m further rows; the product of each with the result may not be negative
+    fixed           (l + k,) True: this entry keeps its value
+    bounds          lower limits on combinations of standard parameters
+
+    For a linear fit, the cost is the increase of the sum of squares, plus the prior in directions that the data do not
     show. Raises InputError if cvxpy is missing, NotPhysical if no solution is found.
     """
     cp: Any = require_cvxpy()
@@ -183,15 +191,21 @@ def _nearest(
 
 
 def whitening_of(covariance: Array) -> Array:
-    """Return W (m, m) with W^T W the inverse of a covariance, computed from its correlations."""
+    """Return the whitening matrix W (m, m) of a covariance matrix (m, m): W^T W is the inverse of the covariance.
+
+    The function inverts the matrix of correlations, because variances of different units differ by many orders.
+    """
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
     correlation = covariance / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
 
 
 def require_physical(model: DynamicsModel, x: Array) -> None:
-    """Raise NotPhysical if a pseudo-inertia of the solution has a negative eigenvalue beyond rounding. The solver's
-    own status is not relied on."""
+    """Raise NotPhysical if the standard parameters x (11 n,) give a link's pseudo-inertia a negative eigenvalue.
+
+    The pseudo-inertia is the 4 x 4 matrix of a link's mass, first and second moments. Small negative values from
+    rounding are accepted. This check does not rely on the status that the solver reports.
+    """
     for joint, link in zip(model.mechanism.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
         matrix = np.zeros((4, 4))
         matrix[:3, :3] = second_moments(inertia_matrix(link))

@@ -17,11 +17,11 @@ LOAD = 10
 
 
 def nearest_load(values: Array, whitening: Array, never_negative: NDArray[np.bool_]) -> Array:
-    """Return the vector nearest to `values` whose first ten entries are the parameters of a real body, which may be a
-    point or rod.
+    """Return the physically possible values of a load, with friction, that are nearest to an estimate.
 
-    The cost of v is |W (v - values)|^2, as in nearest_physical; entries that may not be negative are friction. Raises
-    NotPhysical if the solver fails.
+    The first ten entries of `values` are mass, first moments and inertia of the load. The load may be a point or a rod.
+    The cost of a candidate v is |W (v - values)|^2, W the whitening matrix. Entries that are marked in `never_negative`
+    are friction values. Raises NotPhysical if the solver fails.
     """
     cp = require_cvxpy()
     size = 1.0 / np.linalg.norm(whitening, axis=0)
@@ -45,8 +45,12 @@ def nearest_load(values: Array, whitening: Array, never_negative: NDArray[np.boo
 
 
 def about_centre(load: Array) -> tuple[float, Array, Array]:
-    """Return mass (kg), centre of mass (3,) and inertia about it (3, 3) from ten parameters. Second moments that
-    rounding made negative become zero. A load without mass has no centre and no inertia."""
+    """Return mass (kg), centre of mass (3,) and inertia about the centre of mass (3, 3) of a load from its ten
+    parameters.
+
+    The ten parameters are mass, first moments and inertia about the frame's origin. Second moments that rounding made
+    negative become zero. The centre and the inertia of a load without mass are zero.
+    """
     mass = float(load[0])
     if not mass > 0.0:
         return 0.0, np.zeros(3), np.zeros((3, 3))

@@ -1,5 +1,8 @@
-"""Makes the result of the four steps physically consistent. theta_b and LuGre friction form one vector, and each step
-contributes its own cost."""
+"""Makes the result of a four-step calibration (motors, gravity, friction, inertia) physically consistent.
+
+Base parameters theta_b and LuGre friction (a friction model with bristles) form one vector. Each step contributes a
+cost for changes of the vector.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +34,11 @@ SMALLEST = np.where(NEVER_NEGATIVE, STATE_LAW.bounds[0], -np.inf)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicalSteps:
-    """The result of the four steps, moved to physically possible values.
+    """The physically possible result of a four-step calibration (motors, gravity, friction, inertia).
 
-    theta_b   (l,)
-    found     the result of the four steps with adapted friction
-    distance  distance from the unconstrained vector, in standard deviations
+    theta_b   (l,) base parameters
+    found     results of the four steps, with friction adapted to theta_b
+    distance  distance from the unconstrained result, in standard deviations
     """
 
     theta_b: Array
@@ -46,12 +49,13 @@ class PhysicalSteps:
 def physical_steps(
     model: DynamicsModel, found: FourSteps, options: PhysicalOptions | None = None
 ) -> PhysicalSteps:
-    """Return the physically possible vector of theta_b and all LuGre parameters that is nearest to the result of the
-    four steps.
+    """Return the physically possible base parameters theta_b and LuGre friction nearest to the result of a calibration.
 
-    The cost of a change is the sum of three costs: gravity's of phi, friction's of each joint's seven parameters, and
-    the inertial step's of psi, whose estimate depends on phi and friction. So friction adapts to a change of theta_b,
-    as far as the friction runs allow. Torque constants do not change.
+    The calibration has four steps: motors, gravity, friction and inertia. The cost of a change is the sum of three
+    costs, those of gravity, friction and inertia. The first is for phi, the base parameters that affect gravity. The
+    second is for each joint's seven friction parameters. The third is for psi, the other base parameters, whose
+    estimate depends on phi and friction. So friction adapts to a change of theta_b, as far as the friction runs allow.
+    Torque constants do not change.
     """
     joints = found.friction.joints
     unknowns = {name: unknowns_of(joint)[:SEVEN] for name, joint in joints.items()}

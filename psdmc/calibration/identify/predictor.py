@@ -1,5 +1,7 @@
-"""The regressor that a calibration needs. Compiled robots have one; this module computes it in NumPy without a
-compiler."""
+"""The regressor Y for a calibration, with torques Y theta_b for the base parameters theta_b.
+
+A compiled robot can compute the regressor. Without a compiler, this module computes it in NumPy.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,11 @@ from psdmc.robot.mechanism import Mechanism
 
 
 class Regressor(Protocol):
-    """An object that computes Y with tau = Y theta_b: q, qd, qdd (..., n) -> (..., n, l). psdmc.compile(model) is a
-    fast one."""
+    """An object that computes the regressor Y (..., n, l) of n joints at states q, qd, qdd (..., n).
+
+    The joint torques are tau = Y theta_b with l base parameters theta_b. The result of psdmc.compile(model) is a fast
+    Regressor.
+    """
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array: ...
 
@@ -48,10 +53,10 @@ class ChainRegressor:
 
 
 def expansion(model: DynamicsModel) -> Array:
-    """Return the matrix (11 n, l) from theta_b to standard parameters that the assumptions allow: B @ expansion =
-    identity.
+    """Return a matrix (11 n, l) that computes possible standard parameters x from base parameters theta_b.
 
-    If B is in echelon form, its unit columns give sparse standard parameters.
+    The product of B, with theta_b = B x, and this matrix is the identity. The standard parameters keep the model's
+    assumptions, such as parameters that are zero. If B is in echelon form, most standard parameters are zero.
     """
     span = model.mechanism.parameter_span
     reduced = model.B @ span
@@ -66,14 +71,22 @@ def expansion(model: DynamicsModel) -> Array:
 
 
 def gravity_regressor(model: Regressor, q: Array) -> Array:
-    """Return Y_grav(q), (..., n, l): the regressor of gravity alone."""
+    """Return the regressor Y_grav (..., n, l) of gravity torques alone, at positions q (..., n) of n joints.
+
+    The gravity torques are Y_grav theta_b for the l base parameters theta_b.
+    """
     still = np.zeros_like(q)
     return model.regressor(q, still, still)
 
 
 def payload_torque(chain: Mechanism, q: Array, mass: float, com: tuple[float, float, float]) -> Array:
-    """Return the torques (N, n), N m, that hold a mass (kg) at `com` (m, tip frame) against gravity: -J^T f with f of
-    (17) in Denso-2022."""
+    """Return the joint torques (N, n), N m, that hold a load's weight at N poses q (N, n).
+
+    These are -J^T f with the weight f, (17) in Denso-2022.
+
+    mass  kg
+    com   m, centre of mass in the tip frame
+    """
     frames = frames_of(chain)
     states = [q[:, k] for k in range(len(chain))]
     rotation, _ = frame_placement(frames, chain.tip_body, chain.tip, states)

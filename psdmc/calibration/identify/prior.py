@@ -1,4 +1,4 @@
-"""Plausible values of parameters before a fit: the file's values, and a plausible distance of the truth from them."""
+"""Plausible parameter values before a fit, and their uncertainties. The values are those of the robot file."""
 
 from __future__ import annotations
 
@@ -21,17 +21,21 @@ NO_EFFECT = 1e-9
 
 
 def torque_sizes(torque: Array) -> Array:
-    """Return the RMS (n,) of each joint's torque (N, n), N m, but at least QUIET_JOINT times the largest."""
+    """Return a typical torque (n,) of each joint: the RMS of its torques (N, n), N m.
+
+    The result for a joint is at least the share QUIET_JOINT of the largest RMS of all joints.
+    """
     size = np.sqrt(np.mean(torque**2, axis=0))
     return np.asarray(np.maximum(size, QUIET_JOINT * float(size.max(initial=0.0)) or 1.0))
 
 
 def base_parameter_scale(chain: Mechanism, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
-    """Return a plausible size (l,) of each base parameter: the value that explains a joint's whole torque in an
-    ordinary motion.
+    """Return a plausible size (l,) of each base parameter, as a scale for priors.
+
+    This is the value with which the parameter alone explains the typical torque of a joint in an ordinary motion.
 
     sizes    (n,) N m, typical torques of the joints
-    theta_b  the file's values, which are plausible, too; None if it has none
+    theta_b  (l,) base parameters of the robot file, which are plausible sizes, too; None: the file gives none
     """
     rng = np.random.default_rng(SEED)
     n = len(chain)

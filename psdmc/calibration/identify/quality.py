@@ -9,8 +9,11 @@ from psdmc.model.calibrated import Quality
 
 
 def quality(measured: Array, predicted: Array) -> Quality:
-    """Return the quality for one joint, from arrays (N,). R^2 is one minus the sum of squared errors over that about
-    the mean."""
+    """Return R^2 and root mean square error of one joint's predicted torque, from N samples each of `measured` and
+    `predicted`.
+
+    R^2 is one minus the ratio of the mean squared error to the variance of the measured torque.
+    """
     if len(measured) == 0:
         return Quality(float("nan"), float("nan"))
     error = float(np.mean((measured - predicted) ** 2))
@@ -19,5 +22,6 @@ def quality(measured: Array, predicted: Array) -> Quality:
 
 
 def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
-    """Return the quality for every joint, from arrays (N, n)."""
+    """Return R^2 and root mean square error of each joint's predicted torque, from measured and predicted torques (N,
+    n)."""
     return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))

@@ -15,7 +15,10 @@ from psdmc.model.calibrated import Remark
 
 
 class Judged(Protocol):
-    """A solution with the correlation of its residuals, such as least_squares.Estimate."""
+    """The results of a fit that a check of the residuals needs, such as least_squares.Estimate.
+
+    They are the lag-one correlation of each joint's residuals, and the factor on all standard deviations.
+    """
 
     @property
     def correlation(self) -> Array: ...
@@ -44,12 +47,13 @@ FEWEST_PAIRS = 20
 
 
 def widening(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """Return the factor (n,) by which correlated residuals increase standard deviations. It is at least 1.
+    """Return the factor (n,), at least 1, by which correlated residuals increase standard deviations, for n joints.
 
-    The factor is the root of the number of samples per independent sample, the larger of two estimates. An
-    autoregressive process with lag-one correlation r has (1 + r) / (1 - r). Any stationary process has 1 + 2 sum of
-    its correlations, summed in pairs up to the first pair that is not positive (Geyer 1992). The first estimate is
-    better for short logs, the second for noise with several time scales.
+    The factor is the square root of the number of correlated samples that count as one independent sample. Two
+    estimates of this number are computed, and the larger one is used. An autoregressive process with lag-one
+    correlation r has (1 + r) / (1 - r). Any stationary process has 1 + 2 times the sum of its correlations. They are
+    summed in pairs up to the first pair that is not positive (Geyer 1992). The first estimate is better for short logs,
+    the second for noise with several time scales.
     """
     first = np.clip(sample_correlation(residual, use), 0.0, SURELY)
     each = [_samples_per_effective(residual[:, k], use[:, k]) for k in range(residual.shape[1])]
@@ -79,8 +83,10 @@ NOISY = 1.7
 
 
 def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tuple[str, ...]:
-    """Return warnings if residuals are not noise: the model lacks an effect, and standard deviations were increased
-    for it."""
+    """Return warnings if the residuals of a fit are correlated from sample to sample and therefore more than noise.
+
+    The model then lacks an effect. The warnings also give the factor by which standard deviations were increased.
+    """
     found = [
         (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
     ]

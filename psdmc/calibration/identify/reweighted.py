@@ -22,11 +22,13 @@ below the bound. Less is left from a round whose residual was another one."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sandwich:
-    """Factors for the squares w x x' of the rows, joint by joint.
+    """Factors that convert the sums w x x' of a weighted fit to the matrices B and C of its covariance B^-1 C B^-1.
 
-    slope  (n,)  factor for B: mean(psi') / mean(w)
-    level  (n,)  factor for C: mean(psi^2) / mean(w), in the weighted residual's unit, squared
-    unit   variance per unit of the fit's weighted sum of squares, for all joints together: level / slope^2
+    Here x is a row of the fit, w its weight, psi Huber's function of the scaled residual u (see the module).
+
+    slope  (n,) for each joint, the factor for B: mean(psi') / mean(w)
+    level  (n,) for each joint, the factor for C: mean(psi^2) / mean(w), in squared units of the weighted residual
+    unit   level / slope^2 for all joints together: the variance per unit of the fit's weighted sum of squares
     """
 
     slope: Array
@@ -35,16 +37,18 @@ class Sandwich:
 
 
 def squares(n: int, variance: float) -> Sandwich:
-    """Return the factors for a fit without reweighting, whose weighted residual has this variance."""
+    """Return the covariance factors of n joints for an ordinary least-squares fit, whose weighted residual has
+    `variance`."""
     return Sandwich(np.ones(n), np.full(n, variance), variance)
 
 
 def huber_sandwich(weighted: Array, use: NDArray[np.bool_], bound: float, share: float) -> Sandwich:
-    """Return the factors for Huber's weights.
+    """Return the covariance factors of a fit with Huber's weights, which reduce the effect of outliers.
 
-    weighted  (N, n)  sqrt(w) u
-    use       (N, n)  entries that are used
-    share     degrees of freedom as a share of the samples; for small samples the result is larger
+    weighted  (N, n) sqrt(w) u: residuals u in standard deviations times the root of their weights w
+    use       (N, n) True: the sample is used
+    bound     limit of u above which Huber's weights are below one
+    share     degrees of freedom divided by the number of samples; a smaller share gives a larger covariance
     """
     each = [_factors(weighted[use[:, k], k], bound, share) for k in range(weighted.shape[1])]
     slope, level = np.array(each).T

@@ -24,7 +24,7 @@ PARAMETERS = STATE_LAW.parameters
 
 @dataclass(frozen=True, slots=True)
 class StateLawView:
-    """The C functions of the friction law, for templates."""
+    """The options from which a template makes the C functions of the friction law with a state."""
 
     real: str = "double"
 
@@ -44,11 +44,13 @@ class StateLawView:
 
 
 def friction_torque(values: Array, qd: Array, period: float, z: float = 0.0) -> Array:
-    """Return the friction torque (N,), N m, along speeds (N,) at equal time steps, with linear interpolation between
-    them.
+    """Return the friction torque (N,), N m, of one joint along N speeds (rad/s or m/s) at equal time steps.
 
-    values  (m,) values of the law, in the order of PARAMETERS
-    z       state of the law at the start
+    Speeds between the steps are interpolated linearly.
+
+    values  (m,) parameters of the friction law, in the order of PARAMETERS
+    period  s, time step
+    z       state of the friction law at the start, such as the deflection of bristles
     """
     speeds = np.ascontiguousarray(qd, dtype=np.float64)
     if speeds.ndim != 1:

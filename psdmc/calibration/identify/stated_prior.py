@@ -1,5 +1,7 @@
-"""Uses the bodies in the robot file as a prior with a stated confidence: a normal prior of theta_b, combined with the
-data."""
+"""Combines a fit with prior knowledge: masses and inertias of the robot file, whose uncertainty the user states.
+
+The prior is a normal distribution of the base parameters theta_b.
+"""
 
 from __future__ import annotations
 
@@ -34,17 +36,20 @@ class Confidence:
 
 
 def body_confidence(link: Array, share: float) -> Confidence:
-    """Return the confidence for a link's standard parameters (11,) if mass, radius of gyration and inertia have the
-    same relative standard deviation."""
+    """Return the confidence in a link's standard parameters (11,) from one relative standard deviation, `share`.
+
+    The mass, the radius of gyration and the moments of inertia each have this relative standard deviation.
+    """
     mass, inertia = max(float(link[0]), np.finfo(float).tiny), _about_centre(link)
     return Confidence(share, share * float(np.sqrt(max(np.trace(inertia), 0.0) / (2.0 * mass))), share)
 
 
 def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence], scale: Array) -> Array:
-    """Return the prior covariance (l, l) of theta_b from the confidence in links, by index; other links are nearly
-    unknown.
+    """Return the prior covariance (l, l) of the base parameters theta_b from confidences in links.
 
-    scale  (l, ...)  plausible size of a base parameter: its standard deviation if it contains unknowns or is zero
+    stated  confidence by the index of the link; links without an entry are nearly unknown
+    scale   (at least l,) plausible sizes of base parameters: standard deviations of those that are zero or contain
+            unknowns
     """
     covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
     for k, link in enumerate(model.mechanism.known_parameters):
@@ -89,13 +94,16 @@ def _about_centre(link: Array) -> Array:
 
 
 def with_prior(solved: Estimate, theta_b: Array, covariance: Array, unknown: Sequence[int] = ()) -> Estimate:
-    """Return the most likely estimate for data and prior together (maximum a posteriori; both normal).
+    """Combine a fit with a prior of its base parameters, and return the most likely estimate (maximum a posteriori).
 
-    theta_b, covariance   (l,), (l, l)  prior of the first l entries of the vector
-    unknown               those of these entries that the prior does not determine
+    Both distributions are normal. The l base parameters come first among the fit's values.
 
-    The result keeps the directions that the data do not show, for messages. Its standard deviations are those of data
-    and prior together.
+    theta_b     (l,) mean of the prior
+    covariance  (l, l) covariance of the prior
+    unknown     indices of base parameters that the prior does not determine
+
+    The standard deviations of the result are those of data and prior together. For messages, the result keeps the
+    directions that the data do not show.
     """
     l, m = len(theta_b), len(solved.values)
     by_data = whitening_of(solved.total_covariance + solved.prior_covariance)

@@ -1,4 +1,4 @@
-"""Data classes that the four steps of the calibration share: runs, options, and the quality of predictions."""
+"""Data classes of a four-step calibration (motors, gravity, friction, inertia): runs, options, and accuracy."""
 
 from __future__ import annotations
 
@@ -37,8 +37,10 @@ class MotorRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityRun:
-    """A run of all joints at constant speeds, then along the same path backwards; `tool` is the known load at the tip,
-    if any."""
+    """A run of all joints at constant speeds, and then of the whole motion in reverse.
+
+    tool  known load at the tip; None: no load
+    """
 
     log: Log
     tool: Load | None = None
@@ -63,7 +65,7 @@ class InertialRun:
 
 @dataclass(frozen=True, slots=True)
 class StepOptions:
-    """Options of one step: filter, validation split, and solution of the linear problem."""
+    """Options of one step of a four-step calibration: filter, validation split, and solution of the linear problem."""
 
     filter: FilterOptions
     split: SplitOptions = field(default_factory=SplitOptions)
@@ -77,7 +79,10 @@ class StepOptions:
 
 
 def step_of(used: StepUsed) -> StepOptions:
-    """Return the options of a step that a calibrated model stores. Raises InputError if they are not possible."""
+    """Return filter and validation split that one step of a calibration used, as the calibrated model stores them.
+
+    Raises InputError if the stored values are out of range.
+    """
     return StepOptions(
         FilterOptions(used.cutoff, used.order, used.settle), SplitOptions(used.held_out, used.blocks)
     )
@@ -85,16 +90,18 @@ def step_of(used: StepUsed) -> StepOptions:
 
 @dataclass(frozen=True, slots=True)
 class FrictionOptions:
-    """How the seven LuGre parameters are determined.
+    """Options for the fit of the seven LuGre friction parameters of a joint.
 
-    law             lugre: all seven; coulomb_viscous: F_c and a linear F_v only
-    fast            speed above which pre-sliding is ignored in the first step, as a share of the run's largest speed
-    sliding         speed above which plain friction is fitted, as a share of the run's largest speed
+    law             lugre: all seven parameters; coulomb_viscous: Coulomb friction F_c and linear viscous friction F_v
+                    only
+    fast            lowest speed in the first part of the fit, which ignores pre-sliding; a share of the run's largest
+                    speed
+    sliding         lowest speed in the fit of coulomb_viscous; a share of the run's largest speed
     simplex_steps   largest number of Nelder-Mead evaluations
-    estimate_delay  whether the time between position and current is estimated, too
+    estimate_delay  True: also estimate the time between position and current
     largest_delay   s
     unseen          relative standard deviation above which a parameter counts as not determined
-    workers         number of processes; joints are independent
+    workers         number of processes; joints are fitted independently
     """
 
     law: Literal["lugre", "coulomb_viscous"] = "lugre"
@@ -109,10 +116,11 @@ class FrictionOptions:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
-    """Options of all four steps, with the cut-off frequencies of Denso-2022.
+    """Options of all four steps (motors, gravity, friction, inertia), with the cut-off frequencies of Denso-2022.
 
-    passes   how often gravity, friction and inertia are repeated. From the second pass on, the gravity step subtracts the
-             inertial torque of the previous pass; the paper has one pass and neglects it
+    passes  number of times that gravity, friction and inertia are determined. From the second pass on, the gravity step
+            subtracts the inertial torque that the previous pass determined. The paper has one pass and neglects this
+            torque
     """
 
     motor: StepOptions = field(default_factory=lambda: StepOptions(FilterOptions(cutoff=4.0)))
@@ -133,9 +141,13 @@ def judged(
     use: NDArray[np.bool_] | None = None,
     abscissa: str = "time [s]",
 ) -> StepQuality:
-    """Return the quality for every joint, and samples to plot.
+    """Return the accuracy (R^2, RMSE) of each joint's predicted torques, on fitted and on held-out samples, and data to
+    plot.
 
-    x (N,), measured and predicted (N, n), out (N,) held-out rows; use (N, n) entries that are used, None: all
+    x                    (N,) abscissa of the plots, such as time
+    measured, predicted  (N, n) torques of n joints
+    out                  (N,) True: the sample is held out for validation
+    use                  (N, n) True: the sample is used; None: all samples are used
     """
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []

@@ -27,10 +27,11 @@ NAMED = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visibility:
-    """What the data show of each unknown.
+    """What the data show of each of m unknowns of a fit.
 
-    words       (m)  Remarks: "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
-    determined  (m,) whether the data determine the unknown by itself, however weakly; if so, it has a standard deviation
+    words       m remarks: "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
+    determined  (m,) True: the data determine the unknown by itself, however weakly. The unknown then has a standard
+                deviation
     """
 
     words: tuple[Remark, ...]
@@ -45,11 +46,11 @@ def visibility(
     kept_at: Sequence[str],
     options: FitOptions | None = None,
 ) -> Visibility:
-    """Return the words for every unknown.
+    """Return a remark for each of m unknowns of a fit on how well the data show the unknown.
 
-    values, std   (m,)    final values
-    unseen        (m, k)  directions that the data do not show, in units of plausible sizes
-    kept_at       (m)     in words, the value at which an unknown stays if the data do not show it
+    values, std  (m,) final values and their standard deviations
+    unseen       (m, k) k directions that the data do not show, in units of plausible sizes
+    kept_at      m texts: the value at which an unknown stays if the data do not show the unknown
     """
     limit = (options or FitOptions()).unseen_share
     share = np.minimum(np.sum(unseen**2, axis=1), 1.0)
@@ -72,8 +73,11 @@ BY_PRIOR = Remark("by the stated prior more than by the data", "stated")
 def as_fitted(
     seen: Visibility, kept_at: Sequence[str], dropped: NDArray[np.bool_], stated: NDArray[np.bool_]
 ) -> Visibility:
-    """Return the words of unknowns after some were dropped. Unknowns that are `stated` have a prior with a stated
-    confidence."""
+    """Return the remarks on m unknowns after a fit that left out unknowns or used a prior.
+
+    dropped  (m,) True: the fit left the unknown out because the data do not need it
+    stated   (m,) True: the unknown has a prior with a confidence that the user stated
+    """
     words = [
         Remark(f"not essential: kept at {kept_at[k]}", "dropped")
         if dropped[k]

@@ -41,8 +41,11 @@ PIECE = 2**20
 
 
 def require_packed_file(file: Path) -> None:
-    """Raise InputError if a compressed file unpacks to more than is plausible for its size, or to an MCAP file whose
-    chunks do. For the second check it is unpacked into a temporary file."""
+    """Raise InputError if a compressed file unpacks to more bytes than is plausible for its size.
+
+    The file is also unpacked into a temporary file. If the result is an MCAP file, its chunks are checked in the same
+    way.
+    """
     allowed = _allowed(file)
     with opened(file) as packed, tempfile.TemporaryDirectory() as folder:
         inside = Path(folder) / "inside"
@@ -90,8 +93,11 @@ def _require(size: int, allowed: int, file: Path) -> None:
 
 
 def require_mcap_size(path: Path) -> None:
-    """Raise InputError if a record of an MCAP file is longer than the file. The same applies if its chunks or their
-    index unpack to more than is plausible for its size, or to more than their headers say."""
+    """Raise InputError if the sizes that an MCAP file states are not plausible.
+
+    The checks cover three cases. A record may not be longer than the file. Chunks and their index may not unpack to
+    more bytes than is plausible for the file. They may not unpack to more bytes than their headers say.
+    """
     with opened(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")

@@ -1,4 +1,4 @@
-"""Puts the rows of a log on equal time steps. Rows that are there already stay unchanged; others are resampled."""
+"""Resamples a log to equal time steps. Rows of a log whose times already have equal steps stay unchanged."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from psdmc.calibration.logs.stored_log import AnyLog
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvenGrid:
-    """Equal time steps of a log's median period, from its first row to its last, beginning at zero.
+    """The times of a log after resampling to equal steps, from the first row to the last, beginning at zero.
 
-    same  whether the log's rows already have these times
+    time  s; the step is the median period of the log
+    same  True: the rows of the log already have equal steps
     """
 
     time: Array
@@ -43,8 +44,10 @@ NEIGHBOURS = 4
 
 
 def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[Array, Array]:
-    """Return position and effort at rows `first` to `last` of the grid. Rows that have equal steps already stay
-    unchanged."""
+    """Return position and effort of a log, interpolated at the times `first` to `last` of an evenly spaced grid.
+
+    If the log already has these times, the function returns the logged rows unchanged.
+    """
     if grid.same:
         part = log.rows(first, last)
         return part.position, part.effort

@@ -40,19 +40,19 @@ class SplitOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class States:
-    """A filtered log at equal time steps, with N samples and n joints.
+    """The states of a log after low-pass filtering, at N equal time steps, for n joints.
 
-    time, period      s
-    q, qd, qdd        (N, n)  rad, rad/s, rad/s^2 (m for sliding joints)
-    effort            (N, n)  as logged, filtered like q
-    use               (N,)    False at the ends of the log, where the filter has not settled
-    low_pass          the filter, for predictions that are compared with `effort`
-    cutoff            Hz, of that filter
-    noise             (n,)    standard deviation of an unfiltered position sample, rad (m); zero for joints that rest
-    still             (n,)    whether a joint's motion is no more than noise: its rates are exactly zero then
-    motion            (n,)    of the whole log, peak to peak, rad (m)
-    first             row of the log's time grid that is the first row of these states
-    raw               (N, n)  effort before the filter
+    time, period  s
+    q, qd, qdd    (N, n) rad, rad/s, rad/s^2 (m for sliding joints)
+    effort        (N, n) as logged, filtered like q
+    use           (N,) False at the ends of the log, where the filter has not settled
+    low_pass      the filter, for predictions that are compared with `effort`
+    cutoff        Hz, of the filter
+    noise         (n,) standard deviation of an unfiltered position sample, rad (m); zero for joints that rest
+    still         (n,) True: the joint moves no more than the sensor's noise, so its rates are set to zero
+    motion        (n,) range of each position in the whole log, peak to peak, rad (m)
+    first         index of the first row within the resampled log, if these rows are a part of the log
+    raw           (N, n) effort before the filter
     """
 
     time: Array
@@ -71,15 +71,21 @@ class States:
     raw: Array
 
     def jittered(self) -> tuple[Array, Array, Array]:
-        """Return q, qd, qdd (N, n) with another random sample of the position noise."""
+        """Return q, qd, qdd (N, n) with simulated sensor noise added, to test how noise affects a fit.
+
+        The noise has the standard deviations `noise` and passes the same filter and differences as the log.
+        """
         draw = self.low_pass(noise_like(self.noise, self.first, self.first + len(self.time)))
         rate, acceleration = central_differences(draw, self.period)
         return self.q + draw, self.qd + rate, self.qdd + acceleration
 
 
 def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
-    """Return the states of a checked log, which is held in memory as a whole. A joint that moves by no more than its
-    sensor's noise gets rates of exactly zero, so it adds nothing to a fit."""
+    """Resample and filter a log in memory, and return positions, speeds, accelerations and efforts of all joints.
+
+    A joint that moves by no more than the sensor's noise counts as resting. Its speeds and accelerations are exactly
+    zero, so that noise is not taken for motion.
+    """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
     return _states(log, grid, low_pass, noticed(log, grid, low_pass, options, check), options, 0, grid.count)
@@ -87,9 +93,11 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """A part of a log: its states, with the rows before and after it that the filter needs.
+    """The filtered states of a part of a log, with additional rows before and after the part that the filter needs.
 
-    at  rows of `states` that are usable and independent (one period of the cut-off apart); each is in one part only
+    states  states of the part and of the additional rows
+    at      indices into `states` of the usable rows in this part. They are one period of the cut-off apart, and
+            independent
     """
 
     states: States
@@ -99,11 +107,10 @@ class Stretch:
 def stretches(
     log: AnyLog, options: FilterOptions, check: CheckOptions | None = None, rows: int = STRETCH_ROWS
 ) -> Iterator[Stretch]:
-    """Yield the states of a log in parts of `rows` rows. They are the same as if the whole log had been filtered at
-    once.
+    """Filter a long log in parts of `rows` rows, and yield the states of each part.
 
-    Neighbouring parts overlap by twice the memory of the filter: once for the states, and once for what is computed
-    from them.
+    The states equal those of the whole log filtered at once. Neighbouring parts overlap by twice the number of rows
+    that affect a filtered row: once for the states, once for quantities computed from the states.
     """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
@@ -165,13 +172,19 @@ def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
 
 
 def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDArray[np.intp]:
-    """Return the rows of the whole log that are usable and independent (one period of the cut-off apart)."""
+    """Return the indices of the usable rows of a whole log that are one period of the filter's cut-off apart.
+
+    Rows that are closer share their noise and are not independent.
+    """
     usable = _usable(grid, options, log)
     return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
 
 
 def central_differences(q: Array, period: float) -> tuple[Array, Array]:
-    """Return speed and acceleration without phase error: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
+    """Return speed and acceleration of positions q at time steps T, by central differences without phase error.
+
+    For row k, they are (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2.
+    """
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
     qd[1:-1] = (q[2:] - q[:-2]) / (2.0 * period)
     qdd[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / period**2
@@ -191,7 +204,10 @@ def held_out(count: int, options: SplitOptions) -> NDArray[np.bool_]:
 
 
 def held_out_of(log: AnyLog, count: int, options: SplitOptions) -> NDArray[np.bool_]:
-    """Return for each sample of a log whether it is held out; all are if the log is for validation."""
+    """Return for each sample of a log whether the sample is held out for validation.
+
+    If the whole log is for validation, the result is True for all samples.
+    """
     return np.ones(count, dtype=bool) if log.use == "validate" else held_out(count, options)
 
 
@@ -214,12 +230,14 @@ BLOCK_ROWS = 16384
 
 
 def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
-    """Return the low-pass filtered values at rows `at`, (len(at), ...). They are computed in blocks, so that the
-    values of a long log need not be in memory at once.
+    """Return values at some rows of a log after low-pass filtering over time, for quantities computed from the log's
+    states.
 
-    values   function that returns the values (rows, ...) for a slice of the log's rows
+    at      indices of the wanted rows; the result has one row for each
+    values  function from a slice of the log's rows to the quantity (rows, ...) at these rows
 
-    The result is that of filtering all rows at once, except for effects that are older than MEMORY_CYCLES.
+    The values are computed block by block, so that a long log need not fit into memory. The result equals that of
+    filtering all rows at once, up to effects of rows more than MEMORY_CYCLES cut-off periods away.
     """
     count = len(states.time)
     margin = memory(states.cutoff, states.period)
@@ -244,8 +262,13 @@ def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Arra
 
 
 def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:
-    """Return for each sample whether it is at least two periods of the cut-off away from any reversal of motion, so
-    that the filter does not mix both directions."""
+    """Return for each sample whether the sample is at least two periods of the cut-off away from any reversal of
+    motion.
+
+    Near a reversal, the low-pass filter mixes friction torques of both directions.
+
+    turning  (N,) True: the motion reverses at this sample
+    """
     reach = int(np.ceil(2.0 / options.cutoff / period))
     before = np.concatenate([[0], np.cumsum(turning)])
     index = np.arange(len(turning))
@@ -255,8 +278,13 @@ def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noticed:
-    """The noise and motion of all joints, (n,) each, rad or m: sensor noise of an unfiltered sample (zero for a joint
-    at rest), whether and where the joint rests, and its motion, peak to peak."""
+    """Noise and rest of n joints in a log.
+
+    noise   (n,) standard deviation of an unfiltered position sample, rad or m; zero for a joint at rest
+    still   (n,) True: the joint is at rest, that is, moves no more than noise
+    rest    (n,) mean position of each joint, which replaces the position of a joint at rest
+    motion  (n,) range of the position, peak to peak, rad or m
+    """
 
     noise: Array
     still: NDArray[np.bool_]
@@ -272,8 +300,11 @@ def noticed(
     check: CheckOptions | None = None,
     rows: int = STRETCH_ROWS,
 ) -> Noticed:
-    """Return noise and rest of every joint from one pass over the log. For long logs the noise comes from evenly
-    spread rows."""
+    """Determine sensor noise, range and rest of every joint in one pass over a log.
+
+    A joint is at rest if the position changes no more than noise. For long logs, the noise comes from evenly spread
+    rows.
+    """
     reach, every = memory(options.cutoff, grid.period), -(-grid.count // NOISE_ROWS)
     raw, smooth = [], []
     n = len(log.joint_names)

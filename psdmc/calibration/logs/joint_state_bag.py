@@ -41,9 +41,9 @@ class BagFormat(LogFormat):
 
     @abstractmethod
     def require_sizes(self, path: Path, held: int | None) -> None:
-        """Raise InputError if a file is missing or too large, or unpacks to more than is plausible for its size.
+        """Raise InputError if a file is missing or too large, or unpacks to more bytes than is plausible for its size.
 
-        held  most bytes of rows in memory; None: all
+        held  largest size in bytes of the rows that stay in memory; None: all rows stay in memory
         """
 
     @abstractmethod
@@ -59,13 +59,15 @@ class BagFormat(LogFormat):
         """Return a joint state with the fields of its message type."""
 
     def read(self, path: Path, topic: str = "", held: int | None = None) -> AnyLog:
-        """Return the joint states of one topic as a log. Effort is read as motor torque, and time from the header of
-        each message.
+        """Return the joint states of one topic as a log.
+
+        Effort is read as motor torque. Times come from the header of each message.
 
         topic  name of the topic; empty: /joint_states, or the only topic with joint states
-        held   most bytes of rows in memory; a larger log goes to a temporary file and becomes a StoredLog. None: no limit
+        held   largest size in bytes of the rows that stay in memory; None: no limit. The rows of a larger log go to a
+               temporary file (StoredLog)
 
-        Raises InputError if the bag is damaged, the topic is missing, or its messages disagree on joints.
+        Raises InputError if the bag is damaged, the topic is missing, or the messages contain different joints.
         """
         self.require_sizes(path, held)
         with decoding(str(path), self.what):

@@ -46,19 +46,20 @@ class Timed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Log(Timed):
-    """Samples of one run, with N rows and n joints.
+    """Samples of one run of a robot, with N rows and n joints.
 
     name         name for messages
-    joint_names  n, in the order of the columns
-    time         (N,)    s
-    position     (N, n)  rad; m for sliding joints
-    velocity     (N, n)  per s, or None if the log has none
-    effort       (N, n)  A, N m or N, by `quantity`; motor torque is positive in the joint's positive direction
-    quantity     current: of the motor; motor_torque: with friction; joint_torque: without friction
-    notes        assumptions that psdmc made when it read the log
+    joint_names  n names, in the order of the columns
+    time         (N,) s
+    position     (N, n) rad; m for sliding joints
+    velocity     (N, n) rad/s (m/s), or None if the log has none
+    effort       (N, n) A, N m or N, by `quantity`; motor torque is positive in the joint's positive direction
+    quantity     current: motor current; motor_torque: torque including the friction torque; joint_torque: torque after
+                 friction
+    notes        assumptions that psdmc made when reading the log
     sliding      names of joints whose position is in m, while the others are in rad; None: the log does not say
     date         date of the data if the file tells, else empty
-    use          fit, or validate: the whole log is held out for validation
+    use          fit: the log is for the fit; validate: the whole log is held out for validation
     """
 
     name: str
@@ -85,8 +86,10 @@ class Log(Timed):
             raise InputError(f"{self.name}: quantity {self.quantity!r}", f"known are {', '.join(QUANTITIES)}")
 
     def ordered(self, joint_names: tuple[str, ...]) -> Log:
-        """Return the same log with its columns in the order of these joints. Raises InputError with all joints that
-        are missing."""
+        """Return a copy of the log with its columns in the order of `joint_names`.
+
+        Raises InputError with all joints that the log lacks.
+        """
         columns = places_of(self.name, self.joint_names, joint_names)
         velocity = None if self.velocity is None else self.velocity[:, columns]
         return replace(

@@ -155,11 +155,13 @@ class Fault(NamedTuple):
 
 
 def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions | None = None) -> LogKind:
-    """Return the log with its joints in the order of the robot's, and remarks in its notes.
+    """Return the log with its joints in the order of the robot's joints, and with remarks in its notes.
 
-    cutoff   Hz, of the filter that will be applied to the log
+    chain   the robot
+    cutoff  Hz, cut-off of the filter that will be applied to the log
 
-    Raises InputError with the faults: first values that are not numbers, then faults of time, then others.
+    Raises InputError with the faults of the log. Values that are not numbers come first, then faults of time, then
+    others.
     """
     options = options or CheckOptions()
     if len(log) < 2:

@@ -116,7 +116,10 @@ def _counted(
 
 
 def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> AnyLog:
-    """Return the log whose positions, velocities and efforts are in a RowStore. It is in memory if the store is."""
+    """Return a log from rows of positions, velocities and efforts in a RowStore.
+
+    The rows of the log are in memory if those of the store are, else in a file.
+    """
     log = StoredLog(
         name=layout.name,
         joint_names=layout.joint_names,

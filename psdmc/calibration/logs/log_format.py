@@ -26,8 +26,12 @@ Pieces = tuple[list[str], Iterator[Array]]
 
 @dataclass(frozen=True, slots=True)
 class TextForm:
-    """What is known about the form of a text table. None: psdmc determines it from the first lines. skip: lines before
-    the table."""
+    """Known properties of a text table such as CSV, before reading the table.
+
+    separator  character between cells; None: psdmc determines the character from the first lines
+    header     whether the table has a line with column names; None: psdmc determines this from the first lines
+    skip       number of lines before the table
+    """
 
     separator: str | None = None
     header: bool | None = None
@@ -36,11 +40,11 @@ class TextForm:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """What a log description says about a file, and how many bytes of its rows may be in memory.
+    """Options for opening a log file, from the user's log description (TOML) and from the memory limit.
 
-    form   form of a text table
-    topic  topic of a bag; empty: its only one
-    held   most bytes of a bag's rows in memory; more rows go to a temporary file
+    form   known properties of a text table
+    topic  topic of a bag; empty: the only topic of the bag
+    held   largest size in bytes of a bag's rows in memory; more rows go to a temporary file
     """
 
     form: TextForm = field(default_factory=TextForm)
@@ -53,10 +57,11 @@ class Columns:
     """The columns of an open log file, with any names and contents.
 
     name   name of the file, for messages
-    names  names of its columns; empty if a text table has no header
+    names  names of the columns; empty if a text table has no header
     width  number of columns
-    rows   function, to be called once, that yields numbers (k, len(places)) in columns by index (from 0), in pieces. If its
-           second argument is true, the first of these columns holds dates, which become s since 1970
+    rows   function that yields the numbers in some columns in parts (rows, columns); it may be called once. The first
+           argument has the column indices (from 0). If the second argument is true, the first of these columns holds
+           dates, which become seconds since 1970
     """
 
     name: str

@@ -1,4 +1,7 @@
-"""Statistics of a log's columns that its checks need, from one pass over the rows in parts."""
+"""Computes the statistics of a log's columns that its checks need, in one pass over the log.
+
+The rows are read in parts, so that the log need not fit into memory.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,12 @@ FAST_SHARE = 0.99
 
 @dataclass(frozen=True, slots=True)
 class NoNumber:
-    """A column with values that are not finite, or too large for a measurement: their number, and the first one."""
+    """A column with values that are not finite or too large for a measurement.
+
+    what          the column in words, such as "position of joint J1"
+    rows          number of such values
+    first, value  row and value of the first one
+    """
 
     what: str
     rows: int
@@ -31,15 +39,17 @@ class NoNumber:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """Statistics of the columns of a log with n joints.
+    """Statistics of a log with n joints, over all rows.
 
     no_numbers      columns with values that are not finite; if there are any, the other statistics have no meaning
-    reach, motion   (n,)  largest |position|; peak to peak
-    speed           (n,)  slope of the position that the share FAST_SHARE of the rows does not exceed
-    slope_power     (n,)  sum of squared slopes
-    slope_velocity  (n,)  sum of slope times logged velocity; None if there is none
-    largest_effort  (n,)  |effort|
-    saturated       efforts that stay at an extreme value while their joint moves
+    reach           (n,) largest absolute position
+    motion          (n,) range of the position, peak to peak
+    speed           (n,) a high value of the position's rate of change, which the share FAST_SHARE of the rows does not
+                    exceed
+    slope_power     (n,) sum of the squared rates of change of the position
+    slope_velocity  (n,) sum of logged velocity times rate of change of the position; None if the log has no velocity
+    largest_effort  (n,) largest absolute effort
+    saturated       efforts that stay at an extreme value while the joint moves
     """
 
     no_numbers: tuple[NoNumber, ...]
@@ -53,7 +63,11 @@ class Survey:
 
     @property
     def velocity_ratios(self) -> dict[int, float]:
-        """Return the ratio of logged velocity to the slope of the position, by the index of each joint that moves."""
+        """Return the ratio of logged velocity to the rate of change of the position, by the index of each joint that
+        moves.
+
+        A ratio that differs from one shows a wrong unit. The result is empty if the log has no velocity.
+        """
         if self.slope_velocity is None:
             return {}
         moves = (self.motion >= SEEN_MOTION) & (self.slope_power > 0)
@@ -176,10 +190,13 @@ class Saturated:
 def saturated(
     names: Sequence[str], effort: Array, speed: Array, fast: Array, smallest_share: float
 ) -> tuple[Saturated, ...]:
-    """Return the efforts that stay at an extreme value in some rows of a log: for each joint the extreme that is more
-    frequent.
+    """Return the efforts that stay at their largest or smallest value in many rows of a log, as at a saturated drive.
 
-    effort, speed  (N, n);  fast (n,) the speed of each joint's fast motion;  smallest_share  of rows at an extreme
+    For each joint, only the more frequent extreme is returned.
+
+    effort, speed   (N, n) for N rows and n joints
+    fast            (n,) a high speed of each joint; rows with much smaller speeds are left out
+    smallest_share  share of the rows at an extreme from which the effort is returned
     """
     found = []
     for k, name in enumerate(names):

@@ -38,10 +38,10 @@ class FilterOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LowPass:
-    """A zero-phase Butterworth filter along axis 0, for one sample period.
+    """A zero-phase Butterworth filter along axis 0 of an array, designed for one sample period.
 
-    sections  its second-order sections
-    settled   state of the sections if the input has always been one
+    sections  second-order sections of the filter
+    settled   internal state of the sections after a long constant input of one; it avoids a transient at the start
     """
 
     sections: Array
@@ -99,11 +99,13 @@ SEED = 30_301
 
 
 def position_noise(position: Array, filtered: Array, in_band: float) -> Array:
-    """Return the standard deviation (n,) of an unfiltered sample, rad or m, from what the low-pass filter removed.
+    """Return the standard deviation (n,) of the sensor noise in one position sample, rad or m, for n joints.
 
-    position, filtered  (N, n) of a log at equal time steps;  in_band  share of the spectrum below the cut-off
+    The low-pass filter removes the noise above its cut-off. White noise is assumed, so the removed part gives the
+    whole.
 
-    The noise is assumed to be white, so the part above the cut-off gives the part below.
+    position, filtered  (N, n) positions before and after the filter, at N equal time steps
+    in_band             share of a white noise's power that the filter lets pass
     """
     left = position - filtered
     left = left - np.median(left, axis=0)
@@ -139,8 +141,12 @@ NOISE_CHUNK = 65_536
 
 
 def noise_like(noise: Array, first: int, last: int) -> Array:
-    """Return random position noise (last - first, n) with these standard deviations for some rows. It is the same in
-    every call."""
+    """Return simulated position noise (last - first, n) for rows `first` to `last` of a log.
+
+    The result is the same in every call with the same arguments.
+
+    noise  (n,) standard deviation for each of n joints, rad or m
+    """
     parts = []
     for chunk in range(first // NOISE_CHUNK, (last - 1) // NOISE_CHUNK + 1):
         start = chunk * NOISE_CHUNK

@@ -66,11 +66,14 @@ class RowStore:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredLog(Timed):
-    """A log with the fields of Log. Position, velocity and effort are read with `rows`. N rows, n joints.
+    """A log whose rows are in a RowStore in memory or on disk. It has the fields of Log, with N rows and n joints.
 
-    time    (N,)  s, in memory
-    store   rows of positions, velocities (unused unless `has_velocity`) and efforts, of `stored` joints each
-    places  (n,)  indices of this log's joints among these
+    The method `rows` reads positions, velocities and efforts.
+
+    time          (N,) s, in memory
+    store         rows, each with the positions, velocities and efforts of `stored` joints
+    has_velocity  False: the velocities in the store have no meaning
+    places        (n,) indices of the log's n joints among the `stored` joints
     """
 
     name: str
@@ -87,8 +90,10 @@ class StoredLog(Timed):
     use: Use = "fit"
 
     def ordered(self, joint_names: tuple[str, ...]) -> StoredLog:
-        """Return the same log with its columns in the order of these joints. Raises InputError with all joints that
-        are missing."""
+        """Return a copy of the log with its columns in the order of `joint_names`.
+
+        Raises InputError with all joints that the log lacks.
+        """
         found = places_of(self.name, self.joint_names, joint_names)
         return replace(self, joint_names=joint_names, places=tuple(self.places[k] for k in found))
 

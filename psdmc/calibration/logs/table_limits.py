@@ -23,7 +23,7 @@ ALWAYS_ALLOWED = 64 * 1024**2
 
 
 def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
-    """Raise InputError if a table has too many rows, columns or values. The check runs before they are read."""
+    """Raise InputError if a table has too many rows, columns or values. The check needs only the table's size."""
     found, most = (rows, columns), (LARGEST_ROWS, LARGEST_COLUMNS)
     for what, count, largest in zip(("rows", "columns"), found, most, strict=True):
         if count > largest:

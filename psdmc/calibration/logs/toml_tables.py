@@ -49,9 +49,10 @@ def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
 
 
 class TomlTable:
-    """One table that is read key by key. Faults are added to `faults` with the name of the table.
+    """A table of a TOML file whose values are read key by key, and checked.
 
-    If a key is missing or wrong, its reader returns the default or a harmless value. The caller then checks `faults`.
+    If a key is missing or wrong, the reading function adds a message to the list `faults`, and returns the default or a
+    harmless value. The caller checks the list after reading all keys.
     """
 
     def __init__(self, value: object, where: str, keys: tuple[str, ...], faults: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""Limits of a planned motion: those of the joints, torque limits, and collisions."""
+"""Limits of a planned motion: joint limits, torque limits, and collisions."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ LOOKED_AT = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Allowed:
-    """Limits of motions.
+    """Limits on planned motions of a robot.
 
+    chain          the robot, with the limits of its joints
     torques        torque limits; None: torques are not checked
-    torque_margin  share of these limits that a motion may use
-    clearance      shapes that may not collide; None: collisions are not checked
+    torque_margin  share of the torque limits that a motion may use
+    clearance      shapes that may not collide, or a floor; None: collisions are not checked
     """
 
     chain: Mechanism
@@ -55,12 +56,13 @@ LARGEST_LIMIT = 1e6
 
 @dataclass(frozen=True, slots=True)
 class GivenLimits:
-    """Limits that the user gives by joint name, SI. A range or a speed may only be narrower than the file's.
+    """Limits that the user gives by joint name, SI. A range or a speed may only be narrower than that in the robot
+    file.
 
     ranges         lowest and highest position, rad (m)
     speeds         rad/s (m/s)
     accelerations  rad/s^2 (m/s^2)
-    acceleration   for joints that have no other limit of acceleration; None: such joints give an error
+    acceleration   rad/s^2 (m/s^2), for joints without another limit of acceleration; None: such joints give an error
     efforts        N m (N)
     """
 
@@ -151,11 +153,13 @@ def _ranged(joint: Joint, low: float, high: float) -> Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueLimits:
-    """The largest torques of a robot, and the data to compute the torques of a motion.
+    """The largest joint torques of a robot, and the parameters with which the torques of a motion are computed.
 
+    chain     the robot
+    model     object that computes the regressor Y of the robot, with torques Y theta_b
     largest   (n,) N m (N), infinite for a joint without limit
-    theta_b   (l,)
-    friction  function from speeds (..., n) to torques (..., n); None: unknown
+    theta_b   (l,) base parameters
+    friction  function from speeds (..., n) to friction torques (..., n); None: unknown
     """
 
     chain: Mechanism
@@ -165,19 +169,25 @@ class TorqueLimits:
     friction: Callable[[Array], Array] | None = None
 
     def torque(self, q: Array, qd: Array, qdd: Array, load: Load | None = None) -> Array:
-        """Return the torques (N, n), N m (N). For a load only its weight counts, because it is carried in slow sweeps."""
+        """Return the torques (N, n), N m (N), that a motion needs at N samples of n joints.
+
+        Of a load, only the weight is included, because loads are carried in slow sweeps.
+        """
         tau = self.of(self.model.regressor(q, qd, qdd), qd)
         return tau if load is None else tau + payload_torque(self.chain, q, load.mass, load.com)
 
     def of(self, regressor: Array, qd: Array) -> Array:
-        """Return the torques (..., n) from the regressor (..., n, l) and the speeds."""
+        """Return the joint torques (..., n), friction included, from the regressor (..., n, l) and the joint speeds
+        (..., n)."""
         tau = np.asarray(regressor @ self.theta_b)
         return tau if self.friction is None else tau + self.friction(qd)
 
     def excess(self, regressor: Array, qd: Array, share: float) -> tuple[float, Array, Array]:
-        """Return the penalty for torques beyond `share` of their limits: the mean over samples of the squared excess,
-        in shares of the limit. Also return its derivatives by the regressor (N, n, l) and, through friction, by the
-        speeds (N, n)."""
+        """Return a penalty for torques beyond `share` of the torque limits, and the derivatives of the penalty.
+
+        The penalty is the mean over N samples of the squared relative excess, summed over the joints. The derivatives
+        are those by the entries of the regressor (N, n, l) and, through friction, by the joint speeds (N, n).
+        """
         tau = self.of(regressor, qd)
         usable = share * self.largest
         beyond = np.maximum(np.abs(tau) / usable - 1.0, 0.0)
@@ -189,7 +199,8 @@ class TorqueLimits:
         return float(np.sum(beyond**2)) / len(tau), by_torque[..., None] * self.theta_b, by_speed
 
     def faults(self, tau: Array, share: float) -> list[str]:
-        """Return one sentence for each joint whose torque (N, n) exceeds `share` of its limit."""
+        """Return one sentence for each joint whose largest torque in `tau` (N, n) is above `share` of the joint's
+        limit."""
         reach = np.abs(tau).max(axis=0)
         return [
             f"{joint.name}: torque {value:.4g} beyond {share:.0%} of {limit:g}"

@@ -23,8 +23,14 @@ Try = tuple[float, Callable[[], Trajectory]]
 def first_allowed(
     what: str, tries: Iterable[Try], faults: Callable[[Trajectory], list[str]]
 ) -> tuple[Trajectory, float]:
-    """Return the first motion without faults, and its share of the ranges. Raises InputError if all motions have
-    faults, or with the first error if no motion can be made."""
+    """Return the first motion that violates no limit, and the share of the joint ranges that this motion uses.
+
+    what    kind of motion, for messages
+    tries   shares of the ranges, and functions that make a motion within them
+    faults  function that returns one sentence for each violated limit
+
+    Raises InputError if all motions violate limits, or with the first error if no motion can be made.
+    """
     found: list[str] = []
     for number, (share, make) in enumerate(tries):
         try:
@@ -43,8 +49,11 @@ def first_allowed(
 
 
 def smaller_boxes(chain: Mechanism, seed: int) -> Iterator[tuple[float, int, Mechanism]]:
-    """Yield parts of the joints' ranges, large ones first: the share, the number of the attempt, and the robot with
-    these limits."""
+    """Yield smaller and smaller joint ranges in which a motion may be planned.
+
+    Each entry has the share of the full ranges, the number of the attempt with this share, and the robot with the
+    smaller ranges. The first attempt takes the middle of the ranges, the others random places.
+    """
     rng = np.random.default_rng(seed)
     low, high = np.array([(joint.limits.lower, joint.limits.upper) for joint in chain.joints]).T
     for share in SHARES:

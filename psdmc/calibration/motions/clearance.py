@@ -39,10 +39,11 @@ FLOOR = "the floor"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearance:
-    """Pairs of shapes that must keep a distance from each other.
+    """Pairs of collision shapes of a robot that must keep a distance from each other.
 
-    model, shapes  Pinocchio's; the pairs are those of `shapes`
-    place          (n,) index of each joint's coordinate in Pinocchio's q;  held (nq,) values of the other coordinates
+    model, shapes  Pinocchio's models of the robot and of its shapes, with the pairs
+    place          (n,) index of each joint's coordinate in Pinocchio's q
+    held           (nq,) Pinocchio's q, with the values of coordinates that do not belong to the n joints
     always         pairs, "A and B", that touch in every pose and are not checked
     """
 
@@ -83,10 +84,11 @@ class Clearance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorPoints:
-    """A floor for robots without shapes. The origins of joints and the tip must stay above it.
+    """A floor for robots without collision shapes. The origins of the joints and the tip must stay above the floor.
 
-    above   points that are checked: 0 to n - 1 are the joints' origins, n the tip
-    height  m above the base's origin, against gravity
+    chain   the robot
+    height  m, height of the floor above the base's origin, against gravity
+    above   points that are checked: 0 to n - 1 are the origins of the n joints, n is the tip
     """
 
     chain: Mechanism
@@ -120,8 +122,10 @@ class FloorPoints:
 
 
 def floor_points(chain: Mechanism, height: float) -> FloorPoints:
-    """Return the floor for those points that are above it in some pose. A joint on which the robot stands is below it
-    in all."""
+    """Return a floor, with the points that are above the floor in at least one of many random poses.
+
+    Other points, such as the joint on which the robot stands, are not checked.
+    """
     found = FloorPoints(chain, height)
     heights = found._heights(_random_poses(chain))
     return FloorPoints(

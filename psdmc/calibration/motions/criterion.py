@@ -1,6 +1,7 @@
-"""Measures how well a motion distinguishes the parameters of a fit, with derivatives. Smaller values are better.
+"""Measures how well a motion determines the parameters of a linear fit, with derivatives. Smaller values are better.
 
-Most functions need the Gram matrix of the fit's columns A, which is A^T A.
+The columns A of the fit have one row per sample and joint, one column per parameter. Most functions need the Gram
+matrix A^T A.
 """
 
 from __future__ import annotations
@@ -26,9 +27,12 @@ TINY = 1e-100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scaled:
-    """The Gram matrix of columns after scaling to unit length.
+    """The Gram matrix A^T A of the columns of a fit after each column was scaled to unit length.
 
-    matrix (m, m), lengths (m,) of the columns, eigenvalues `values` (m,) ascending, eigenvectors `vectors` (m, m)
+    matrix   (m, m) scaled Gram matrix of m columns, with ones on the diagonal
+    lengths  (m,) lengths of the columns before scaling
+    values   (m,) eigenvalues of the matrix, ascending
+    vectors  (m, m) eigenvectors
     """
 
     matrix: Array
@@ -43,12 +47,13 @@ class Scaled:
 
     @property
     def deviation(self) -> float:
-        """Bound of the parameters' standard deviations, as a geometric mean, if the error of each row is one: the
-        condition number divided by the columns' lengths.
+        """Upper bound of the parameters' standard deviations, as a geometric mean, for a measurement error of one in
+        each row.
 
-        The standard deviation of parameter j is sqrt((C^-1)_jj) / L_j, with the matrix C and the length L_j of its
-        column. The first factor is at most the condition number, because the largest eigenvalue of a matrix with unit
-        diagonal is at least one.
+        The bound is the condition number divided by the geometric mean of the columns' lengths. The standard deviation
+        of parameter j is sqrt((C^-1)_jj) / L_j, with the scaled Gram matrix C and the length L_j of column j. The first
+        factor is at most the condition number, because the largest eigenvalue of a matrix with unit diagonal is at
+        least one.
         """
         return self.condition / float(np.exp(np.mean(np.log(self.lengths))))
 
@@ -69,7 +74,10 @@ class Scaled:
 
 
 def scaled(columns: Array) -> Scaled:
-    """Return the scaled Gram matrix of columns (..., m), where all leading axes are rows."""
+    """Return the Gram matrix of the columns of a fit, each scaled to unit length.
+
+    columns  (..., m) m columns; all leading axes count rows
+    """
     rows = columns.reshape(-1, columns.shape[-1])
     gram = rows.T @ rows
     lengths = np.sqrt(np.maximum(np.diagonal(gram), TINY))
@@ -79,7 +87,12 @@ def scaled(columns: Array) -> Scaled:
 
 
 def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float, Array]:
-    """Return a smooth form of the objective, in logarithms, and its derivatives by the unscaled Gram matrix (m, m)."""
+    """Return a smooth measure of how well a motion determines the parameters of a fit, and its derivatives.
+
+    With the objective "log_det", the measure is minus the log determinant of the Gram matrix. With the others, it is
+    the smoothed logarithm of the condition number, with "deviation" divided by the columns' geometric mean length. The
+    derivatives are those by the entries of the Gram matrix (m, m) before scaling.
+    """
     if objective == "log_det":
         return negative_log_det(of)
     value, by_gram = smooth_condition(of, power)
@@ -90,10 +103,14 @@ def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float,
 
 
 def smooth_condition(of: Scaled, power: float) -> tuple[float, Array]:
-    """Return a smooth form of the logarithm of the condition number, and its derivatives by the unscaled Gram matrix
-    (m, m). Means over all eigenvalues replace the extreme ones.
+    """Return a smooth form of the logarithm of the condition number of scaled columns, and its derivatives.
 
-    power   exponent of these means: 1 weights all directions equally, large values only the best and the worst
+    The condition number is not differentiable where several eigenvalues are the largest or the smallest. Power means
+    over all eigenvalues therefore take the place of these two. The derivatives are those by the entries of the Gram
+    matrix (m, m) before scaling.
+
+    power  exponent of the power means: with 1, all eigenvalues matter; with large values, only the largest and the
+           smallest
     """
     values, vectors = of.values, of.vectors
     up, down = (values / values[-1]) ** power, (values / values[0]) ** -power
@@ -119,12 +136,15 @@ ANGLE_STEP = 1e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitColumns:
-    """The columns (..., n, m + n f) of a linear fit at states: (Y @ into) for theta_b, then friction and offset of
+    """Computes the columns (..., n, m + n f) of a linear fit at states of n joints.
+
+    The first m columns are Y @ into, with the regressor Y. They are followed by f columns of friction and offset for
     each joint.
 
-    model  regressor Y
-    into   (l, m)  directions of theta_b that the fit determines
-    terms  function from speeds (..., n) to factors (..., n, f) of a joint's friction and offset; None: the fit has none
+    model  object that computes the regressor Y
+    into   (l, m) the m combinations of base parameters theta_b that the fit determines
+    terms  function from speeds (..., n) to the f factors (..., n, f) of friction and offset; None: the fit has no
+           friction
     """
 
     model: Regressor
@@ -132,7 +152,7 @@ class FitColumns:
     terms: Callable[[Array], Array] | None = None
 
     def of(self, regressor: Array, qd: Array) -> Array:
-        """Return the columns from the regressor (..., n, l) and the speeds."""
+        """Return the columns (..., n, m + n f) of the fit from the regressor (..., n, l) and the joint speeds (..., n)."""
         rigid = regressor @ self.into
         if self.terms is None:
             return np.asarray(rigid)
@@ -147,9 +167,14 @@ class FitColumns:
         return self.of(self.model.regressor(q, qd, qdd), qd)
 
     def slopes(self, states: Array, weights: Array, on_regressor: Array | None = None) -> Array:
-        """Return the derivatives (3, n, N) of sum(weights * columns) + sum(on_regressor * Y) by the states.
+        """Return the derivatives (3, n, N) of sum(weights * columns) + sum(on_regressor * Y) by the states of N
+        samples.
 
-        states (3, n, N), weights (N, n, m + n f), on_regressor (N, n, l)
+        Here `columns` are those of the fit, and Y is the regressor. The first axis has derivatives by q, qd and qdd.
+
+        states        (3, n, N) q, qd and qdd of n joints
+        weights       (N, n, m + n f)
+        on_regressor  (N, n, l) additional weights of Y; None: zero
         """
         q, qd, qdd = (np.ascontiguousarray(part.T) for part in states)
         m = self.into.shape[1]
@@ -166,7 +191,8 @@ class FitColumns:
 
 
 def all_columns(model: Regressor, l: int, options: LinearOptions) -> FitColumns:
-    """Return the columns of the linear fit of one log, before its filter: all base parameters, friction and offsets."""
+    """Return the columns of the linear fit of a log, for states that are not filtered: base parameters, friction and
+    offsets."""
 
     def terms(qd: Array) -> Array:
         return np.stack(friction_columns(options.terms, qd, options.sign_speed), axis=-1)
@@ -175,16 +201,19 @@ def all_columns(model: Regressor, l: int, options: LinearOptions) -> FitColumns:
 
 
 def inertial_columns(chain: Mechanism, model: Regressor, l: int) -> FitColumns:
-    """Return the columns of the inertial step of the four steps: the parameters that do not affect gravity torques,
-    (23) of Denso-2022. Friction is known in that step."""
+    """Return the columns of the inertial step of a four-step calibration, (23) of Denso-2022.
+
+    The columns belong to the parameters that do not affect gravity torques. In the inertial step, friction is known.
+    """
     return FitColumns(model, gravity_split(chain, model, l).from_psi())
 
 
 def regressor_slopes(model: Regressor, q: Array, qd: Array, qdd: Array, weights: Array) -> Array:
-    """Return the derivatives (3, n, N) of sum(weights * Y(q, qd, qdd)) by q, qd and qdd, (N, n) each; weights (N, n,
-    l).
+    """Return the derivatives (3, n, N) of sum(weights * Y) by the states of N samples, with the regressor Y.
 
-    Y is linear in the accelerations and quadratic in the speeds, so differences are exact for these.
+    The first axis has the derivatives by q, qd and qdd, (N, n) each. `weights` is (N, n, l) like Y.
+
+    Y is linear in the accelerations and quadratic in the speeds, so finite differences are exact for these.
     """
     count, n = q.shape
     away = np.eye(n)[:, None]

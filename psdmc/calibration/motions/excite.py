@@ -1,5 +1,8 @@
-"""Finds exciting trajectories: sums of sines for each joint (22), optimised for the fit's columns (23) within limits
-that every candidate keeps. Source of the equations: Denso-2022."""
+"""Finds exciting trajectories, that is, motions that determine the parameters of a fit well.
+
+They are sums of sines for each joint, (22), optimised for the columns of the fit, (23), within limits that every
+candidate keeps. Source of the equations: Denso-2022.
+"""
 
 from __future__ import annotations
 
@@ -37,15 +40,18 @@ SPARE = 0.99
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Excitation:
-    """The exciting motion that was found, compared with random motions.
+    """The exciting motion that a search found, compared with random motions. Smaller condition numbers are better.
 
-    condition         condition number of the scaled columns along the motion
-    random_conditions (random,) of random motions within the same limits, ascending; infinite if a motion needs too much
-                      torque at any amplitude. Motions that collide do not count if they are better than the best allowed one
-    history           (k, 2) number of evaluations, and best value of the objective so far
-    seconds           CPU time since the time limit of the options began to count
-    ended_by_clock    whether the time limit ended the search; if so, another run may find another motion
-    deviation         bound on standard deviations (criterion.Scaled);  random_deviation: that of the best random motion
+    condition          condition number of the scaled columns of the fit along the motion
+    random_conditions  (random,) condition numbers of random motions within the same limits, ascending; infinite if a
+                       motion needs too much torque at any amplitude. Motions that collide do not count if they are
+                       better than the best allowed one
+    history            (k, 2) for k times during the search: number of evaluations, and best value of the objective so
+                       far
+    seconds            CPU time since the time limit of the options began to count
+    ended_by_clock     True: the time limit ended the search, so another run may find another motion
+    deviation          upper bound of the parameters' standard deviations (criterion.Scaled.deviation)
+    random_deviation   the bound for the best random motion
     """
 
     motion: SineSum
@@ -77,14 +83,17 @@ def excite(
     allowed: Allowed | None = None,
     began: float | None = None,
 ) -> Excitation:
-    """Search for an exciting motion by quasi-Newton descents that start from the best random motions.
+    """Search for a motion that determines the parameters of a fit well. The search starts from the best random motions.
 
-    model    columns of the fit; or a regressor, all of whose columns count
+    The method is quasi-Newton descent.
+
+    chain    the robot
+    model    columns of the fit; or an object that computes the regressor, of which all columns are fitted
     allowed  limits of torque and collisions in addition to the joints' limits; None: none
     began    value of cpu_seconds() from which the time limit counts; None: now
 
-    The result is never worse than the best random motion that keeps the same limits without a collision. It depends on
-    the options alone if the time limit does not end the search. Raises InputError if a joint has no limits, or if no
+    The result is never worse than the best random motion that keeps all limits without a collision. The result depends
+    on the options alone if the time limit does not end the search. Raises InputError if a joint has no limits, or if no
     motion is allowed.
     """
     options, allowed = options or ExciteOptions(), allowed or Allowed(chain)
@@ -232,8 +241,10 @@ UNFELT = 1e-6
 def motor_poses(
     chain: Mechanism, load: Load, *, tries: int = 400, range_share: float = 0.9, seed: int = 0
 ) -> tuple[Array, Array]:
-    """Return random poses (tries, n). Also return the RMS torque (tries, n), N m (N), of the load on each joint while
-    that joint moves through its sweep."""
+    """Return random poses (tries, n), and the torques (tries, n), N m (N), of a load in them.
+
+    The torque of joint k in a pose is the RMS value while joint k moves through its range and the other joints rest.
+    """
     rng = np.random.default_rng(seed)
     low, high = np.array([swept_range(joint, range_share) for joint in chain.joints]).T
     poses = rng.uniform(low, high, (tries, len(chain)))

@@ -1,7 +1,8 @@
 """Describes sums of sines by unbounded coordinates, so that every motion keeps the joints' limits.
 
-The sines of each joint are divided by the share of its tightest limit that they need. A norm that is never smaller
-replaces the largest value of a curve. So motions are smooth in their coordinates, and the limits still hold.
+The sines of each joint are divided by the share of its tightest limit that they need, and so keep that limit. This
+share is the largest value of a curve, which is not a smooth function of the coordinates. A norm that is never smaller
+than the largest value therefore takes its place.
 """
 
 from __future__ import annotations
@@ -27,11 +28,14 @@ TINY = 1e-300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """Motions for given coordinates, with the data for their derivatives.
+    """A motion for given coordinates (see LimitedSines), with the data for its derivatives; n joints, N samples.
 
-    states  (3, n, N)  position, speed and acceleration
-    raw     (3, n, N)  before scaling;  norm (n,) share of the tightest limit, reach (n,) share of the position limit
-    fill    (n,)       share of the limits that is used;  place (n,) of the centre within the range, -1 to 1
+    states  (3, n, N) position, speed and acceleration
+    raw     (3, n, N) the sines before scaling
+    norm    (n,) share of each joint's tightest limit that the sines before scaling need
+    reach   (n,) share of the position limit that they need
+    fill    (n,) share of the limits that the motion uses
+    place   (n,) centre of the motion within the range of positions that remains, -1 to 1
     """
 
     states: Array
@@ -67,13 +71,14 @@ class LimitedSines:
         self.basis = np.stack([np.vstack(part) * self.weight for part in parts])
 
     def drawn(self, count: int, rng: np.random.Generator) -> Array:
-        """Return random coordinates (count, size) of motions that fill their limits."""
+        """Return random coordinates (count, size) of `count` motions that use nearly the full limits of every joint."""
         found = rng.standard_normal((count, self.size))
         found.reshape(count, self.n, -1)[..., -2] = FULL
         return found
 
     def filled(self, point: Array, share: float) -> Array:
-        """Return the coordinates with every joint's motion limited to this share of its limits."""
+        """Return the coordinates of a motion with the used share of every joint's limits reduced to `share`, if it was
+        larger."""
         found = point.copy().reshape(self.n, -1)
         found[:, -2] = np.minimum(found[:, -2], np.log(share / (1.0 - share)))
         return found.ravel()
@@ -101,8 +106,12 @@ class LimitedSines:
         )
 
     def slope(self, at: Placed, by_states: Array) -> Array:
-        """Return the derivatives (size,) by the coordinates of a number whose derivatives by the states (3, n, N) are
-        given."""
+        """Convert the derivatives of a scalar by the states of a motion to derivatives (size,) by the motion's
+        coordinates.
+
+        at         the motion, as `placed` returns it
+        by_states  (3, n, N) derivatives by q, qd and qdd of n joints at N samples
+        """
         by_centre = by_states[0].sum(axis=1)
         by_scale = np.einsum("pnt,pnt->n", by_states, at.raw) - by_centre * at.place * self.half * at.reach
         by_norm = -by_scale * at.fill / at.norm**2
@@ -170,7 +179,10 @@ class SineSum:
 
 
 def sine_basis(harmonics: tuple[int, ...], duration: float, time: Array) -> list[tuple[Array, Array]]:
-    """Return the sines and cosines, as rows (h, N), for position, speed and acceleration."""
+    """Return the sines and cosines (h, N each) of h harmonics at N times, and their first and second derivatives.
+
+    The result has three pairs: for position, speed and acceleration.
+    """
     w = 2.0 * np.pi * np.array(harmonics)[:, None] / duration
     s, c = np.sin(w * time), np.cos(w * time)
     return [(s, c), (w * c, -w * s), (-(w**2) * s, -(w**2) * c)]
@@ -206,7 +218,11 @@ def from_rest_to_rest(
 def ramped(
     motion: SineSum, joint_names: tuple[str, ...], period: float, repeats: int, ramp: float
 ) -> Trajectory:
-    """Return the motion with ramps of `ramp` seconds, rounded to rows."""
+    """Return `repeats` periods of a motion with a ramp from rest before them, and a ramp to rest after them.
+
+    period  s between rows
+    ramp    s, duration of each ramp, rounded to a whole number of rows
+    """
     rows = max(round(ramp / period), 1)
     middle: Array = np.arange(round(repeats * motion.duration / period) + 1, dtype=np.float64) * period
     length = rows * period

@@ -1,5 +1,7 @@
-"""Decides for which limits and collisions planned motions are checked, and describes these checks in sentences. The
-sentences also say which checks were not possible, and why."""
+"""Selects the limits and collisions for which planned motions are checked, and describes these checks in sentences.
+
+The sentences also say which checks were not possible, and why.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,16 @@ def allowed_of(
     shapes: Sequence[Path] | None,
     floor: float | None,
 ) -> Allowed:
-    """Return the limits of a model's motions. Torques are limited if theta_b is known and a joint has a torque limit;
-    collisions are checked if the model contains shapes.
+    """Return the limits and collision checks for planned motions of a model's robot.
 
-    chain   the model's robot, with the limits that the motions keep
-    shapes  folders of meshes; None: shapes are not checked
-    floor   m above the base's origin; None: no floor
+    Torques are limited if the base parameters theta_b are known and a joint has a torque limit. Collisions are checked
+    if the model contains collision shapes.
+
+    chain          the model's robot, with the limits that the motions must keep
+    regressor      object that computes the regressor of the robot
+    torque_margin  share of the torque limits that a motion may use
+    shapes         folders of meshes; None: shapes are not checked
+    floor          m, height of a floor above the base's origin; None: no floor
 
     Raises InputError if a floor that cannot be checked is given, or if meshes are missing.
     """

@@ -1,7 +1,7 @@
 """Searches for an exciting motion by quasi-Newton descents from the best of many random motions.
 
-The condition number has kinks where its smallest eigenvalue is double. So a descent first minimises a smooth mean over
-all directions, and then approaches the condition number in steps.
+The condition number of a fit's columns is not differentiable where two eigenvalues are both the smallest. So a descent
+first minimises a smooth mean over all eigenvalues, and then approaches the condition number in steps.
 """
 
 from __future__ import annotations
@@ -52,8 +52,13 @@ class OutOfTime(Exception):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """The result of a search: the best point of each descent, best first; the number of evaluations; and a history (k,
-    2) of this number and the best score so far."""
+    """The result of a search for an exciting motion.
+
+    points          best coordinates of a motion (size,) from each descent, best first
+    evaluations     number of evaluations of the objective
+    history         (k, 2) for k times during the search: number of evaluations, and best objective so far
+    ended_by_clock  True: the time limit ended the search
+    """
 
     points: tuple[Array, ...]
     evaluations: int
@@ -62,7 +67,11 @@ class Found:
 
 
 class Criterion:
-    """The function that the search minimises: the objective of the options plus a penalty for excess torque."""
+    """The function of a motion's coordinates that the search minimises.
+
+    It is the objective of the options, such as the condition number of the fit's columns, plus a penalty for torques
+    beyond their limits.
+    """
 
     def __init__(
         self, space: LimitedSines, columns: FitColumns, options: ExciteOptions, torques: TorqueLimits | None
@@ -75,7 +84,13 @@ class Criterion:
         return found.score(self.options.objective)
 
     def cost(self, point: Array) -> float:
-        """Return the smooth objective of the last descent with the penalty for excess torque, without derivatives."""
+        """Return the smooth objective of a motion plus the penalty for torques beyond their limits, without
+        derivatives.
+
+        The smoothing is that of the last descent, which is closest to the objective itself.
+
+        point  (size,) coordinates of the motion
+        """
         q, qd, qdd = (np.ascontiguousarray(part.T) for part in self.space.placed(point).states)
         regressor = self.columns.model.regressor(q, qd, qdd)
         seen = scaled(self.columns.of(regressor, qd))
@@ -85,7 +100,12 @@ class Criterion:
         return value + TORQUE_COST * self.torques.excess(regressor, qd, self.options.torque_margin)[0]
 
     def smooth(self, point: Array, power: float) -> tuple[float, Array, float]:
-        """Return the smooth objective with the penalty for excess torque, its derivatives, and the objective itself."""
+        """Return the smooth objective of a motion with a penalty for excessive torques, its derivatives, and the plain
+        objective.
+
+        point  (size,) coordinates of the motion
+        power  exponent of the smoothing; larger values are closer to the plain objective
+        """
         at = self.space.placed(point)
         q, qd, qdd = (np.ascontiguousarray(part.T) for part in at.states)
         regressor = self.columns.model.regressor(q, qd, qdd)
@@ -110,12 +130,14 @@ def search(
     is_free: Callable[[Array], bool] | None = None,
     progress: SearchProgress | None = None,
 ) -> Found:
-    """Return the results of descents from the first of the starts (k, size), best first. The options' evaluations
-    determine how many there are.
+    """Return the best motions that descents from several start motions find, best first.
 
-    begin     value of cpu_seconds() from which the time limit counts
-    is_free   function that returns whether the motion at a point has no collision. Descents stay at such points. If a
-              collision ends a descent early, a random walk continues
+    criterion  function to minimise
+    starts     (k, size) coordinates of k start motions. The options' number of evaluations limits how many of them are
+               used
+    begin      value of cpu_seconds() from which the time limit counts
+    is_free    function that returns whether the motion with given coordinates has no collision. Descents stay at such
+               motions. If a collision ends a descent early, a random walk continues
     """
     options = criterion.options
     budget = options.evaluations
@@ -196,7 +218,7 @@ class _Counted:
         return value, slope
 
     def steps_left(self) -> Iterator[int]:
-        """Yield the steps of the random walk until its evaluations or the time are used up."""
+        """Yield the number of each step of the random walk until the number of evaluations or the time is used up."""
         for step in range(STEPS_PER_EVALUATION * max(self.budget - self.count, 0)):
             if self.is_late:
                 return
@@ -224,8 +246,14 @@ def walked(
     steps: Iterable[object],
     rng: np.random.Generator,
 ) -> Array:
-    """Return the best point that a random walk of these steps finds among points without collision. It starts at
-    `point`, which has none."""
+    """Search for a motion of lower cost by a random walk, and return its coordinates. Only motions without collision
+    count.
+
+    cost     function from the coordinates of a motion to its cost
+    point    (size,) coordinates of the first motion, which has no collision
+    is_free  function that returns whether a motion has no collision
+    steps    iterable with one entry per step of the walk
+    """
     lowest, step = cost(point), FIRST_STEP
     for _ in steps:
         tried = point + step * rng.standard_normal(len(point))

@@ -38,10 +38,12 @@ class SweepOptions:
 class SineOptions:
     """Options of sines with growing amplitude, one joint at a time.
 
-    smallest, largest  amplitudes, rad: from within pre-sliding to what the speed limit allows
+    smallest, largest  amplitudes, rad. The smallest lies in pre-sliding (elastic deflection before the joint slides);
+                       limits may reduce the largest
     ratio              ratio of one amplitude to the one before
     frequencies        Hz; each amplitude is run at each frequency that the limits allow, or at the largest possible one
-    cycles             periods at full amplitude; during one more before and after them the amplitude grows and falls
+    cycles             number of periods at full amplitude; one more period before them fades the sine in, one after
+                       them fades it out
     margin             share of the speed and acceleration limits that is used
     period             s between rows
     """
@@ -69,7 +71,8 @@ def swept_range(joint: Joint, share: float) -> tuple[float, float]:
 
 
 def sweep_speed(joint: Joint, share: float) -> float:
-    """Return a share of the joint's speed limit, rad/s or m/s; without a limit, of 2."""
+    """Return a share of the joint's speed limit, rad/s or m/s. For a joint without a limit, 2 rad/s or m/s takes its
+    place."""
     return share * (joint.limits.speed if np.isfinite(joint.limits.speed) else 2.0)
 
 
@@ -111,10 +114,10 @@ def single_joint_sweep(chain: Mechanism, joint: int, pose: Array, options: Sweep
 
 
 def gravity_sweep(chain: Mechanism, seed: int, options: SweepOptions) -> Trajectory:
-    """Return a motion of all joints forwards and backwards, each at its own constant speed, and then the same path
-    backwards. Source: Denso-2022, (18).
+    """Return a slow motion of all joints for the identification of gravity torques. Source: Denso-2022, (18).
 
-    Speeds and starts are random numbers from the seed, so the joints always meet in new poses.
+    Each joint moves forwards and backwards at its own constant speed. Then the whole motion is repeated in reverse, so
+    that friction cancels. Speeds and starts are random numbers from the seed, so the joints always meet in new poses.
     """
     rng = np.random.default_rng(seed)
     half = _times(options.seconds, options.period)
@@ -160,7 +163,11 @@ def sine_series(chain: Mechanism, joint: int, pose: Array, options: SineOptions)
 
 
 def sine_plan(joint: Joint, centre: float, options: SineOptions) -> list[tuple[float, float]]:
-    """Return (amplitude, frequency) of each sine of a series, within the joint's limits."""
+    """Return (amplitude, frequency) of each sine for the friction identification of one joint, within the joint's
+    limits.
+
+    centre  rad or m, position about which the joint oscillates
+    """
     limits = joint.limits
     room = min(limits.upper - centre, centre - limits.lower, options.largest)
     if not room >= options.smallest or not min(limits.speed, limits.acceleration) > 0:

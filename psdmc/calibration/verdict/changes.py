@@ -38,11 +38,12 @@ RESOLVED = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One value of the calibrated file, and its change in the logs.
+    """One value of a calibrated file, such as a base parameter, and how much it differs in new logs.
 
-    value, change, std  value in the file, and its change in the logs with its standard deviation. std is infinite if the
-                        logs do not determine the value by itself
-    torque              largest RMS over the joints of the torque of this change, N m (N)
+    value   value in the file
+    change  difference of the value that fits the logs from the value in the file
+    std     standard deviation of the difference; infinite if the logs do not determine the value by itself
+    torque  RMS over the samples of the torque that the difference causes, N m (N); largest of all joints
     """
 
     name: str
@@ -84,10 +85,13 @@ class LoadChange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    """An explanation of the logs by a load and changes of single values, `chosen` in number.
+    """A load at the tip and changed values of the calibrated file that together explain new logs.
 
-    values  (u,) changes of the whole vector
-    left    chi-square that remains
+    values  (u,) differences of all u values of the file, theta_b first
+    load    the load; None: no load is needed
+    named   the changed values
+    left    chi-square of the differences that remain unexplained
+    chosen  number of explaining items: each changed value, and the load, counts as one
     """
 
     values: Array
@@ -98,10 +102,11 @@ class Explanation:
 
 
 class Changes:
-    """The changes of all u values of a calibrated file, theta_b first, in some logs.
+    """The differences of all u values of a calibrated file (theta_b first, then friction) that fit new logs best.
 
-    white     (r,)    changes in the directions that the logs show, in standard deviations of file and logs together
-    by_value  (r, u)  the same for a unit change of each value
+    white     (r,) the differences in r independent directions that the logs determine, in standard deviations. The
+              standard deviations are those of file and logs together
+    by_value  (r, u) the entries of `white` for a difference of one in each value
     """
 
     def __init__(self, found: Delivered, fit: LinearResult, rows: PredictedRows) -> None:
@@ -134,15 +139,17 @@ class Changes:
 
     @property
     def chance(self) -> float:
-        """Probability that an unchanged robot gives a chi-square at least as large, or a single value with at least as
-        large a change."""
+        """Probability that the logs of an unchanged robot differ from the calibrated file by at least as much.
+
+        The measure of the difference is chi-square or the largest change of a single value, whichever is less probable.
+        """
         sizes = np.linalg.norm(self.by_value, axis=0)
         alone = (self.by_value.T @ self.white) / np.where(sizes > 0.0, sizes, np.inf)
         single = len(sizes) * stats.chi2.sf(np.max(alone**2, initial=0.0), 1)
         return float(min(1.0, 2.0 * min(stats.chi2.sf(self.chi2, self.freedom), single)))
 
     def torque(self, values: Array) -> Array:
-        """Return the torque (N, n) of a change of all values."""
+        """Return the torques (N, n) that given changes (u,) of all calibrated values cause at N samples of n joints."""
         return np.concatenate([block.columns @ values for block in self.fit.problem.rows])
 
     def _change(self, k: int, change: float, std: float) -> Change:
@@ -163,12 +170,13 @@ class Changes:
         return Change(f"{name} of {owner}", "", unit, value, change, std, torque)
 
     def explanation(self) -> Explanation:
-        """Return the explanation, to which the load or single values are added one by one. At each step the one that
-        explains most is added, until the remaining differences are no more than chance.
+        """Return the load and the few changed values that explain the difference between a calibrated file and new
+        logs.
 
-        A load has more parameters than a single value, so it explains more by chance. Therefore each parameter has a
-        cost. But a load changes more often than a link, so a base parameter costs as much as a load if a load is
-        possible.
+        In each step, the item that explains most of chi-square is added. The search ends if the remaining differences
+        are no more than chance. A load has more parameters than a single value, so it explains more by chance.
+        Therefore each parameter has a cost. But a load changes more often than a link, so a base parameter costs as
+        much as a load if a load is possible.
         """
         price = float(stats.chi2.isf(CHANCE / self.size, 1))
         blocks = {k: self.by_value[:, [k]] for k in range(self.size) if self.by_value[:, k].any()}

@@ -34,8 +34,10 @@ time."""
 def delays_of(
     regressor: Regressor, logs: Sequence[Shifted], coupling: Coupling | None, known: float = 0.0
 ) -> tuple[Delay, ...]:
-    """Return the delay of each log in addition to the known one. Logs that are too short for their own fit are fitted
-    together."""
+    """Return the delay between motion and torque in each log, in addition to the delay `known`, s.
+
+    Logs that are too short for a fit of their own are fitted together.
+    """
     alone = [
         log
         for log in logs

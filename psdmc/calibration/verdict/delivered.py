@@ -48,12 +48,14 @@ from psdmc.progress import silent
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Delivered:
-    """A calibrated model as read from its file.
+    """A calibrated model as read from its file, with all data to predict torques.
 
-    friction         values by joint and parameter name
-    constants        N m/A by joint, empty if torques were logged
-    shown            those of them that the calibration determined; given ones are not part of its quality
-    columns, extra   springs and further friction, and their values (m,)
+    model           the model
+    prediction      filter, friction law and options of the calibration
+    friction        friction values by joint and parameter name
+    constants       torque constants, N m/A by joint; empty if torques were logged
+    shown           torque constants that the calibration determined; those that the user gave are left out
+    columns, extra  springs and further friction of the robot, and their values (m,)
     """
 
     model: DynamicsModel
@@ -70,13 +72,14 @@ class Delivered:
 
     @property
     def step(self) -> StepOptions:
-        """Filter and split of the step that fits the whole torque of a fast motion."""
+        """Return filter and validation split of the calibration step that fitted the whole torque of fast motions."""
         steps = self.prediction.steps
         return step_of(steps["all"] if "all" in steps else steps["inertial"])
 
     @property
     def linear(self) -> LinearOptions:
-        """Options of a linear fit with the file's filter and, if its friction law has no state, the file's friction."""
+        """Return options to fit the model to new logs: the file's filter, and its friction terms if friction has no
+        state."""
         law, options = self.prediction, LinearOptions(filter=self.step.filter)
         if not law.is_linear:
             return options
@@ -123,14 +126,22 @@ def delivered(model: DynamicsModel) -> Delivered:
 
 
 def sprung(found: Delivered) -> Callable[[States, NDArray[np.intp]], Array] | None:
-    """Return a function of states and rows that computes the torque (rows, n) of the springs, filtered like a log's.
-    Return None if there are no springs."""
+    """Return a function that computes the torques (rows, n) of the model's springs; None if the model has no springs.
+
+    The function takes the states of a log and row indices. The torques pass the log's low-pass filter, like measured
+    torques.
+    """
     return beside(found, found.columns.of_springs)
 
 
 def beside(found: Delivered, held: NDArray[np.bool_]) -> Callable[[States, NDArray[np.intp]], Array] | None:
-    """Return a function of states and rows that computes the torque (rows, n) of the springs and friction values
-    selected by the mask `held` (m,), filtered like a log's. None of them depends on the load."""
+    """Return a function that computes the torques (rows, n) of some springs and friction terms; None if there are none.
+
+    The function takes the states of a log and row indices. The torques pass the log's low-pass filter, like measured
+    torques. None of them depends on the load.
+
+    held  (m,) True: the term is included; one entry per value in `found.extra`
+    """
     if not held.any():
         return None
     values = np.where(held, found.extra, 0.0)
@@ -203,8 +214,10 @@ class PredictedRows:
 def log_parts(
     model: DynamicsModel, log: AnyLog, check: CheckOptions
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return data of one log's independent samples, for a model that was calibrated from plain logs: time (N,),
-    measured torque and predicted torque (N, n), and which samples are held out (N,)."""
+    """Return time (N,), measured torque (N, n), predicted torque (N, n) and held-out mask (N,) for samples of a log.
+
+    The model must have been calibrated from plain logs. The N samples are far enough apart to be independent.
+    """
     found = delivered(model)
     rows = predicted_rows(found, log, check)
     return rows.time, rows.measured, rows.predicted, held_out_of(log, len(rows.time), found.step.split)
@@ -225,9 +238,9 @@ def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) 
 def predicted_rows(
     found: Delivered, log: AnyLog, check: CheckOptions, motors: Motors | None = None
 ) -> PredictedRows:
-    """Return measured and predicted torque of one log's independent samples.
+    """Return measured and predicted torque at independent samples of a log.
 
-    motors  motors to use instead of the file's
+    motors  factors from logged effort to torque; None: those of the model's file
     """
     step, motors, parts = found.step, motors or found.motors, []
     friction = None if found.prediction.is_linear else _with_state(found)

@@ -47,10 +47,12 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shifted:
-    """Independent samples of a log with torques from other times; N samples, n joints, D delays.
+    """Independent samples of a log with torques from earlier and later times, to find a delay; N samples, n joints.
 
-    lags         (D,) s, evenly spaced about zero;  torque (N, n, D) this much later than the motion
-    q, qd, qdd   (N, n);  speed, sign (N, n) of the motors, as in Evidence
+    lags         (D,) s, D delays, evenly spaced about zero
+    q, qd, qdd   (N, n) states
+    speed, sign  (N, n) speed of the motors, and its smooth sign as in Evidence
+    torque       (N, n, D) torque at the time of the state plus each of the D delays
     """
 
     log: str
@@ -65,16 +67,19 @@ class Shifted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Independent samples, one per half period of the filter's cut-off; N samples, n joints.
+    """Independent samples of logs, from which a verdict on a calibration follows; N samples, n joints.
 
-    model       the model before its calibration: its theta_b is that of the robot file, or None
-    regressor   regressor of the model
-    q, qd, qdd  (N, n)
-    sign        (N, n)  smooth sign of the motors' speed, filtered like the torque: the column of Coulomb friction
-    torque      (N, n)  of the motors, N m (N), filtered, without the torques of the known load and of springs
-    noise       (n,)    RMS of the sensor noise that passes the filter, estimated from noise above its cut-off
-    coupling    of the motors that drive several joints together; None: motor k drives joint k
-    shifted     fewer samples, log by log, with torques from other times
+    Samples are half a period of the filter's cut-off apart.
+
+    model       the model before the calibration: its base parameters theta_b are those of the robot file, or None
+    regressor   object that computes the regressor of the model
+    q, qd, qdd  (N, n) states
+    sign        (N, n) smooth sign of the motors' speed, filtered like the torque: the regressor column of Coulomb
+                friction
+    torque      (N, n) motor torque, N m (N), filtered; torques of the known load and of springs are subtracted
+    noise       (n,) RMS of the sensor noise that passes the filter, estimated from noise above its cut-off
+    coupling    matrix of a robot whose motors each drive several joints; None: motor k drives joint k
+    shifted     for each log, some samples with torques from earlier and later times, to find a delay
     saturated   efforts that stay at an extreme value
     """
 
@@ -98,7 +103,7 @@ class Evidence:
         return int(self.q.shape[1])
 
     def columns(self) -> Array:
-        """Return the regressor (N, n, l) at these states."""
+        """Return the regressor (N, n, l) at the N samples, for n joints and l base parameters."""
         return self.regressor.regressor(self.q, self.qd, self.qdd)
 
     def file_torque(self) -> Array | None:
@@ -116,7 +121,11 @@ class Evidence:
         return replace(self, **kept)
 
     def turned(self, signs: Array, order: Sequence[int]) -> Evidence:
-        """Return the samples as if joint k's position were `signs[k]` times column `order[k]` of the log."""
+        """Return the samples with joint columns exchanged and reversed: position k becomes signs[k] times column
+        order[k].
+
+        This tests whether the columns of a log were exchanged or have a wrong sign.
+        """
         columns = list(order)
         moved = {name: signs * getattr(self, name)[:, columns] for name in ("q", "qd", "qdd", "sign")}
         if self.coupling is not None:
@@ -124,8 +133,11 @@ class Evidence:
         return replace(self, **moved)
 
     def of_motors(self) -> Evidence:
-        """Return the samples with torques, speeds, accelerations and columns of motors instead of joints. Positions
-        remain the joints'."""
+        """Return the samples for motors instead of joints: torques, speeds, accelerations and regressor. Positions are
+        the joints'.
+
+        For robots whose motors each drive one joint, the samples stay unchanged.
+        """
         return self if self.coupling is None else _of_motors(self, self.coupling)
 
 
@@ -162,9 +174,11 @@ def evidence_of(
     coupling: Coupling | None = None,
     springs: Torque | None = None,
 ) -> Evidence:
-    """Return the samples of all motions in sequence. Raises InputError if a log cannot be used.
+    """Return independent samples of the logs of all motions, one log after another. Raises InputError if a log cannot
+    be used.
 
-    springs   function that returns their torque (rows, n) at rows of states, which is subtracted; None: no springs
+    motors   factors from logged effort to torque
+    springs  function from the states of a log and row indices to the springs' torques (rows, n); None: no springs
     """
     most = max(1, MOST_SHIFTED // model.n // len(motions))
     parts = [_samples(model, motion, motors, options, coupling, springs, most) for motion in motions]

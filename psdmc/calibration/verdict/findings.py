@@ -24,7 +24,7 @@ NOISE_FLOOR = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """The number of independent samples that a step used, and the number of unknowns that they determined."""
+    """The number of independent samples that one step of a calibration used, and the number of unknowns it determined."""
 
     step: str
     samples: int
@@ -36,11 +36,13 @@ class Demand:
 
 
 class Findings:
-    """A calibration's record and the log that it was fitted to, with figures of both.
+    """Figures of a calibration and of its log, from which the verdict follows.
 
-    delays             of torques after the motion, log by log, in addition to the delay that the record itself has
-    variation, speed   (n,) standard deviation of the torque; RMS speed
-    fitted, held_out   RMSE and R^2 of the whole torque per joint, on fitted and on held-out samples
+    delays            delay of the torque after the motion in each log, in addition to the delay that the calibration
+                      found
+    variation         (n,) standard deviation of each joint's torque
+    speed             (n,) RMS speed of each joint
+    fitted, held_out  RMSE and R^2 of each joint's whole torque, on fitted and on held-out samples
     """
 
     def __init__(
@@ -66,8 +68,8 @@ class Findings:
         return not self.held_out[k].r2 >= self.limits.poor_r2 and bool(self.variation[k] > 0)
 
     def excused(self, k: int) -> bool:
-        """Return whether joint k hardly moves, or has only sensor noise as torque, so that there is nothing to
-        predict."""
+        """Return whether the torque of joint k need not be predicted: the joint hardly moves, or its torque is only
+        noise."""
         noise = float(self.evidence.noise[k])
         noisy = noise > NOISE_FLOOR * self.variation[k] and self.held_out[k].rmse < self.limits.sure * noise
         return bool(self.speed[k] < self.limits.hardly) or noisy
@@ -87,13 +89,16 @@ class Findings:
         return self.evidence.model.mechanism.joints[k].type.effort_unit
 
     def gained(self, joints: Sequence[int]) -> list[dict[str, Any]]:
-        """Return for these joints the names, gains and standard deviations, as a ground of the verdict lists them."""
+        """Return names, gains and standard deviations of some joints, as a verdict's reason or doubt lists them.
+
+        The gain is the ratio of the measured torque to the torque from the robot file.
+        """
         return [
             {"joint": self.names[k], "gain": self.gains[k].value, "std": self.gains[k].std} for k in joints
         ]
 
     def followed(self, joints: Sequence[int]) -> list[dict[str, Any]]:
-        """Return for these joints the names, R^2 and RMSE on held-out data, as a ground of the verdict lists them."""
+        """Return names, R^2 and RMSE on held-out samples of some joints, as a verdict's reason or doubt lists them."""
         return [
             {
                 "joint": self.names[k],

@@ -45,8 +45,11 @@ class Power:
 
 
 def joint_gains(evidence: Evidence) -> tuple[Gain, ...]:
-    """Return the gain of each joint (of its motor if motors are coupled), by a regression of the measured torque on
-    the file's. The regression also contains friction, and the drive inertia if the file does not give it."""
+    """Return the gain of each joint: the ratio of the measured torque to the torque from the robot file's parameters.
+
+    The ratio comes from a regression that also contains friction, and drive inertia if the file does not give it. If
+    motors drive several joints together, the gains are those of the motors.
+    """
     evidence = evidence.of_motors()
     by_file = evidence.file_torque()
     if by_file is None:
@@ -86,8 +89,10 @@ def _line(evidence: Evidence, by_file: Array, k: int) -> _Line:
 
 
 def nuisance(evidence: Evidence, k: int) -> Array:
-    """Return the columns (N, 3 or 4) besides the file's torque in the regression of joint k's gain: Coulomb and
-    viscous friction, offset, and acceleration if the file has no drive inertia."""
+    """Return regressor columns (N, 3 or 4) for joint k, besides the robot file's torque, in the regression of the gain.
+
+    The columns are Coulomb friction, viscous friction, offset, and acceleration if the file has no drive inertia.
+    """
     columns = [evidence.sign[:, k], evidence.qd[:, k], np.ones(len(evidence))]
     drive = evidence.model.mechanism.parameters[k, DRIVE]
     if not drive > 0:
@@ -135,8 +140,11 @@ def _power(evidence: Evidence, rigid: Array, k: int) -> Power:
 
 
 def basis(columns: Array) -> Array:
-    """Return an orthonormal basis (N, rank) of the columns, without directions of the scaled columns that are only
-    noise."""
+    """Return an orthonormal basis (N, rank) of the space that regressor columns (N, m) span.
+
+    Columns are first scaled to unit length. Directions with tiny singular values are left out, because they are only
+    noise.
+    """
     scale: Array = np.linalg.norm(columns, axis=0)
     kept: Array = columns[:, scale > 0] / scale[scale > 0]
     if not kept.shape[1]:
@@ -151,8 +159,10 @@ def _less(explained: Array, values: Array) -> Array:
 
 
 def clustered(scores: Array) -> Array:
-    """Return the covariance of the sum of the scores if neighbours in time depend on each other (Liang and Zeger
-    1986)."""
+    """Return the covariance of a sum of N score vectors (N, m) whose neighbours in time may be correlated.
+
+    A score is a sample's residual times its regressor row. Source: Liang and Zeger 1986.
+    """
     count = min(CLUSTERS, len(scores))
     sums = np.zeros((count, scores.shape[1]))
     np.add.at(sums, np.arange(len(scores)) * count // len(scores), scores)

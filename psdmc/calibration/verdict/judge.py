@@ -146,7 +146,10 @@ def _late(found: Findings) -> Iterator[Ground]:
 
 
 def late(delay: Delay) -> Ground:
-    """Return the ground of a verdict for a delay, with the change that removes it."""
+    """Return the reason or doubt of a verdict for a delay between motion and torque.
+
+    The text of the verdict states the delay and the change of the log that removes it.
+    """
     return Ground("late", {"log": delay.log, "seconds": delay.value, "std": delay.std})
 
 

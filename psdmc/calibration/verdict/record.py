@@ -1,5 +1,4 @@
-"""The record of a calibration: its results together with the calibrated model. Both the four steps and the linear fit
-have one."""
+"""The result of a calibration, with the calibrated model. Four-step calibrations and linear fits have this result."""
 
 from __future__ import annotations
 
@@ -67,20 +66,24 @@ DROPPED_LINKS = "dropped_links"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Calibration(Calibrated):
-    """The whole result of a calibration, with its steps and samples to plot.
+    """The whole result of a calibration, with the results of its steps and samples to plot.
 
-    model  the calibrated model, whose `calibrated` has these numbers
+    model  the calibrated model; its field `calibrated` holds the results without the samples to plot
     """
 
     model: DynamicsModel
 
     def as_json(self) -> dict[str, Any]:
-        """Return the record as plain values; numbers that are not finite become null."""
+        """Return the result of a calibration as dictionaries, lists, texts and numbers. Numbers that are not finite
+        become null."""
         return document(self)
 
 
 def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:
-    """Return the record with a model that has its present numbers, and with theta_b if it is given."""
+    """Return the result of a calibration with a copy of its results stored in its model.
+
+    theta_b  (l,) new base parameters of the model; None: they stay unchanged
+    """
     theta = record.model.theta_b if theta_b is None else theta_b
     return replace(record, model=replace(record.model, theta_b=theta, calibrated=record.kept()))
 
@@ -91,9 +94,9 @@ def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
 
 
 def logs_used(logs: Sequence[AnyLog], use: str = "") -> tuple[LogUsed, ...]:
-    """Return names, lengths and dates of logs.
+    """Return name, number of rows, duration, date and use of each log, as the result of a calibration stores them.
 
-    use  fit or validate for all of them; None: each log's own
+    use  "fit" or "validate" for all logs; empty: the use that each log has
     """
     return tuple(LogUsed(log.name, len(log), log.duration, log.date, use or log.use) for log in logs)
 
@@ -110,7 +113,7 @@ def _versions() -> dict[str, str]:
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
-    """Return the calibration with its verdict, which its model also gets."""
+    """Return the result of a calibration with a verdict added, also in the data that its model stores."""
     return with_model(replace(record, verdict=verdict))
 
 
@@ -127,7 +130,11 @@ def verdict_of(record: Calibration) -> Verdict:
 def four_step_record(
     model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
 ) -> Calibration:
-    """Return the record of a campaign with these base parameters, without its quality."""
+    """Return the result of a four-step calibration with the given base parameters, before its accuracy is computed.
+
+    found    results of the four steps: motors, gravity, friction, inertia
+    theta_b  (l,) base parameters
+    """
     inertial, gravity = found.inertial, found.gravity
     groups = ["inertial"] * model.l
     for k in gravity.split.pivots:
@@ -200,7 +207,10 @@ def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, .
 def linear_record(
     model: DynamicsModel, found: LinearResult, values: Array, options: LinearOptions
 ) -> Calibration:
-    """Return the record of a linear fit with these values of the whole vector, without its quality."""
+    """Return the result of a linear fit with the given values, before its accuracy is computed.
+
+    values  base parameters, followed by friction values and offsets, in the order of the fit
+    """
     problem, solved = found.problem, found.estimate
     names = (*model.base_parameters.labels, *problem.names)
     at = _kept_at(model, values, found.prior.scale, found.prior.values)
@@ -383,10 +393,12 @@ def judged_record(
     distance: float | None = None,
     check: CheckOptions | None = None,
 ) -> Calibration:
-    """Return the record with its quality on these logs or runs, computed from its model's file after reading it back.
+    """Return the result of a calibration with its accuracy on logs or runs added.
 
-    plain     record of the unconstrained fit, if this one is physically consistent
-    distance  distance from the unconstrained fit in standard deviations
+    The torques are computed from the model's file after it was written and read back.
+
+    plain     result of the unconstrained fit, if `record` is physically consistent; None: `record` is unconstrained
+    distance  distance of `record` from the unconstrained fit, in standard deviations
     """
     model = reread(record.model)
     steps = delivered_quality(model, source, check)

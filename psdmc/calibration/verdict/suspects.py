@@ -40,9 +40,12 @@ BELIEVED = 0.7
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """A hypothesis about a log: joint k's position is signs[k] times column order[k]; the same holds for its effort.
+    """A hypothesis that columns of a log are exchanged or reversed.
 
-    score   explained share of the torque's variation, summed over joints
+    The true position of joint k is signs[k] times position column order[k]. The true effort of joint k is
+    effort_signs[k] times effort column effort_order[k].
+
+    score  share of the torque's variation that the hypothesis explains, summed over the joints
     """
 
     signs: tuple[int, ...]
@@ -53,8 +56,11 @@ class Hypothesis:
 
     @property
     def changes(self) -> int:
-        """Number of reversed signs and exchanged pairs. All signs together, or the same change of position and effort,
-        count as one."""
+        """Return the number of changes in this hypothesis: reversed signs and exchanged pairs of columns.
+
+        All efforts reversed together count as one change. The same change of a joint's position and effort also counts
+        as one.
+        """
         swaps = exchanges(self.order)
         if self.effort_order != self.order:
             swaps += exchanges(self.effort_order)
@@ -63,8 +69,14 @@ class Hypothesis:
         return swaps + sum(-1 in both for both in zip(self.signs, self.effort_signs, strict=True))
 
     def worth(self, stated: Hypothesis) -> float:
-        """Return how many changes the improvement over the log as it is (`stated`) justifies, minus the number of
-        changes in this hypothesis."""
+        """Return whether the hypothesis is worth its changes: positive if it explains the log better than `stated` by
+        enough.
+
+        The result is the number of changes that the improvement justifies, minus the number of changes in the
+        hypothesis.
+
+        stated  the hypothesis that the log has no wrong columns
+        """
         gained = self.score - stated.score
         left = max(len(self.signs) - self.score, 1e-12)
         fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
@@ -72,7 +84,7 @@ class Hypothesis:
 
     @property
     def reading(self) -> dict[str, tuple[int, ...]]:
-        """The hypothesis as plain values for a ground of the verdict."""
+        """Return the hypothesis as plain numbers, which a verdict's reason or doubt stores."""
         names = ("order", "signs", "effort_order", "effort_signs")
         return {name: getattr(self, name) for name in names}
 
@@ -172,8 +184,11 @@ TRAINING = 0.7
 
 
 class Explainer:
-    """A function explain(k, torque) that returns which share of a column's variation joint k explains, without and
-    with reversed sign: each 0 to 1."""
+    """Computes how much of an effort column each joint explains, to find exchanged columns and reversed signs.
+
+    A call explain(k, torque) returns two shares, 0 to 1, of the column's variation. The first is the share that the
+    torque of joint k explains, the second the share that the reversed torque explains.
+    """
 
     def __init__(self, evidence: Evidence) -> None:
         evidence = evidence.of_motors()
@@ -246,7 +261,10 @@ MOTOR_SIDE = (1.0 / 300.0, 1.0 / ABOUT)
 
 
 def unit_suspect(gains: Sequence[Gain]) -> Ground | None:
-    """Return the likely wrong unit; None if the reliable gains are about one, or contradict each other."""
+    """Return the likely wrong unit of all torques, from their gains; None if no common wrong unit explains the gains.
+
+    A gain is the ratio of measured torque to the torque from the robot file. Only reliable gains are used.
+    """
     seen = np.array([gain.value for gain in gains if gain.visible])
     if not len(seen) or np.any(seen <= 0) or seen.max() > ALIKE * seen.min():
         return None

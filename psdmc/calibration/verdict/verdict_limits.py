@@ -7,23 +7,29 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class VerdictOptions:
-    """The limits from which a verdict follows. A calibration beyond the first limit of a pair is not usable; beyond
-    the second, it is doubtful.
+    """The limits from which a verdict on a calibration follows.
 
-    fewest_samples, few_samples  independent samples per fitted unknown: smallest number
-    poor_r2, fair_r2             held-out R^2 of a joint's whole torque: smallest value
-    gains, sure_gains            measured torque over the torque from the file: range
+    If a quantity has two limits, a calibration beyond the first is not usable, and one beyond the second is doubtful.
+
+    fewest_samples, few_samples  smallest number of independent samples per fitted unknown
+    poor_r2, fair_r2             smallest R^2 of a joint's whole torque on held-out samples
+    gains, sure_gains            range of the ratio of measured torque to the torque from the robot file
     hardly                       rad/s (m/s) RMS; a slower joint hardly moves, so the sign of its friction is unknown
-    noise_ratio                  residual over sensor noise above which the model lacks an effect
-    worse                        held-out RMSE over fitted RMSE above which a fit does not predict other data
-    carried                      held-out RMSE over the torque's variation below which `worse` does not matter
-    noticeable                   held-out RMSE over the torque's variation below which a lacking effect does not matter
-    settled                      torque for one standard deviation of a parameter, over the torque's variation
-    sure                         standard deviations by which friction's power must be negative
+    noise_ratio                  ratio of residual to sensor noise above which the model lacks an effect
+    worse                        ratio of held-out RMSE to fitted RMSE above which a fit does not predict other data
+    carried                      held-out RMSE, as a share of the torque's variation, below which `worse` does not
+                                 matter
+    noticeable                   held-out RMSE, as a share of the torque's variation, below which a lacking effect does
+                                 not matter
+    settled                      largest torque change for one standard deviation of a parameter, as a share of the
+                                 torque's variation
+    sure                         number of standard deviations by which friction's power must be negative
     friction_share               share of the motor's power below which friction is not judged
-    of_limit                     largest torque over the file's effort limit: range outside of which there is a doubt
-    late, hardly_late            s between motion and torque: largest value
-    acceleration_lost            share of the acceleration that differences of samples lose at the cut-off: doubt above it
+    of_limit                     range of the largest torque, as a share of the file's effort limit; a value outside
+                                 gives a doubt
+    late, hardly_late            s, largest delay between motion and torque
+    acceleration_lost            largest share of the acceleration that differences of samples may lose at the cut-off;
+                                 more gives a doubt
     """
 
     fewest_samples: float = 8.0

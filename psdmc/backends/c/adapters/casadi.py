@@ -142,13 +142,14 @@ def needed_by_theta(functions: Sequence[str], wide: bool) -> list[str]:
 
 
 def _has_blocks(name: str) -> bool:
-    """Whether some function computes all derivatives of this one."""
+    """Whether some function computes all derivatives of this one. Its outputs are vectors: CasADi numbers the entries of a
+    matrix column by column, the blocks row by row."""
     other = RECIPES.get(name + DERIVATIVES)
     if other is None:
         return False
     own = RECIPES[name].signature
     names = [output.name for output in other.signature.outputs]
-    return all(f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
+    return all(len(o.axes) == 1 and f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
 def files(package: PackageView) -> dict[str, str]:
@@ -310,7 +311,8 @@ class _Externals:
         for output in kernel.outputs:
             for k, vector in enumerate(kernel.inputs):
                 block = next(one for one in other.outputs if one.name == f"d{output.name}_d{vector.name}")
-                at, shape, zero = call.at(block.name), block.shape, frozenset(block.zero)
+                at, zero = call.at(block.name), frozenset(block.zero)
+                shape: tuple[int, ...] = (output.size, vector.size)
                 if call.is_wide(k):
                     at, shape, zero = call.by_entries(block, k)
                 shown.append((f"jac_{output.name}_{vector.name}", at, self.patterns.of(shape, zero)))
@@ -326,10 +328,10 @@ class _Externals:
         seed = Argument(f"adj_{output.name}", self.patterns.of(output.shape))
         for k, name in enumerate([*(vector.name for vector in kernel.inputs), *[THETA] * kernel.theta]):
             found = next(one for one in gradient.outputs if one.name == f"grad_{name}")
-            at, shape = call.at(found.name), found.shape
-            if call.is_wide(k):
-                at, shape, _ = call.by_entries(found, k)
-            shown.append((f"adj_{name}", at, self.patterns.of(shape)))
+            at = call.by_entries(found, k)[0] if call.is_wide(k) else call.at(found.name)
+            if len(found.shape) > 1:
+                at = call.turned(found)
+            shown.append((f"adj_{name}", at, inputs[k].pattern))
         return call.external("adj1_", (*inputs, seed), shown, [f"given(arg[{len(inputs)}])"])
 
     def _forward(self, kernel: KernelView, direction: KernelView) -> External:
@@ -390,6 +392,12 @@ class _Call:
         entries = [divmod(one, info.nq) for one in _nonzeros(self.of.kernels[MAP].outputs[0])]
         kept = {row * info.nq + j for row in range(rows) for i, j in entries if (row, i) in left}
         return _offset(to), (*block.shape[:-1], info.nq), frozenset(range(rows * info.nq)) - kept
+
+    def turned(self, block: OutputView) -> int:
+        """Where the transpose of a matrix is put: inputs have a column per row of ours."""
+        to = self._room(block.size)
+        self.after.append(f"give({self.of.patterns.of(block.shape)}, w + {self.at(block.name)}, {to});")
+        return _offset(to)
 
     def by_theta(self) -> tuple[int, tuple[int, ...]]:
         """Add the C call that computes derivatives of the function by theta_b (the base parameters). Returns where the

@@ -26,7 +26,7 @@ WRITTEN = tuple(
 
 
 def format_of(path: Path) -> LogFormat:
-    """Return the format that reads a path. Raises InputError with the known suffixes if there is none."""
+    """Return the log file format to which a file belongs. Raises InputError with the known suffixes if there is none."""
     for each in FORMATS:
         if each.sniff(path):
             return each
@@ -35,7 +35,8 @@ def format_of(path: Path) -> LogFormat:
 
 
 def table_of(path: Path) -> TableFormat:
-    """Return the kind of table that reads a path. Raises InputError with the known suffixes if there is none."""
+    """Return the format of a table file, such as CSV. Raises InputError with the known suffixes if the file is no
+    table."""
     for each in FORMATS:
         if isinstance(each, TableFormat) and each.sniff(path):
             return each

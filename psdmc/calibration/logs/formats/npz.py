@@ -36,15 +36,20 @@ class NpzFormat(TableFormat):
     endings = (".npz",)
 
     def columns_of(self, file: BinaryIO, name: str, form: TextForm) -> Columns:
-        """Return columns by name: arrays of one dimension, and NAME[k] for column k (from 1) of an array with two
-        dimensions."""
+        """Return the columns of an npz file by name.
+
+        An array of one dimension is one column. Column k (from 1) of an array with two dimensions has the name NAME[k].
+        """
         with decoding(name, "an npz file"), zipfile.ZipFile(file) as archive:
             members = _members(archive, file, name)
             arrays = {_column(m): _array(archive.read(m)) for m in members}
         return columns_of_arrays(arrays, name)
 
     def pieces(self, file: BinaryIO, name: str) -> Pieces:
-        """Return names and rows in pieces. All columns are read in parallel, so only one piece is in memory."""
+        """Return the column names of an npz file, and its rows as a sequence of parts.
+
+        All columns are read in parallel, so that only one part is in memory at a time.
+        """
         with decoding(name, "an npz file"):
             archive = zipfile.ZipFile(file)
             members = _members(archive, file, name)

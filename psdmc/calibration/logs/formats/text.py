@@ -55,7 +55,7 @@ class TextFormat(TableFormat):
         return Columns(name, table.names, table.width, table.rows)
 
     def pieces(self, file: BinaryIO, name: str) -> Pieces:
-        """Return names and rows of a CSV file, in pieces that end with a line."""
+        """Return the column names of a CSV file, and its rows as a sequence of parts that end with a complete line."""
         file = _with_line_ends(file, name)
         reader = CsvReader(name)
         names: list[str] = []
@@ -101,7 +101,7 @@ class CsvReader:
         self._decimal = ""
 
     def header(self, line: bytes) -> list[str]:
-        """Return the column names in the next line, or none if it is empty."""
+        """Return the column names in the next line of the file; an empty list if the line is empty."""
         self._line += 1
         text = plain_text(line, self.name, self._line - 1).strip("\n")
         if not text.strip():
@@ -137,7 +137,10 @@ class CsvReader:
 
 
 def plain_text(data: bytes, name: str, before: int = 0) -> str:
-    """Return bytes as text with plain line ends; `before` is the number of lines before them."""
+    """Return the text of some bytes of a CSV file, with plain line ends.
+
+    before  number of lines in the file before these bytes, for line numbers in errors
+    """
     for mark, encoding in _OTHER_MARKS:
         if data.startswith(mark):
             raise InputError(f"{name}: is {encoding} text, expected UTF-8", "save it as CSV in UTF-8")
@@ -305,10 +308,12 @@ class TextTable:
             return [cell.strip() for cell in next(csv.reader([line], delimiter=self._separator), [])]
 
     def rows(self, places: Sequence[int], dates: bool = False) -> Iterator[Array]:
-        """Yield the numbers (k, len(places)) in these columns, in pieces. Raises InputError with the line and column
-        of a cell that is no number.
+        """Yield the numbers in some columns of the table, in parts (rows, len(places)).
 
-        dates   whether the first of these columns holds dates, which become s since 1970
+        places  indices of the columns
+        dates   True: the first of these columns holds dates. The result has seconds since 1970 in place of the dates
+
+        Raises InputError with the line and column of a cell that is no number.
         """
         self._dated = places[0] if dates else None
         line, left = (self._line, self._first.encode() + b"\n") if self._first else (self._line + 1, b"")
@@ -368,8 +373,10 @@ class TextTable:
 
 
 def whole_lines(file: BinaryIO, name: str, left: bytes = b"") -> Iterator[bytes]:
-    """Yield the rest of a text in pieces of complete lines, after the text `left`. Raises InputError if a line is
-    longer than a piece."""
+    """Yield the rest of a text file in parts of complete lines. Raises InputError if a line is longer than a part.
+
+    left  text before the rest of the file, which the first part begins with
+    """
     while chunk := file.read(PIECE_BYTES):
         end = chunk.rfind(b"\n") + 1
         if not end and len(left) + len(chunk) > PIECE_BYTES:

@@ -1,0 +1,64 @@
+"""The whole robot's momentum about its centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.centroidal import about_centre
+from psdmc.dynamics.momentum import total_momentum
+from psdmc.dynamics.scalar import Scalar
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+INPUTS = (Q, QD)
+MOMENTUM = Quantity(
+    "h",
+    ("6",),
+    means="linear momentum (kg m/s), then angular momentum about the centre of mass (kg m^2/s), along the axes of the base "
+    "frame, without drive inertias",
+    unit="J s",
+    powers=(-1,),
+)
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    bodies = robot.solids()
+    parts = about_centre(robot.frames, bodies, q, total_momentum(robot.frames, bodies, q, qd))
+    return {"h": [x for part in parts for x in robot.in_base(part)]}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def momentum(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        return np.array(pin.computeCentroidalMomentum(model, data, q, qd).vector)
+
+    return {"h": robot.each(momentum, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "centroidal_momentum",
+        420,
+        "linear momentum (kg m/s), then angular momentum about the centre of mass (kg m^2/s) of all links, along the base "
+        "frame's axes, drive inertias not included",
+        INPUTS,
+        (MOMENTUM,),
+        theta=False,
+        summary="Compute the linear momentum of all links, and their angular momentum about their centre of mass.",
+    ),
+    "centroidal momentum",
+    *on_both(values, INPUTS),
+    "computeCentroidalMomentum",
+    pinocchio,
+    needs=Needs.STANDARD,
+    beside="centroidal_momentum_matrix",
+)

@@ -1,0 +1,58 @@
+"""Derivatives of the whole robot's momentum about its centre of mass by joint positions and rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.centroidal import momentum_rate_slopes
+from psdmc.dynamics.scalar import Scalar
+from psdmc.functions import centroidal_momentum_matrix
+from psdmc.functions.centroidal_momentum import INPUTS, MOMENTUM
+from psdmc.program.signature import Signature, derivative_of
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    """Differentiate the momentum's rate at rest, A qdd, at qdd = qd: there it equals the momentum."""
+    found = momentum_rate_slopes(robot.frames, robot.solids(), q, [0.0] * len(qd), qd)
+    return {"dh_dq": robot.rows_in_base(found.by_q), "dh_dqd": robot.rows_in_base(found.by_qdd)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        found = pin.computeCentroidalDynamicsDerivatives(model, data, q, qd, np.zeros(model.nv))
+        return np.reshape(found[0], (6, model.nv))
+
+    matrix = centroidal_momentum_matrix.RECIPE.pinocchio(robot, given)["A"]
+    return {"dh_dq": robot.each(slopes, given["q"], given["qd"]), "dh_dqd": matrix}
+
+
+RECIPE = Recipe(
+    Signature(
+        "centroidal_momentum_derivatives",
+        422,
+        "derivatives by q and qd of all links' linear momentum, then angular momentum about the centre of mass, along the "
+        "base frame's axes; those by qd are the centroidal momentum matrix",
+        INPUTS,
+        tuple(derivative_of(MOMENTUM, quantity) for quantity in INPUTS),
+        theta=False,
+        summary="Compute the derivatives by q and qd of the linear momentum of all links, and of their angular momentum "
+        "about their centre of mass.",
+    ),
+    "derivatives of the centroidal momentum",
+    *on_both(values, INPUTS),
+    "computeCentroidalDynamicsDerivatives",
+    pinocchio,
+    needs=Needs.STANDARD,
+    beside="centroidal_momentum_matrix",
+)

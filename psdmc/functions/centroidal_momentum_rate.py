@@ -1,0 +1,65 @@
+"""The rate of the whole robot's momentum about its centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.centroidal import about_centre
+from psdmc.dynamics.momentum import total_momentum_rate
+from psdmc.dynamics.scalar import Scalar
+from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+INPUTS = (Q, QD, QDD)
+RATE = Quantity(
+    "hdot",
+    ("6",),
+    means="rate of the linear momentum (N), then of the angular momentum about the centre of mass (N m), along the axes of "
+    "the base frame, without drive inertias",
+    unit="J",
+    powers=(-1,),
+)
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scalar]) -> Outputs:
+    bodies = robot.solids()
+    parts = about_centre(robot.frames, bodies, q, total_momentum_rate(robot.frames, bodies, q, qd, qdd))
+    return {"hdot": [x for part in parts for x in robot.in_base(part)]}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def rate(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:
+        return np.array(pin.computeCentroidalMomentumTimeVariation(model, data, q, qd, qdd).vector)
+
+    return {"hdot": robot.each(rate, given["q"], given["qd"], given["qdd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "centroidal_momentum_rate",
+        424,
+        "rate of the linear momentum (N), then of the angular momentum about the centre of mass (N m) of all links, along "
+        "the base frame's axes: the sum of all external forces, gravity's included, and of their moments",
+        INPUTS,
+        (RATE,),
+        theta=False,
+        summary="Compute the rates of the linear momentum of all links, and of their angular momentum about their centre of "
+        "mass.",
+    ),
+    "rate of the centroidal momentum",
+    *on_both(values, INPUTS),
+    "computeCentroidalMomentumTimeVariation",
+    pinocchio,
+    needs=Needs.STANDARD,
+    beside="centroidal_momentum_matrix",
+)

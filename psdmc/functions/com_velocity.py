@@ -1,0 +1,57 @@
+"""Velocity of the whole robot's centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.momentum import total_momentum
+from psdmc.dynamics.scalar import Scalar, scale
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+INPUTS = (Q, QD)
+VELOCITY = Quantity(
+    "v", ("3",), means="velocity of the centre of mass, m/s, along the axes of the base frame", unit="m/s"
+)
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    linear, _ = total_momentum(robot.frames, robot.solids(), q, qd)
+    return {"v": scale(robot.in_base(linear), 1.0 / robot.mass)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def velocity(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        pin.centerOfMass(model, data, q, qd)
+        return np.array(data.vcom[0])
+
+    return {"v": robot.each(velocity, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "com_velocity",
+        410,
+        "velocity of all links' common centre of mass (m/s), base frame",
+        INPUTS,
+        (VELOCITY,),
+        theta=False,
+        summary="Compute the velocity of the centre of mass of all links in the base frame.",
+    ),
+    "velocity of the centre of mass",
+    *on_both(values, INPUTS),
+    "centerOfMass",
+    pinocchio,
+    needs=Needs.STANDARD,
+    beside="com_jacobian",
+)

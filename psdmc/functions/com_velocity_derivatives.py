@@ -1,0 +1,59 @@
+"""Derivatives of the velocity of the whole robot's centre of mass by joint positions and rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.centroidal import momentum_rate_slopes
+from psdmc.dynamics.scalar import Scalar
+from psdmc.functions import com_jacobian
+from psdmc.functions.com_velocity import INPUTS, VELOCITY
+from psdmc.program.signature import Signature, derivative_of
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    """Differentiate the acceleration at rest, J qdd, at qdd = qd: there it equals the velocity."""
+    found = momentum_rate_slopes(robot.frames, robot.solids(), q, [0.0] * len(qd), qd)
+    by_q, by_qd = (robot.rows_in_base(rows[:3], 1.0 / robot.mass) for rows in (found.by_q, found.by_qdd))
+    return {"dv_dq": by_q, "dv_dqd": by_qd}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        pin.computeForwardKinematicsDerivatives(model, data, q, qd, np.zeros(model.nv))
+        pin.centerOfMass(model, data, q, qd)
+        return np.reshape(pin.getCenterOfMassVelocityDerivatives(model, data), (3, model.nv))
+
+    by_qd = com_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    return {"dv_dq": robot.each(slopes, given["q"], given["qd"]), "dv_dqd": by_qd}
+
+
+RECIPE = Recipe(
+    Signature(
+        "com_velocity_derivatives",
+        412,
+        "derivatives by q and qd of the velocity of all links' common centre of mass, base frame; those by qd are its "
+        "Jacobian",
+        INPUTS,
+        tuple(derivative_of(VELOCITY, quantity) for quantity in INPUTS),
+        theta=False,
+        summary="Compute the derivatives by q and qd of the velocity of the centre of mass of all links in the base frame.",
+    ),
+    "derivatives of the centre of mass's velocity",
+    *on_both(values, INPUTS),
+    "getCenterOfMassVelocityDerivatives",
+    pinocchio,
+    needs=Needs.STANDARD,
+    beside="com_jacobian",
+)

@@ -1,0 +1,66 @@
+"""Forward dynamics with external wrenches and its derivative along a direction (forward mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from psdmc.functions import forward_dynamics_with_wrenches, forward_dynamics_with_wrenches_derivatives
+from psdmc.program.signature import Signature
+from psdmc.recipes.accelerations import accelerations
+from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, torque_slopes
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.wrenches import DWRENCHES, WRENCHES, along_all, wrenches_on_links
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE
+BLOCKS = forward_dynamics_with_wrenches_derivatives.RECIPE
+DIRECTIONS = (DQ, DQD, DTAU, DWRENCHES)
+
+
+def trace(g: Ingredients) -> Outputs:
+    """Trace as `forward_dynamics_jvp` does. The torques of inverse dynamics depend on the wrenches, too."""
+    external, wrenches = wrenches_on_links(g), [g.inputs[each.name] for each in (WRENCHES, DWRENCHES)]
+    qdd, factors = accelerations(g, g.inputs["tau"], external)
+    changes = torque_slopes(g, qdd, external, *wrenches)
+    load = [given - own for given, own in zip(g.inputs[DTAU.name], changes, strict=True)]
+    return {"qdd": qdd, "dqdd": factors.solved(load), "pivot": factors.pivots}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return _along(BLOCKS.reference(robot, given), given)
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return _along(BLOCKS.pinocchio(robot, given), given)
+
+
+def _along(found: Arrays, given: Mapping[str, Array]) -> Arrays:
+    qdd = found.pop("qdd")
+    return {"qdd": qdd, "dqdd": along_all(found, DIRECTIONS, given)}
+
+
+RECIPE = Recipe(
+    Signature(
+        "forward_dynamics_with_wrenches_jvp",
+        436,
+        "qdd under external wrenches, and its derivative along (dq, dqd, dtau, dwrenches)",
+        (*ACCELERATIONS.signature.inputs, *DIRECTIONS),
+        (*ACCELERATIONS.signature.outputs, replace(DQDD, means="derivative of qdd along the direction")),
+        theta=True,
+        summary="Compute the accelerations qdd under external wrenches, and their derivative dqdd along the direction "
+        "(dq, dqd, dtau, dwrenches).",
+        factorises=ACCELERATIONS.signature.factorises,
+    ),
+    "forward dynamics with wrenches along a direction",
+    trace,
+    reference,
+    "computeABADerivatives with fext",
+    pinocchio,
+    shares="inverse_dynamics",
+)

@@ -1,0 +1,62 @@
+"""Accelerations of the named frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.named_frames import frame_accelerations
+from psdmc.dynamics.scalar import Scalar
+from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+INPUTS = (Q, QD, QDD)
+ACCELERATION = Quantity(
+    "a",
+    ("frames", "6"),
+    means="linear acceleration of the frame's origin (m/s^2), without gravity, then angular acceleration (rad/s^2), along "
+    "the axes of the base frame",
+    unit="1/s^2",
+    powers=(0, 1),
+)
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scalar]) -> Outputs:
+    return {"a": frame_accelerations(robot.frames, robot.named, q, qd, qdd, robot.root)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def accelerations(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:
+        pin.forwardKinematics(model, data, q, qd, qdd)
+        aligned = pin.LOCAL_WORLD_ALIGNED
+        found = [pin.getFrameClassicalAcceleration(model, data, frame, aligned) for frame in robot.frame_ids]
+        return np.array([motion.vector for motion in found])
+
+    return {"a": robot.each(accelerations, given["q"], given["qd"], given["qdd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "frame_acceleration",
+        402,
+        "linear then angular acceleration of every named frame, J qdd + dJ/dt qd, base frame",
+        INPUTS,
+        (ACCELERATION,),
+        theta=False,
+        summary="Compute the acceleration J qdd + (dJ/dt) qd of each named frame along the axes of the base frame.",
+    ),
+    "frame acceleration",
+    *on_both(values, INPUTS),
+    "getFrameClassicalAcceleration",
+    pinocchio,
+    beside="frame_jacobian",
+)

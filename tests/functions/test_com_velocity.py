@@ -1,0 +1,25 @@
+"""The velocity of the centre of mass against Pinocchio and against the Jacobian."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from wide_robots import is_pinocchios
+
+
+@pytest.mark.parametrize(("robot", "real"), EVERY)
+def test_it_is_pinocchios(robot: str, real: str) -> None:
+    matches_pinocchio("com_velocity", robot, real)
+
+
+def test_it_is_pinocchios_where_joints_have_several_coordinates() -> None:
+    is_pinocchios("com_velocity", "small", 1e-11, in_c=True)
+
+
+@pytest.mark.parametrize("robot", [ARM, "sliding"])
+def test_it_is_the_jacobian_times_qd(robot: str) -> None:
+    own = bench(robot)
+    q, qd = own.given["q"], own.given["qd"]
+    expected = np.einsum("kij,kj->ki", own.robot.com_jacobian(q), qd)
+    np.testing.assert_allclose(own.robot.com_velocity(q, qd), expected, atol=1e-13 * np.abs(expected).max())

@@ -1,0 +1,35 @@
+"""Inverse dynamics with wrenches along a direction, against Pinocchio and difference quotients."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from wide_robots import is_pinocchios
+
+
+@pytest.mark.parametrize(("robot", "real"), SEVERAL)
+def test_it_is_pinocchios(robot: str, real: str) -> None:
+    matches_pinocchio("inverse_dynamics_with_wrenches_jvp", robot, real)
+
+
+@pytest.mark.parametrize("robot", INTERPRETED)
+def test_its_programs_are_pinocchios(robot: str) -> None:
+    program_matches_pinocchio("inverse_dynamics_with_wrenches_jvp", robot)
+
+
+def test_it_is_pinocchios_where_joints_have_several_coordinates() -> None:
+    is_pinocchios("inverse_dynamics_with_wrenches_jvp", "small", 1e-11, in_c=False)
+
+
+@pytest.mark.parametrize("robot", [ARM, "sliding"])
+def test_it_is_the_slope_along_the_direction(robot: str) -> None:
+    own, step = bench(robot), 1e-6
+    g, call = own.given, own.robot.inverse_dynamics_with_wrenches_jvp
+    names = ("q", "qd", "qdd", "wrenches")
+    directions = [g[f"d{name}"] for name in names]
+    ahead, behind = (
+        call(*(g[name] + h * g[f"d{name}"] for name in names), *directions)[0] for h in (step, -step)
+    )
+    found = call(*(g[name] for name in names), *directions)[1]
+    np.testing.assert_allclose(found, (ahead - behind) / (2 * step), atol=1e-6 * np.abs(found).max())
