@@ -31,7 +31,6 @@ from psdmc.backends.options import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
-from psdmc.garbage import collecting_rarely
 from psdmc.program.kernel import Kernel
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.target import Target
@@ -295,7 +294,6 @@ class PackageView:
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
-@collecting_rarely()
 def package_view(
     info: PackageInfo,
     kernels: Mapping[str, Kernel],
