@@ -237,6 +237,8 @@ REST = (
     "semi_implicit_euler",
     "semi_implicit_euler_derivatives",
     "rk4_step",
+    "inverse_dynamics_second_derivatives",
+    "forward_dynamics_second_derivatives",
 )
 
 

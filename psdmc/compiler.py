@@ -34,6 +34,7 @@ from psdmc.backends.reference_states import reference_states
 from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
+from psdmc.garbage import collecting_rarely
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
@@ -260,6 +261,7 @@ def compare_emitted(
     return differences(directory, _files(model, progress=progress, **recorded))
 
 
+@collecting_rarely()
 def _files(
     model: DynamicsModel,
     backend: str,
@@ -441,6 +443,7 @@ def _again(request: _Request) -> CompiledRobot[Any]:
     return _ROBOTS.get(request.key) or request.compiled()
 
 
+@collecting_rarely()
 def _package(*given: Any) -> PackageView:
     """The C package of what `_emission` takes."""
     made = _emission(*given)

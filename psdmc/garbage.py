@@ -1,8 +1,9 @@
 """Makes Python search less often for reference cycles (unused objects that refer to each other), while psdmc creates
 millions of small objects.
 
-The PROGRAMs (lists of operations) of psdmc are tuples of tuples and have no cycles. By default Python searches for
-cycles each time 700 more tuples exist. For a humanoid this search takes a fifth of the time to generate the C code.
+The PROGRAMs (lists of operations) of psdmc are tuples of tuples, and neither they nor traces have cycles. By default Python
+searches for cycles each time 700 more tuples exist. For a humanoid this search takes a fifth of the time to generate the C
+code.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
 
-RARELY = 500_000
-"""Objects made, beyond those that are gone again, before Python looks for cycles: some 50 MB."""
+RARELY = 5_000_000
+"""Objects made, beyond those that are gone again, before Python looks for cycles: some 500 MB."""
 
 _lock = Lock()
 _stages = 0

@@ -48,6 +48,10 @@ def times(a: Array, b: Array) -> Any:
         return a @ b
     if b.ndim > 2:
         return _stacked(a, b)
+    if a.ndim == b.ndim == 1:
+        return np.add.accumulate(a * b)[
+            -1
+        ]  # in the order of the entries; np.sum's order depends on their number
     wide = b.ndim == 2
     total = a[..., 0, None] * b[0] if wide else a[..., 0] * b[0]
     for k in range(1, b.shape[0]):

@@ -30,6 +30,7 @@ DERIVATIVES = (
     "inverse_dynamics_derivatives",
     "inverse_dynamics_vjp",
     "inverse_dynamics_jvp",
+    "inverse_dynamics_second_derivatives",
     "forward_dynamics_derivatives",
     "forward_dynamics_vjp",
     "forward_dynamics_jvp",

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from weakref import ref
 
 import pytest
 
 from psdmc.garbage import RARELY, collecting_rarely
+from psdmc.program.dimensioned import DimensionedTracer
+from psdmc.program.limb_sums import LimbSums
+from psdmc.program.trace import Tracer
 
 
 @pytest.fixture(autouse=True)
@@ -49,3 +53,19 @@ def test_a_process_that_looks_more_rarely_or_never(own: int) -> None:
     with collecting_rarely():
         assert gc.get_threshold() == (own, 11, 12)
     assert gc.get_threshold() == (own, 11, 12)
+
+
+def with_limbs() -> Tracer:
+    tracer = Tracer()
+    sums = LimbSums(tracer, [2])
+    sums.add_input("group0_q", 0)
+    sums.total(0, tracer.symbols("group0_q", 1)[0])
+    return tracer
+
+
+@pytest.mark.parametrize("make", [Tracer, DimensionedTracer, with_limbs])
+def test_a_trace_is_gone_without_a_search_for_cycles(make: Callable[[], Tracer]) -> None:
+    gc.set_threshold(0)
+    alive = ref(make())
+
+    assert alive() is None

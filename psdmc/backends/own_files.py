@@ -27,7 +27,7 @@ LARGEST_LIST = 16 << 20
 """Bytes of a manifest or journal that are read; a nine-joint arm's manifest has 0.1 MB."""
 
 OWN_NAME = re.compile(
-    r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi(?:_theta)? | wheel | fmu )
+    r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi(?:_(?:theta|hessian))? | wheel | fmu )
               / [A-Za-z_]\w* \. (?: c | h | hpp | inc )
           | cmake / [A-Za-z_]\w* \.cmake\.in
           | [A-Za-z_]\w* \.pc\.in

@@ -316,7 +316,7 @@ def emit(
         typer.Option(
             "--with",
             metavar="NAME,...",
-            help="also write files for another program: casadi, casadi_theta, wheel, fmu",
+            help="also write files for another program: casadi, casadi_theta, casadi_hessian, wheel, fmu",
         ),
     ] = None,
     target: Annotated[
@@ -384,7 +384,8 @@ def emit(
         print(f"note: the {language.language} name of '{one_line(asked)}' is {written_as}")
     elif output is None and asked != folder.name:
         print(f"note: the {language.named} is {asked}; --name changes it")
-    for remark in remarks(found.mechanism, names(adapters), kernels.wanted(wanted, found.mechanism)):
+    shown = kernels.wanted(wanted, found.mechanism)
+    for remark in remarks(found.mechanism, names(adapters), shown, found.l):
         print(f"note: {remark}")
     ending = "; write --with casadi_theta to call them in CasADi" if names(adapters) == ("casadi",) else ""
     for note in run_time_only(found, wanted):

@@ -52,7 +52,7 @@ def mass_matrix(
         parent = frames[i].parent
         if parent != BASE:
             double = None
-            if choices.fold_double_angle and frames[i].joint.about_z:
+            if frames[i].joint.about_z and choices.fold_double_angle:
                 angle = joint_angle(frames[i], own[i])
                 double = (angle + angle).turn()
             before = turned(composites[i], turns[i], double)

@@ -31,7 +31,7 @@ from typing import NamedTuple
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, about_z, inward, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, about_z, inward, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -130,7 +130,7 @@ def swept(
     choices: Choices = PLAIN,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[list[Axis], list[Step], list[tuple[int, Composite]]]:
-    """Return each joint's axis, each joint's step to its parent, and the result of `_composites`."""
+    """Return each joint's axis, each joint's step to its parent, and the result of `composites`."""
     forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
     q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
     axes: list[Axis] = []
@@ -139,10 +139,10 @@ def swept(
         axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
         axes.append(axis)
         steps.append(step)
-    return axes, steps, _composites(frames, bodies, q, qd, qdd, forward, choices, steps, external)
+    return axes, steps, composites(frames, bodies, q, qd, qdd, forward, choices, steps, external)
 
 
-def _composites(
+def composites(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
     q: Sequence[Scalar],
@@ -151,7 +151,7 @@ def _composites(
     forward: Forward,
     choices: Choices,
     steps: Sequence[Step],
-    external: Mapping[int, Wrench],
+    external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> list[tuple[int, Composite]]:
     """For each joint its number and the composite beyond it, in the joint's orientation about its origin; children
     before parents."""
@@ -163,12 +163,7 @@ def _composites(
         frame, step = frames[i], steps[i]
         whole = at_rest(bodies[i])
         if is_leaf[i] and frame.joint.about_z:
-            body = bodies[i]
-            turn = about_z(forward.states[i].turn)
-            angle = joint_angle(frame, q[i])
-            double = (angle + angle).turn() if choices.fold_double_angle else None
-            body = spun(body, turn) if double is None else turned(body, turn, double)
-            whole = at_rest(spun(body, step.turn) if step.joins else body)
+            whole = at_rest(leaf_body(frame, bodies[i], q[i], step, forward.states[i].turn, choices))
             if i in external:
                 whole = relieved(whole, *(inward(forward.compound_turns[i], v) for v in external[i]))
         else:
@@ -191,6 +186,16 @@ def _composites(
     return found
 
 
+def leaf_body(
+    frame: Frame, body: Body, q: Scalar, step: Step, turn: Turn | Rotation | None, choices: Choices
+) -> Body:
+    """A body that carries no other one, in its joint's orientation."""
+    angle = joint_angle(frame, q)
+    double = (angle + angle).turn() if choices.fold_double_angle else None
+    body = spun(body, about_z(turn)) if double is None else turned(body, about_z(turn), double)
+    return spun(body, step.turn) if step.joins else body
+
+
 def _fill_row(
     at: tuple[int, int],
     frames: Sequence[Frame],
@@ -207,7 +212,7 @@ def _fill_row(
     first = first_rates(frames)
     while True:
         joint, axis = frames[j].joint, axes[j]
-        found = by_own_axes(joint, axis, row, qd[j]) if not joint.about_z else _by_axis(joint, axis, row)
+        found = by_own_axes(joint, axis, row, qd[j]) if not joint.about_z else by_axis(joint, axis, row)
         for place, (x, y, z) in enumerate(zip(*found, strict=True), start=first[j]):
             by_q[k][place], by_qd[k][place] = x, y
             by_qdd[k][place] = by_qdd[place][k] = z
@@ -216,7 +221,7 @@ def _fill_row(
         row, j = steps[j].carried_row(row), frames[j].parent
 
 
-def _by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tuple[Scalar], tuple[Scalar]]:
+def by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tuple[Scalar], tuple[Scalar]]:
     """Derivatives of a torque with this row by a joint's position, rate and acceleration."""
     turning = dot(row.a, axis.bend) + dot(row.b, axis.rate) + dot(row.c, axis.lever)
     by_q = effort(joint, (0.0, 0.0, dot(row.c, axis.bend)), (0.0, 0.0, turning))

@@ -21,7 +21,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 POSITIONS = ("q",)
-RATES = ("qd", "qdd", "qd_r", "qdd_r")
+RATES = ("qd", "qdd", "qd_r", "qdd_r", "weights")
 """Arguments of algorithms, by name, that have an entry for each coordinate."""
 
 Gather = Callable[[Sequence[Frame], Any], Any]

@@ -119,7 +119,7 @@ def sweep_outward(
     """
     at_base = _resting(base_acceleration, qd_r is not None)
     folded = tuple(
-        choices.fold and is_leaf and frame.parent != BASE and frame.joint.about_z
+        is_leaf and frame.parent != BASE and frame.joint.about_z and choices.fold
         for is_leaf, frame in zip(leaves(frames), frames, strict=True)
     )
     own, rates, changes = positions(frames, q), rates_of(frames, qd), rates_of(frames, qdd_r)
@@ -166,7 +166,7 @@ def _swept(
     own_angle, offset = joint_angle(frame, q), joint_offset(frame, q)
     turning, sliding = (_along(part, given) for part in (frame.joint.turn, frame.joint.slide))
     group = parent.group
-    joins = choices.compound and frame.parent != BASE and frame.is_parallel and group is not None
+    joins = frame.parent != BASE and frame.is_parallel and group is not None and choices.compound
     if group is None or not joins:
         before = _rates_before_turn(frame, parent.rates)
         group = _Group(before, _no_turning(before), NO_TURN, None)

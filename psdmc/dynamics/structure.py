@@ -6,7 +6,7 @@ is the number zero is zero at every state, for all masses and inertias.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.second_derivatives import SecondDerivatives, inverse_dynamics_second_derivatives
+from psdmc.dynamics.solve import Rows, factorize, inner_product, inverse
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
 
 Places = tuple[tuple[int, int], ...]
@@ -65,11 +68,47 @@ def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
 
     lift  (11 n, l)  matrix from base parameters to standard parameters about the link frames
     """
-    needed = lift.any(axis=1).reshape(-1, PARAMETERS_PER_LINK)
-    bodies = tuple(_body(chain, i, row[:BODY_PARAMETERS]) for i, row in enumerate(needed))
-    drives = _unknown(needed[:, DRIVE])
-    rows = mass_matrix(frames_of(chain), bodies, drives, [SOMETHING] * chain.nq)
-    return tuple((i, j) for i, row in enumerate(rows) for j in range(i + 1) if _differs(row[j]))
+    bodies, drives = _bodies_and_drives(chain, lift)
+    return _lower_triangle(mass_matrix(frames_of(chain), bodies, drives, [SOMETHING] * chain.nq))
+
+
+def torque_hessian_places(chain: Mechanism, lift: Array) -> Places:
+    """Return the places in the lower triangle of the weighted torques' second derivatives by (q, qd, qdd); `lift` as in
+    `mass_matrix_places`."""
+    bodies, _ = _bodies_and_drives(chain, lift)
+    q, rates = [SOMETHING] * chain.nq, [SOMETHING] * chain.nv
+    found = inverse_dynamics_second_derivatives(
+        frames_of(chain), bodies, q, rates, rates, rates, base_acceleration(chain)
+    )
+    return _lower_triangle(found.hessian)
+
+
+def acceleration_hessian_places(chain: Mechanism, lift: Array) -> Places:
+    """Return the places in the lower triangle of the weighted accelerations' second derivatives by (q, qd, tau); `lift` as
+    in `mass_matrix_places`."""
+    bodies, drives = _bodies_and_drives(chain, lift)
+    frames, up, nv = frames_of(chain), base_acceleration(chain), chain.nv
+    q, rates = [SOMETHING] * chain.nq, [SOMETHING] * nv
+    first = inverse_dynamics_derivatives(frames, bodies, drives, q, rates, rates, up)
+    second = inverse_dynamics_second_derivatives(frames, bodies, q, rates, rates, rates, up)
+    by_tau = _product(second.by_q_qdd, inverse(factorize(first.by_qdd)))
+    by_q, by_qd = _product(by_tau, first.by_q), _product(by_tau, first.by_qd)
+    found = SecondDerivatives(
+        _sum(second.by_q_q, _sum(by_q, zip(*by_q, strict=True))),
+        _sum(second.by_q_qd, by_qd),
+        second.by_qd_qd,
+        by_tau,
+    )
+    return _lower_triangle(found.hessian)
+
+
+def _product(a: Iterable[Sequence[Scalar]], b: Iterable[Sequence[Scalar]]) -> Rows:
+    columns = list(zip(*b, strict=True))
+    return tuple(tuple(inner_product(row, column) for column in columns) for row in a)
+
+
+def _sum(a: Iterable[Sequence[Scalar]], b: Iterable[Sequence[Scalar]]) -> Rows:
+    return tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(a, b, strict=True))
 
 
 def regressor_places(chain: Mechanism, lift: Array) -> Places:
@@ -90,6 +129,17 @@ def _in_base_parameters(rows: tuple[dict[int, Scalar], ...], lift: Array) -> Ite
     for i, row in enumerate(rows):
         seen = frozenset(k for k, value in row.items() if _differs(value))
         yield from ((i, j) for j, part in enumerate(parts) if part & seen)
+
+
+def _lower_triangle(rows: Sequence[Sequence[Scalar]]) -> Places:
+    return tuple((i, j) for i, row in enumerate(rows) for j in range(i + 1) if _differs(row[j]))
+
+
+def _bodies_and_drives(chain: Mechanism, lift: Array) -> tuple[tuple[Body, ...], list[Scalar]]:
+    """Return what some base parameter has a part in."""
+    needed = lift.any(axis=1).reshape(-1, PARAMETERS_PER_LINK)
+    bodies = tuple(_body(chain, i, row[:BODY_PARAMETERS]) for i, row in enumerate(needed))
+    return bodies, _unknown(needed[:, DRIVE])
 
 
 def _body(chain: Mechanism, i: int, needed: NDArray[np.bool_]) -> Body:

@@ -303,7 +303,7 @@ RECIPE = Recipe(
         "that state's derivatives by q, qd and tau.",
         factorises=STEP.signature.factorises,
         spoilt=STEP.signature.spoilt,
-        calls=ACCELERATIONS.name,
+        calls=(ACCELERATIONS.name,),
     ),
     "Jacobians of a step of fourth-order Runge-Kutta",
     trace,

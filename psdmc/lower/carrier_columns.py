@@ -90,7 +90,8 @@ def _lifted(reframed: Reframed, representative: Array) -> Long:
     lift = np.zeros((PARAMETERS_PER_LINK * len(reframed.frames), representative.shape[1]), np.longdouble)
     for k, place in enumerate(reframed.link_frames):
         rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
-        lift[rows] = times(link_map(place).astype(np.longdouble), representative[rows])
+        filled = np.flatnonzero(representative[rows].any(axis=0))
+        lift[rows, filled] = times(link_map(place).astype(np.longdouble), representative[rows, filled])
     return lift
 
 

@@ -27,7 +27,7 @@ from psdmc.lower.reframe import Reframed
 from psdmc.lower.units import are_scaled, dimensions_of_traced, multiple, own_axes, scaled_parameters
 from psdmc.program.cost import Cost
 from psdmc.program.dimensions import NUMBER, dimension_of
-from psdmc.program.program import Program, Slot
+from psdmc.program.program import Program, Slot, slots_of
 from psdmc.program.signature import Signature, Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.program.trace import Outputs as Recorded
@@ -195,9 +195,11 @@ def stored_entries(signature: Signature, outputs: Outputs) -> Recorded:
     Raises InternalError if the outputs do not fit the signature."""
     if outputs.keys() != signature.traced:
         raise InternalError(f"{signature.name}: its trace gives {', '.join(outputs)}")
-    return [
-        (Slot(name, i), value) for name, values in outputs.items() for i, value in enumerate(_flat(values))
-    ]
+    found: list[tuple[Slot, Symbol | Number]] = []
+    for name, values in outputs.items():
+        flat = _flat(values)
+        found += zip(slots_of(name, len(flat)), flat, strict=True)
+    return found
 
 
 def _flat(values: Any) -> list[Symbol | Number]:

@@ -116,7 +116,7 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
     if not names:
         raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
-    called = {known[name].calls for name in names}
+    called = {other for name in names for other in known[name].calls}
     return tuple(name for name in known if name in names or name in called)
 
 
@@ -186,8 +186,9 @@ class _Lowered:
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
-        if recipe.regions is not None:
-            regions, program = recipe.regions(self.geometry.unmoved.frames), NOTHING
+        regions = recipe.regions(self.geometry.unmoved.frames) if recipe.regions else None
+        if regions is not None:
+            program = NOTHING
             if self.model.nv <= TRACED:
                 arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
                 program = trace_dynamics(recipe, arranged, self._search(theta).robot)

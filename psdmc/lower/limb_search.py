@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.dynamics.choices import Choices
+from psdmc.dynamics.choices import ByChoices, Choices
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.solve import SingularMatrix
@@ -116,7 +116,7 @@ class LimbSearch:
     def __init__(self, search: Search, recipe: Recipe, costs: Costs) -> None:
         self.search, self.recipe, self.costs = search, recipe, costs
         self.lanes = min(USUAL, costs.angles_per_sincos)
-        self._parts: dict[tuple[Reframed, tuple[int, ...], Choices, tuple[Limbs, ...]], float] = {}
+        self._weights: ByChoices[float] = ByChoices()
 
     def best(self, start: Arrangement) -> LimbArrangement | None:
         """Return the cheapest arrangement (frames, parameters) with limbs in SIMD lanes, searched from `start`. Return
@@ -195,8 +195,17 @@ class LimbSearch:
         return best
 
     def _weighed(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> LimbArrangement:
-        found, stages = cost_of_limbs(self.recipe, arrangement, self.search.robot, groups)
-        return LimbArrangement(arrangement, groups, weight_of_stages(found, stages, self.lanes, self.costs))
+        return LimbArrangement(arrangement, groups, self._weight(arrangement, self.search.robot, groups))
+
+    def _weight(self, arrangement: Arrangement, robot: RobotConstants, groups: tuple[Limbs, ...]) -> float:
+        """The weight of a robot's limbs, or of a part's, which is counted once."""
+
+        def make(choices: Choices) -> float:
+            found = cost_of_limbs(self.recipe, replace(arrangement, choices=choices), robot, groups)
+            return weight_of_stages(*found, self.lanes, self.costs)
+
+        key = arrangement.reframed, arrangement.unit, arrangement.carriers, groups
+        return self._weights.made(key, arrangement.choices, make)
 
     def _expected(self, best: LimbArrangement, candidate: Arrangement) -> float:
         """The weight of an exchange, told from the branches that it changes; -inf where it is not told."""
@@ -214,11 +223,7 @@ class LimbSearch:
         self, arrangement: Arrangement, groups: tuple[Limbs, ...], kept: tuple[int, ...]
     ) -> float:
         part, robot = self.search.branches.part(arrangement, kept)
-        key = part.reframed, part.carriers, part.choices, groups
-        if key not in self._parts:
-            found, stages = cost_of_limbs(self.recipe, part, robot, limbs_in(groups, kept))
-            self._parts[key] = weight_of_stages(found, stages, self.lanes, self.costs)
-        return self._parts[key]
+        return self._weight(part, robot, limbs_in(groups, kept))
 
     def _traced(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> TracedLimbs:
         return trace_limbs(self.recipe, arrangement, self.search.robot, groups)

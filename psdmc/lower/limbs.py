@@ -139,6 +139,7 @@ class _Trace:
             ]
             for axis in ("nq", "nv")
         }
+        self.first["nxa"] = [3 * self.first["nv"][-1]]
         if has_columns(recipe):
             self._select_columns(whole.link_frames)
 
@@ -206,15 +207,21 @@ class _Trace:
         counts = range(first[place.joints[0] + 1] - first[place.joints[0]])
         return [tuple(first[joint] + k for joint in place.joints) for k in counts]
 
+    def _along(self, axis: str) -> list[tuple[int | None, tuple[int, ...]]]:
+        """The group of each entry of an axis, and its numbers in the robot, limb by limb."""
+        if axis == "nxa":
+            nv, each = self.first["nv"][-1], self._along("nv")
+            return [
+                (group, tuple(first + k for k in own)) for first in (0, nv, 2 * nv) for group, own in each
+            ]
+        return [(place.group, own) for place in self.places for own in self._entries(place, axis)]
+
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
         """Yield the output values to store, with slots (name and index) of a group of limbs or of the core (everything
         outside limbs). Zeros are not stored."""
         self.products = self._products(found)
         for quantity in self.signature.stored:
-            entries = [
-                [(place.group, own) for place in self.places for own in self._entries(place, axis)]
-                for axis in quantity.axes
-            ]
+            entries = [self._along(axis) for axis in quantity.axes]
             for index, which in enumerate(product(*entries)):
                 value = found[Slot(quantity.name, index)]
                 if not (isinstance(value, float | int) and value == 0.0):

@@ -11,6 +11,7 @@ from psdmc.program.kernel import Kernel
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
+from psdmc.program.regions import Column, Reader, Regions, drop_unread, straight
 from psdmc.program.signature import Signature
 
 Kept = Mapping[Slot, Slot]
@@ -29,15 +30,34 @@ def packed(kernel: Kernel, function: Signature, columns: int, places: Places) ->
         Slot(matrix.name, row * columns + column): Slot(values.name, k)
         for k, (row, column) in enumerate(places)
     }
-    single = _only(kernel.single, kept)
-    batch = single if kernel.batch is kernel.single else _only(kernel.batch, kept)
+    single = _only(kernel.single, matrix.name, kept)
+    batch = single if kernel.batch is kernel.single else _only(kernel.batch, matrix.name, kept)
     limbs = None if kernel.limbs is None else _limbs(kernel.limbs, matrix.name, kept)
-    return replace(kernel, function=function, single=single, batch=batch, limbs=limbs, places=places)
+    regions = None if kernel.regions is None else _regions(kernel.regions, matrix.name, columns, kept)
+    return replace(
+        kernel, function=function, single=single, batch=batch, limbs=limbs, places=places, regions=regions
+    )
 
 
-def _only(program: Program, kept: Kept) -> Program:
-    outputs = tuple((kept[slot], index) for slot, index in program.outputs if slot in kept)
+def _only(program: Program, matrix: str, kept: Kept) -> Program:
+    """The PROGRAM without the matrix's other entries; pivots stay."""
+    outputs = tuple(
+        (kept.get(slot, slot), index)
+        for slot, index in program.outputs
+        if slot in kept or slot.vector != matrix
+    )
     return drop_unused(Program(program.body, outputs))
+
+
+def _regions(body: Regions, matrix: str, columns: int, kept: Kept) -> Regions:
+    """The regions, which compute the whole matrix in an array of their own, and copies of the entries that are kept."""
+
+    def copied(read: Reader) -> dict[str, Column]:
+        (name,) = {place.vector for place in kept.values()}
+        return {name: Column([read(matrix, 1, first=slot.index)[0] for slot in kept])}
+
+    arrays = {**body.arrays, matrix: columns * columns}
+    return drop_unread(replace(body, arrays=arrays, regions=(*body.regions, straight(copied))))
 
 
 def _limbs(limbs: LimbProgram, matrix: str, kept: Kept) -> LimbProgram | None:

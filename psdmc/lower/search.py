@@ -17,7 +17,7 @@ from operator import ne
 
 import numpy as np
 
-from psdmc.dynamics.choices import Choices
+from psdmc.dynamics.choices import ByChoices, Choices
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InternalError
@@ -91,7 +91,7 @@ class Search:
         self.branches = Branches(self.robot)
         self._is_arm = chain.is_serial and not self.is_large and all(kind.about_z for kind in chain.types)
         self.budget = budget * LARGE**2 // max(LARGE, len(chain)) ** 2
-        self._costs: dict[tuple[str, Reframed, float, tuple[int, ...], Choices], Cost] = {}
+        self._costs: ByChoices[Cost] = ByChoices()
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
         self.accuracy = None if known is None else Accuracy(self.robot, known)
@@ -170,10 +170,11 @@ class Search:
 
     def _branch_cost(self, recipe: Recipe, a: Arrangement, kept: tuple[int, ...]) -> Cost:
         part, robot = self.branches.part(a, kept)
-        key = recipe.name, part.reframed, a.unit, part.carriers, a.choices
-        if key not in self._costs:
-            self._costs[key] = cost_of_dynamics(recipe, part, robot)
-        return self._costs[key]
+        return self._costs.made(
+            self._key(recipe, part),
+            part.choices,
+            lambda choices: cost_of_dynamics(recipe, replace(part, choices=choices), robot),
+        )
 
     def _accurate(
         self, firsts: Sequence[Arrangement], error_of: Callable[[Arrangement], float]
@@ -220,14 +221,21 @@ class Search:
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
         """Return the numbers of operations of a function in an arrangement (frames, nonzero parameters, recursion). The
         result is computed once and cached."""
-        key = self._key(recipe, a)
-        if key not in self._costs:
-            self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
-        return self._costs[key]
+        return self._recorded(recipe, a, [])
+
+    def _recorded(self, recipe: Recipe, a: Arrangement, new: list[Recording]) -> Cost:
+        """Return the numbers of operations of a function in an arrangement. If the function is recorded for this, its
+        recording is added to `new`."""
+
+        def make(choices: Choices) -> Cost:
+            new.append(Recording.of(recipe, replace(a, choices=choices), self.robot))
+            return new[0].cost()
+
+        return self._costs.made(self._key(recipe, a), a.choices, make)
 
     @staticmethod
-    def _key(recipe: Recipe, a: Arrangement) -> tuple[str, Reframed, float, tuple[int, ...], Choices]:
-        return recipe.name, a.reframed, a.unit, a.carriers, a.choices
+    def _key(recipe: Recipe, a: Arrangement) -> tuple[str, Reframed, float, tuple[int, ...]]:
+        return recipe.name, a.reframed, a.unit, a.carriers
 
     def _anew(self, choices: Choices) -> Iterator[Arrangement]:
         """Start the search again from its first choices, in this arrangement. Of what was chosen for another function,
@@ -266,10 +274,13 @@ class Search:
         left = OPERATIONS if is_usual else OPERATIONS_OF_LARGE
         targets = (self.single, self.batch) if is_usual else (self.batch,)
         for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):
-            if self._key(recipe, choices[k]) not in self._costs:
-                recorded[k] = Recording.of(recipe, choices[k], self.robot)
-                self._costs[self._key(recipe, choices[k])] = recorded[k].cost()
-            costs[k] = self.cost(recipe, choices[k])
+            new: list[Recording] = []
+            costs[k] = self._recorded(recipe, choices[k], new)
+            new += [
+                recorded[j] for j in recorded if costs[j] is costs[k]
+            ]  # of choices that are not told apart
+            if new:
+                recorded[k] = new[0]
             best = {min(sorted(costs), key=lambda k: target.weight(costs[k])) for target in targets}
             recorded = {k: recorded[k] for k in best if k in recorded}
             left -= costs[k].total

@@ -41,11 +41,14 @@ def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequ
         [Dimension(0, order) for joint in joints for order in getattr(joint, orders)]
         for orders in ("q_orders", "v_orders")
     )
+    rates, accelerations = [times(each, RATE) for each in nv], [times(each, RATE, 2) for each in nv]
     return {
         "n": [NUMBER] * len(frames),
         "nq": nq,
         "nv": nv,
-        "nx": [*nv, *(times(each, RATE) for each in nv)],
+        "nx": [*nv, *rates],
+        "nxa": [*nv, *rates, *accelerations],
+        "nxu": [*nv, *rates, *(times(dimension_of("J"), each, -1) for each in nv)],
         "l": theta_b,
         "frames": [NUMBER] * len(named),
         "contacts": [NUMBER] * len([each for each in named if each.rows]),

@@ -3,7 +3,7 @@ operation with unlike arguments, such as the sum of a mass and a length."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from psdmc.program.dimensions import NUMBER, Known, Unlike, raised
 from psdmc.program.program import Op, Slot
@@ -27,7 +27,7 @@ class DimensionedTracer(Tracer):
 
     def __init__(self) -> None:
         super().__init__()
-        self.steps = self._own = _Steps(self)
+        self.steps = self._own = _Steps(self.constants)
 
     def measured(self, slot: Slot, dimension: Known) -> Symbol:
         """One input of this dimension."""
@@ -53,11 +53,11 @@ class _Steps(list[Step]):
     results  by an operation and the numbers of its two arguments that of its value: most steps are found here
     """
 
-    __slots__ = ("given", "kinds", "number", "results", "seen", "tracer")
+    __slots__ = ("constants", "given", "kinds", "number", "results", "seen")
 
-    def __init__(self, tracer: Tracer) -> None:
+    def __init__(self, constants: Mapping[int, Constant]) -> None:
         super().__init__()
-        self.tracer = tracer
+        self.constants = constants
         self.given: dict[Slot, Known] = {}
         self.kinds: list[int] = []
         self.seen: list[Known] = []
@@ -97,5 +97,5 @@ class _Steps(list[Step]):
             raise UnlikeArguments(f"{_WORDS.get(op, op.value)} of {unlike}") from None
 
     def _value(self, exponent: int) -> float | None:
-        value = self.tracer.constants.get(exponent)
+        value = self.constants.get(exponent)
         return value if isinstance(value, float) else None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from weakref import proxy
 
 from psdmc.program.lanes import Lanes
 from psdmc.program.limb_program import LimbGroup
@@ -27,7 +28,9 @@ class LimbSums:
     """
 
     def __init__(self, tracer: Tracer, counts: Sequence[int]) -> None:
-        self.tracer, self.counts = tracer, counts
+        # The tracer owns its sums. A cycle would keep each trace until Python looks for cycles.
+        self.tracer: Tracer = proxy(tracer)
+        self.counts = counts
         self.partials: list[dict[int, int]] = [{} for _ in counts]
         self.summed: dict[int, int] = {}
         self._names = [LimbGroup(number, count, (), (), ()).sum for number, count in enumerate(counts)]

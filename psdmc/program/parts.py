@@ -15,6 +15,9 @@ from psdmc.program.angles import angles_first
 from psdmc.program.check import check
 from psdmc.program.program import Instr, Op, Program, Slot
 
+CONSTANT = -1
+"""Position and part of a constant, which each part has."""
+
 LEEWAY = 0.25
 """Share of a part's length by which its end may move to where few values are read beyond it."""
 
@@ -58,10 +61,12 @@ class _Cut:
         self.program, self.kept_in = program, kept_in
         sections = angles_first(program)
         self.order = [i for section in sections for i in section if program.body[i].op is not Op.CONST]
-        self.position = {i: k for k, i in enumerate(self.order)}
+        self.position = [CONSTANT] * len(program)
+        for k, i in enumerate(self.order):
+            self.position[i] = k
         self.stored_at = self._stored_at(groups, late)
         self.ends = self._ends(longest)
-        self.part = {i: self._part_at(k) for i, k in self.position.items()}
+        self.part = [self._part_at(k) if k != CONSTANT else CONSTANT for k in self.position]
         self.outputs = self._outputs()
         self.read_in = self._read_in()
         self.first_store = min((p for p, outputs in enumerate(self.outputs) if outputs), default=0)
@@ -72,11 +77,11 @@ class _Cut:
         last = len(self.order) - 1
         if late:
             return {slot: last for slot, _ in self.program.outputs}
-        known = {slot: self.position.get(i, -1) for slot, i in self.program.outputs}
+        known = {slot: self.position[i] for slot, i in self.program.outputs}
         for group in groups:
             together = [slot for slot in group if slot in known]
-            known |= dict.fromkeys(together, max((known[slot] for slot in together), default=-1))
-        return {slot: last if at < 0 else at for slot, at in known.items()}
+            known |= dict.fromkeys(together, max((known[slot] for slot in together), default=CONSTANT))
+        return {slot: last if at == CONSTANT else at for slot, at in known.items()}
 
     def _ends(self, longest: int) -> list[int]:
         """Positions before which a part ends, but for the last one."""
@@ -115,18 +120,16 @@ class _Cut:
 
     def _crossing_at(self) -> list[int]:
         """Of each position how many values from before it are read from it on."""
-        last = dict(self.position)
+        last = list(self.position)
         for position, i in enumerate(self.order):  # ascending: the last one stays
             for a in self.program.body[i].args:
-                if a in last:
-                    last[a] = position
+                last[a] = position
         for slot, i in self.program.outputs:
-            if i in last:
-                last[i] = max(last[i], self.stored_at[slot])
+            last[i] = max(last[i], self.stored_at[slot])
         change = [0] * (len(self.order) + 2)
-        for i, end in last.items():
+        for i in self.order:
             change[self.position[i] + 1] += 1
-            change[end + 1] -= 1
+            change[last[i] + 1] -= 1
         crossing, now = [], 0
         for each in change:
             now += each
@@ -143,17 +146,19 @@ class _Cut:
         return outputs
 
     def _read_in(self) -> dict[int, set[int]]:
-        """Of each value the parts that read it."""
-        read: dict[int, set[int]] = {i: set() for i in self.order}
+        """The parts that read a value which is not a constant, but for the part that computes it; inputs are computed
+        nowhere."""
+        read: dict[int, set[int]] = {}
+        body, part = self.program.body, self.part
+        computed = [CONSTANT if instr.op is Op.LOAD else part[i] for i, instr in enumerate(body)]
         for i in self.order:
-            part = self.part[i]
-            for a in self.program.body[i].args:
-                if a in read:
-                    read[a].add(part)
+            for a in body[i].args:
+                if computed[a] != part[i] and part[a] != CONSTANT:
+                    read.setdefault(a, set()).add(part[i])
         for p, outputs in enumerate(self.outputs):
             for _, i in outputs:
-                if i in read:
-                    read[i].add(p)
+                if computed[i] != p and part[i] != CONSTANT:
+                    read.setdefault(i, set()).add(p)
         return read
 
     def _is_free(self, value: int, part: int) -> bool:
@@ -193,11 +198,9 @@ class _Cut:
     def _leaving(self) -> list[list[int]]:
         """Of each part the values that it stores for later ones."""
         leaving: list[list[int]] = [[] for _ in self.outputs]
-        for i in self.order:
+        for i in filter(self.read_in.__contains__, self.order):
             home = self._home(i)
-            if max(self.read_in[i], default=home) > home and any(
-                p > home and not self._is_free(i, p) for p in self.read_in[i]
-            ):
+            if any(p > home and not self._is_free(i, p) for p in self.read_in[i]):
                 leaving[home].append(i)
         return leaving
 

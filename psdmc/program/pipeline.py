@@ -30,6 +30,9 @@ ROUND: tuple[Pass, ...] = (
 )
 """Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor."""
 
+AT_ONCE: frozenset[Pass] = frozenset((drop_unused, fold_constants, merge_duplicates, absorb_negations))
+"""Passes that keep every bit: a second run of one changes nothing."""
+
 LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused)
 """Passes of both forms before instructions are put in order."""
 
@@ -76,8 +79,9 @@ def shortened(program: Program, of_large: bool = False) -> Program:
     many joints), it is long from LONG_OF_LARGE operations on.
     """
     operations, long = _operations(program), LONG_OF_LARGE if of_large else LONG
+    done: dict[Pass, Program] = {}
     for _ in range(LONGEST):
-        shorter = _applied(ROUND, program)
+        shorter = _applied(ROUND, program, done)
         if shorter is program or (left := _operations(shorter)) >= operations:
             break
         is_last = len(program) >= long and left > (1.0 - LITTLE) * operations
@@ -94,9 +98,9 @@ def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
     Both orders are equal if the target has no lanes, or if one order serves both. Spilled values are values that do not
     fit in registers. If they delay the code for one state, this code takes the order with fewer spilled values.
     """
-    last = _applied(LAST, short)
-    for_lanes = _applied(LAST_FOR_LANES, last)
-    for_one = _applied(last_for_one_state(costs), last)
+    last = _applied(LAST, short, {})
+    for_lanes = _applied(LAST_FOR_LANES, last, {})
+    for_one = _applied(last_for_one_state(costs), last, {})
     if costs.spills_wait:
         for_one = min(for_one, for_lanes, key=lambda each: beyond_registers(each, costs.registers))
     if not costs.has_vectors or live_values(for_one) <= costs.crowded * live_values(for_lanes):
@@ -104,9 +108,14 @@ def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
     return for_one, for_lanes
 
 
-def _applied(passes: tuple[Pass, ...], program: Program) -> Program:
+def _applied(passes: tuple[Pass, ...], program: Program, done: dict[Pass, Program]) -> Program:
+    """The PROGRAM behind some passes. `done` has for each pass the PROGRAM that it has nothing more to do for."""
     for apply in passes:
+        if done.get(apply) is program:
+            continue
         passed = apply(program)
+        if passed is program or apply in AT_ONCE:
+            done[apply] = passed
         program = program if passed is program else check(passed, after=apply.__name__)
     return program
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import chain
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +27,12 @@ class Slot(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.vector}[{self.index}]"
+
+
+@lru_cache(maxsize=128)
+def slots_of(vector: str, count: int) -> tuple[Slot, ...]:
+    """Return the names of all entries of a vector. They are cached, as each trace of a search needs them again."""
+    return tuple(Slot(vector, index) for index in range(count))
 
 
 class Instr(NamedTuple):
@@ -84,12 +92,13 @@ class Program:
     _arguments: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
+    _uses: list[list[int]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return two arrays (k,) for the k arguments of all instructions. The first has the index of each argument's
         value, the second that of the instruction that takes it. They are computed at the first call."""
         if not self._arguments:
-            given = [args for _, args, _, _ in self.body]
+            given = list(map(itemgetter(1), self.body))
             counts = np.fromiter(map(len, given), np.intp, len(given))
             flat = np.fromiter(chain.from_iterable(given), np.intp, int(counts.sum()))
             self._arguments.append((flat, np.repeat(np.arange(len(given)), counts)))
@@ -100,12 +109,15 @@ class Program:
         and index."""
         return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
 
-    def uses(self) -> list[int]:
-        """Return for each instruction how often its result is an argument of another instruction or an output."""
-        count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
-        for _, index in self.outputs:
-            count[index] += 1
-        return count
+    def uses(self) -> Sequence[int]:
+        """Return for each instruction how often its result is an argument of another instruction or an output. The numbers
+        are counted at the first call."""
+        if not self._uses:
+            count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
+            for _, index in self.outputs:
+                count[index] += 1
+            self._uses.append(count)
+        return self._uses[0]
 
     def __iter__(self) -> Iterator[Instr]:
         return iter(self.body)

@@ -3,7 +3,7 @@ can be used further, or the inputs replaced."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from psdmc.errors import InternalError
 from psdmc.program.interpret import evaluated
@@ -30,34 +30,32 @@ def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequen
     tracer = inputs[0].tracer
     if any(symbol.slot is None for symbol in inputs):
         raise InternalError("only inputs can be replaced")
-    found = dict(zip((symbol.index for symbol in inputs), given, strict=True))
+    known = dict(zip((symbol.index for symbol in inputs), given, strict=True))
+    changed = {index: value for index, value in known.items() if not _is_value(value, index)}
     roots = [value.index for value in values if isinstance(value, Symbol)]
-    for index in _computed_from(tracer, roots, found):
-        found[index] = _replaced(tracer, index, found)
-    return [_signed(found[value.index], value) if isinstance(value, Symbol) else value for value in values]
+    for index, is_needed in enumerate(tracer.needed(roots, known)):
+        if is_needed and index not in known:
+            arguments = tracer.arguments(index)
+            if not changed.keys().isdisjoint(arguments):
+                value = _replaced(tracer, index, arguments, changed)
+                if not _is_value(value, index):
+                    changed[index] = value
+    return [
+        _signed(changed[value.index], value)
+        if isinstance(value, Symbol) and value.index in changed
+        else value
+        for value in values
+    ]
 
 
-def _computed_from(tracer: Tracer, roots: Sequence[int], known: Mapping[int, Value]) -> Iterator[int]:
-    """What the roots are computed from, and they themselves, in their order; nothing that is known already."""
-    needed = [False] * (max(roots, default=-1) + 1)
-    for root in roots:
-        needed[root] = True
-    for index in reversed(range(len(needed))):
-        if needed[index] and index not in known:
-            for argument in tracer.arguments(index):
-                needed[argument] = True
-    return (index for index, is_needed in enumerate(needed) if is_needed and index not in known)
+def _is_value(value: Value, index: int) -> bool:
+    """Whether this is the recorded value of that index, without a sign."""
+    return isinstance(value, Symbol) and value.index == index and not value.negative
 
 
-def _replaced(tracer: Tracer, index: int, found: Mapping[int, Value]) -> Value:
-    """A value from what its arguments have become; itself where none has changed."""
-    arguments = tracer.arguments(index)
-    own = [found[argument] for argument in arguments]
-    if all(
-        isinstance(value, Symbol) and value.index == argument and not value.negative
-        for value, argument in zip(own, arguments, strict=True)
-    ):
-        return Symbol(tracer, index)
+def _replaced(tracer: Tracer, index: int, arguments: tuple[int, ...], changed: Mapping[int, Value]) -> Value:
+    """A value from what its arguments have become."""
+    own = [changed[each] if each in changed else Symbol(tracer, each) for each in arguments]
     sums = tracer.limb_sums
     if sums is not None and index in sums.summed:
         return sums.total(sums.group_of(arguments[0]), own[0])

@@ -15,9 +15,10 @@ from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
 from psdmc.program.thin_products import Thin
 
-WORDS = ("n", "nq", "nv", "nx", "l", "frames", "contacts", "contact_rows", "nonzeros")
-"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames, contacts
-and the rows of all contacts; and, of a function that packs a matrix, entries that it puts out."""
+WORDS = ("n", "nq", "nv", "nx", "nxa", "nxu", "l", "frames", "contacts", "contact_rows", "nonzeros")
+"""Sizes that depend on the robot: joints, length of q, of qd, of both together, and of these with qdd and with tau, base
+parameters, named frames, contacts and the rows of all contacts; and, of a function that packs a matrix, entries that it puts
+out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,16 @@ class Sizes:
         """Return 2 nv, the number of entries of a small change of the state: nv for the change of q, nv for that of qd.
         A quaternion counts as three rotations."""
         return 2 * self.nv
+
+    @property
+    def nxa(self) -> int:
+        """The number of entries of a small displacement of (q, qd, qdd), along the tangent of q."""
+        return 3 * self.nv
+
+    @property
+    def nxu(self) -> int:
+        """The number of entries of a small displacement of (q, qd, tau), along the tangent of q."""
+        return 3 * self.nv
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:
@@ -84,6 +95,7 @@ class Quantity:
              (lower/units.py)
     powers   for each axis, the power to which the unit of the row or column multiplies `unit`; left out: zero. This
              unit is rad or m along nq and nv, by the joint. Along nx it is that of nv, then that of nv per second.
+             Along nxa and nxu it is that of nx, then that of qdd or tau.
              Along l it is that of the base parameter. Along 6, and the rows of a contact, it is m for the first three,
              then 1
     default  the value of all entries if Python's callers leave the input out
@@ -163,7 +175,7 @@ class Signature:
               last (thin_products.py)
     normalizes  whether quaternions in q may have any length but zero
     summary   a sentence on what it computes, for Python and the table of docs/functions.md
-    calls     name of the function that the C code calls for each stage of an integration step; None: no call
+    calls     names of the functions that the C code calls, such as one for each stage of an integration step
     spoilt    name of its outputs in sentences about failure, such as "accelerations"
     """
 
@@ -176,7 +188,7 @@ class Signature:
     factorises: tuple[SymmetricMatrix, ...] = ()
     products: tuple[Product, ...] = ()
     thin: tuple[Thin, ...] = ()
-    calls: str | None = None
+    calls: tuple[str, ...] = ()
     normalizes: bool = False
     summary: str = ""
     spoilt: str = "results"

@@ -10,7 +10,7 @@ To differentiate by computed values, trace with inputs in their place, and subst
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from psdmc.errors import InternalError
 from psdmc.program.limb_sums import CORE
@@ -54,9 +54,10 @@ def gradients(
             bars.add(value.index, _signed(value, weight), group)
     for index in reversed(range(len(sources.needed))):
         bar = bars.of(index)
-        if index not in sources.held and not _is_zero(bar):
+        if not _is_zero(bar) and index not in sources.held:
+            group = sources.group_of(index)
             for argument, partial in sources.partials(index):
-                bars.add(argument, partial * bar, sources.group_of(index))
+                bars.add(argument, partial * bar, group)
     return [
         [_divided(bars.of(symbol.index), factor) for symbol, factor in zip(*each, strict=True)]
         for each in known
@@ -99,7 +100,7 @@ class _Bars:
     def add(self, index: int, value: Value, group: int) -> None:
         """Add a term to the derivative by the value with this index. The term comes from a value of the limb group
         `group` (equal branches, such as legs)."""
-        if group in (CORE, self.sources.group_of(index)):
+        if group == CORE or group == self.sources.group_of(index):
             self.own[index] = self.own[index] + value
         else:
             given = self.from_limbs.setdefault(index, {})
@@ -110,8 +111,9 @@ class _Bars:
         derivative is 0 if there are none."""
         if index >= len(self.own):
             return 0.0
-        for group, value in self.from_limbs.pop(index, {}).items():
-            self.own[index] = self.own[index] + self.sources.total(group, value)
+        if index in self.from_limbs:
+            for group, value in self.from_limbs.pop(index).items():
+                self.own[index] = self.own[index] + self.sources.total(group, value)
         return self.own[index]
 
 
@@ -123,13 +125,7 @@ class _Sources:
 
     def __init__(self, tracer: Tracer, roots: Sequence[int], held: Mapping[int, None]) -> None:
         self.tracer, self.held = tracer, held
-        self.needed = [False] * (max(roots) + 1)
-        for root in roots:
-            self.needed[root] = True
-        for index in reversed(range(len(self.needed))):
-            if self.needed[index] and index not in held:
-                for argument in tracer.arguments(index):
-                    self.needed[argument] = True
+        self.needed = tracer.needed(roots, held)
         self._pairs = TurnedPairs(tracer, self.needed)
 
     @staticmethod
@@ -168,20 +164,17 @@ class _Sources:
     def _is_sum(self, index: int) -> bool:
         return self.tracer.limb_sums is not None and index in self.tracer.limb_sums.summed
 
-    def partials(self, index: int) -> Iterator[tuple[int, Value]]:
-        """Yield for each argument of the value with this index the argument's index, and the partial derivative by this
+    def partials(self, index: int) -> Iterable[tuple[int, Value]]:
+        """Return for each argument of the value with this index the argument's index, and the partial derivative by this
         argument. An argument can occur twice."""
         turned = self._pairs.of(index)
         if turned is not None:
-            yield turned.angle, turned.slope
-            yield from turned.parts
-            return
+            return (turned.angle, turned.slope), *turned.parts
         arguments = self.tracer.arguments(index)
         if self._is_sum(index):
-            yield arguments[0], 1.0
-        elif arguments:
-            op, symbols = self.tracer.steps[index][0], map(self._value, arguments)
-            yield from zip(arguments, op.operation.partials(self._value(index), *symbols), strict=True)
+            return ((arguments[0], 1.0),)
+        op, symbols = self.tracer.steps[index][0], map(self._value, arguments)
+        return zip(arguments, op.operation.partials(self._value(index), *symbols), strict=True)
 
     def _value(self, index: int) -> Symbol:
         return Symbol(self.tracer, index)

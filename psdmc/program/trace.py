@@ -11,13 +11,13 @@ tuples without function calls. `finish` turns the tuples into instructions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import compress
 from typing import Any, Protocol
 
 from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
-from psdmc.program.program import Instr, Op, Program, Slot, operation
+from psdmc.program.program import Instr, Op, Program, Slot, operation, slots_of
 
 Number = float | int
 Constant = Number | Lanes
@@ -80,7 +80,7 @@ class Tracer:
     """Records operations on symbols. `symbols` makes inputs, and `finish` makes the PROGRAM (list of operations to
     generate)."""
 
-    __slots__ = ("_places", "constants", "known", "lane_constants", "limb_sums", "steps")
+    __slots__ = ("__weakref__", "_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
     def __init__(self) -> None:
         self.steps: list[Step] = []
@@ -92,7 +92,7 @@ class Tracer:
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
         """Inputs vector[0] ... vector[count - 1]."""
-        return [self.symbol(Slot(vector, i)) for i in range(count)]
+        return [self.symbol(slot) for slot in slots_of(vector, count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
         """Return new input symbols that stand for these values. Later, `substituted` (replay.py) puts the values in
@@ -150,6 +150,22 @@ class Tracer:
         if self.limb_sums is not None and index in self.limb_sums.summed:
             return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
+
+    def needed(self, roots: Collection[int], known: Collection[int]) -> list[bool]:
+        """Return for each value up to the last root whether a root is computed from it. The search does not go on behind
+        known values."""
+        needed = [False] * (max(roots, default=-1) + 1)
+        for root in roots:
+            needed[root] = True
+        for index in range(len(needed) - 1, -1, -1):
+            if needed[index] and index not in known:
+                _, a, b = self.steps[index]
+                if b is not None:  # as in nearly all
+                    needed[a] = needed[b] = True
+                else:
+                    for argument in self.arguments(index):
+                        needed[argument] = True
+        return needed
 
     def finish(self, outputs: Outputs) -> Program:
         """Return the PROGRAM (list of operations to generate) that stores these values as outputs. Operations that no

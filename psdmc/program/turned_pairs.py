@@ -8,6 +8,7 @@ and needs no derivatives of sine and cosine. This takes one product instead of t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import compress
 from typing import NamedTuple
 
 from psdmc.program.program import Op
@@ -55,19 +56,23 @@ class TurnedPairs:
 
     def __init__(self, tracer: Tracer, needed: Sequence[bool]) -> None:
         self._tracer, self._needed = tracer, needed
-        self._uses = _uses(tracer, needed)
+        self._uses, self._is_product = _uses(tracer, needed)
 
     def of(self, index: int) -> Turned | None:
         """Return the rotated value (see Turned) with this index. Return None if the value is not of the form c x0 + s
         x1, or if its derivative by the angle is not recorded."""
         op, a, b = self._tracer.steps[index]
         if op is Op.MUL:
+            if not self._is_product[index]:
+                return None
             for product in self._products(index):
                 slope = self._slope_of_product(product)
                 if slope is not None and self._needed[slope.index]:
                     return Turned(product.angle, slope, (self._part(product),))
             return None
-        if op not in _SUMS or self._uses[a] != 1 or self._uses[b] != 1:
+        if op not in _SUMS or not (self._is_product[a] and self._is_product[b]):
+            return None
+        if self._uses[a] != 1 or self._uses[b] != 1:
             return None
         for first in self._products(a):
             for second in self._products(b):
@@ -113,11 +118,17 @@ class TurnedPairs:
         return Symbol(self._tracer, index, signs[low])
 
 
-def _uses(tracer: Tracer, needed: Sequence[bool]) -> list[int]:
-    """How often each value is an argument of a needed one."""
-    uses = [0] * len(needed)
-    for index in range(len(needed)):
-        if needed[index]:
+def _uses(tracer: Tracer, needed: Sequence[bool]) -> tuple[list[int], list[bool]]:
+    """How often each value is an argument of a needed one, and whether it is needed and a product with a sine or cosine."""
+    uses, is_product = [0] * len(needed), [False] * len(needed)
+    product, steps = Op.MUL, tracer.steps
+    for index in compress(range(len(needed)), needed):
+        op, a, b = steps[index]
+        if b is None:
             for argument in tracer.arguments(index):
                 uses[argument] += 1
-    return uses
+            continue
+        uses[a] += 1
+        uses[b] += 1
+        is_product[index] = op is product and (steps[a][0] in _SLOPE or steps[b][0] in _SLOPE)
+    return uses, is_product

@@ -62,6 +62,16 @@ GRADIENT_THETA = Quantity(
 )
 """Derivatives of the weighted sum of outputs by each input."""
 
+
+def hessian_of(last: Quantity, axis: str) -> Quantity:
+    """The symmetric matrix of second derivatives of a weighted sum by q, qd and a third quantity."""
+    means = (
+        f"symmetric matrix of second derivatives of the weighted sum by (q, qd, {last.name}): rows and columns nv each for "
+        f"{OF_Q}, for qd[j] and for {last.name}[j]"
+    )
+    return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
+
+
 _FREE = "free_qdd"
 """Name of an input that no function has: the accelerations while torques are differentiated."""
 

@@ -17,6 +17,7 @@ from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivatives
 from psdmc.reproducible import solved, times
 from psdmc.robot.mechanism import Array, Mechanism
 
@@ -104,6 +105,12 @@ class RobotOnArrays:
         )
         by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
         return by_q, by_qd, by_qdd
+
+    def torque_hessian(self, q: Array, qd: Array, qdd: Array, weights: Array) -> Array:
+        """(k, 3 nv, 3 nv) second derivatives of the weighted torques by (q, qd, qdd)."""
+        given = (list(q.T), list(qd.T), list(qdd.T), list(weights.T))
+        found = inverse_dynamics_second_derivatives(self.frames, self.bodies, *given, self.base_acceleration)
+        return matrix(found.hessian, len(q))
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """(k, n) joint accelerations."""

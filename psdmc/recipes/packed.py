@@ -38,6 +38,8 @@ def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packi
             function.inputs,
             (VALUES,),
             theta=function.theta,
+            factorises=function.factorises,
+            calls=function.calls,
             summary=summary,
         ),
         title=f"{dense.title}, packed",
@@ -55,7 +57,7 @@ def unpacked(packing: Packing, dense: Recipe, robot: RobotOnArrays, values: Arra
     """Return the whole matrices that `dense` would return, from the vectors (k, nonzeros) of their nonzero entries, for
     k states."""
     (matrix,) = dense.signature.outputs
-    lengths = {"nv": robot.nv, "l": robot.lift.shape[1]}
+    lengths = {"nv": robot.nv, "nxa": 3 * robot.nv, "nxu": 3 * robot.nv, "l": robot.lift.shape[1]}
     found = np.zeros((len(values), *(lengths[axis] for axis in matrix.axes)))
     rows, columns = _indices(packing, robot)
     found[:, rows, columns] = values

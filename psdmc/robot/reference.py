@@ -97,6 +97,28 @@ class Reference:
         by_q, by_qd, by_tau = np.moveaxis(self._loaded(acceleration_derivatives, wrenches, q, qd, tau), -3, 0)
         return self.forward_dynamics(q, qd, tau, wrenches), by_q, by_qd, by_tau
 
+    def second_derivatives(self, gradient: Callable[..., Sequence[Array]], *states: Array) -> Array:
+        """Return (..., 3 nv, 3 nv) second derivatives from this gradient by q, qd and a third vector: its central
+        differences, for q of eighth order and along `integrate`. The gradient may be at most quadratic in qd and the third
+        vector: then these differences are exact. Joints with several coordinates: the mean of both orders."""
+        nv = self.model.nv
+        columns = []
+        for which, size in enumerate((DIFFERENCE, 1.0, 1.0)):
+            for step in size * np.eye(nv):
+                total = np.zeros((*states[1].shape[:-1], 3 * nv))
+                for k, weight in enumerate((0.5,) if which else CENTRAL, start=1):
+                    for sign in (k, -k):
+                        moved = list(states)
+                        way = np.broadcast_to(sign * step, states[1].shape)
+                        moved[which] = moved[which] + way if which else self.integrated(moved[0], way)
+                        total += np.copysign(weight / size, weight * sign) * np.concatenate(
+                            gradient(*moved), -1
+                        )
+                columns.append(total)
+        found = np.stack(columns, axis=-1)
+        mean: Array = 0.5 * (found + np.swapaxes(found, -1, -2))
+        return mean
+
     def integrated(self, q: Array, way: Array) -> Array:
         """Return the positions (..., nq) after a motion from q at constant rates. `way` is the rates multiplied by the
         duration."""

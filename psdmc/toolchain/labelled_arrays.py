@@ -30,6 +30,8 @@ _DIMENSIONS = {
     "nq": JOINT,
     "nv": JOINT,
     "nx": "state",
+    "nxa": "state_and_acceleration",
+    "nxu": "state_and_torque",
     "l": "base_parameter",
     "frames": "frame",
     "contacts": "contact",
@@ -37,7 +39,14 @@ _DIMENSIONS = {
     "3": "axis",
     "6": "twist",
 }
-_COLUMNS = {JOINT: COLUMN, "axis": "axis_column", "state": "state_column", "contact_row": "contact_column"}
+_COLUMNS = {
+    JOINT: COLUMN,
+    "axis": "axis_column",
+    "state": "state_column",
+    "state_and_acceleration": "state_and_acceleration_column",
+    "state_and_torque": "state_and_torque_column",
+    "contact_row": "contact_column",
+}
 
 
 def is_foreign(value: object) -> bool:

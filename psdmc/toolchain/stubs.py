@@ -89,6 +89,8 @@ _SIZES = {
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
     "nx": "2 nv: the first nv are for q (ball joint or floating base: for small motions along qd), the last nv for qd",
+    "nxa": "3 nv: those of nx, then nv for qdd (nx = 2 nv: nv for q, nv for qd)",
+    "nxu": "3 nv: those of nx, then nv for tau (nx = 2 nv: nv for q, nv for qd)",
     "l": "number of base parameters",
     "frames": "number of named frames",
     "contacts": "number of contacts",

@@ -127,6 +127,9 @@ def _summed(robot: OnCoordinates, values: Array, axes: Sequence[str]) -> Array:
     for k, axis in enumerate(axes):
         if axis in ("nq", "nv"):
             values = robot.following.summed(values, k - len(axes))
+        elif axis == "nxa":
+            parts = np.split(values, 3, axis=k - len(axes))
+            values = np.concatenate([robot.following.summed(x, k - len(axes)) for x in parts], k - len(axes))
     return values
 
 

@@ -6,14 +6,18 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot
+from robots_at_hand import in_wheel
 from unoptimised import without_optimisation
 
 from psdmc.compiler import emit_c
 from psdmc.robot.reference import reference
+from psdmc.toolchain.compiler_command import find_compiler
 
 EXAMPLES = ROBOTS.parent / "trajectory_optimisation"
 sys.path.insert(0, str(EXAMPLES))
@@ -87,3 +91,75 @@ def test_the_step_of_a_1_khz_controller_compiles_and_arrives(tmp_path: Path) -> 
         subprocess.run(words, cwd=tmp_path, check=True)
     done = subprocess.run([str(tmp_path / "mpc")], capture_output=True, text=True, check=True)
     assert "largest error after 1.5 s" in done.stdout
+
+
+@pytest.fixture(scope="module")
+def jumped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any, Any]:
+    """The example's module, its robot, and a jump in 13 nodes with the package's functions, which are not optimised."""
+    casadi = pytest.importorskip("casadi")
+    import jump
+
+    model, folder = jump.solo12(), tmp_path_factory.mktemp("jump") / "solo"
+    names = ["inverse_dynamics_with_wrenches", "forward_kinematics"]
+    emit_c(model, folder, functions=names, name="solo", adapters=["casadi_hessian"])
+    words = [*find_compiler().command, "-std=c99", "-O0", "-shared", "-fPIC", "-Iinclude"]
+    source = "casadi_hessian/solo_casadi_hessian.c"
+    subprocess.run([*words, source, "-lm", "-o", "solo.so"], cwd=folder, check=True)
+    dynamics = jump.Dynamics(*(casadi.external(f"solo_{name}", str(folder / "solo.so")) for name in names))
+    return jump, model, jump.jump(dynamics, 24.0, PHASES, 0.4, 0.1)
+
+
+PHASES = (5, 4, 4)
+
+
+@pytest.mark.slow
+def test_solo12_jumps(jumped: tuple[Any, Any, Any]) -> None:
+    """Pinocchio's torques and feet for the motion that was found: motors, floor and friction are respected."""
+    jump, _, found = jumped
+    robot = pin.buildModelFromUrdf(str(in_wheel("solo12.urdf")), pin.JointModelFreeFlyer())
+    data = robot.createData()
+    feet = [robot.getFrameId(name) for name in jump.FEET]
+    dt = 0.4 / sum(PHASES)
+    for k in range(sum(PHASES)):
+        q, qd = found.q[:, k].copy(), found.qd[:, k]
+        q[3:7] /= np.linalg.norm(q[3:7])
+        pin.framesForwardKinematics(robot, data, q)
+        heights = np.array([data.oMf[foot].translation[2] for foot in feet])
+        loads = [pin.Force.Zero() for _ in range(robot.njoints)]
+        for foot, force in zip(feet, found.force[:, k].reshape(4, 3), strict=True):
+            frame = robot.frames[foot]
+            along = data.oMf[foot].rotation.T @ force
+            loads[frame.parentJoint] += frame.placement.act(pin.Force(along, np.zeros(3)))
+            assert np.hypot(*force[:2]) <= jump.FRICTION * force[2] + 1e-6
+        tau = pin.rnea(robot, data, q, qd, (found.qd[:, k + 1] - qd) / dt, loads)
+        np.testing.assert_allclose(tau, np.r_[np.zeros(6), found.tau[:, k]], atol=1e-6)
+        if PHASES[0] <= k < PHASES[0] + PHASES[1]:
+            assert np.abs(found.force[:, k]).max() < 1e-6
+            assert heights.min() > -1e-6
+        else:
+            assert np.abs(heights).max() < 1e-6
+        if k == PHASES[0] + PHASES[1] // 2:
+            assert heights.min() > 1e-3
+    assert np.abs(found.tau).max() <= jump.TORQUE + 1e-6
+    assert found.q[0, -1] == pytest.approx(0.1, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_the_jump_is_that_of_pinocchio_on_symbols(jumped: tuple[Any, Any, Any]) -> None:
+    jump, model, found = jumped
+    if shutil.which("g++") is None:
+        pytest.skip("g++ is not installed")
+    theirs = jump.jump(jump.with_pinocchio(model), 24.0, PHASES, 0.4, 0.1)
+    assert theirs.cost == pytest.approx(found.cost, rel=1e-8)
+    assert np.abs(theirs.q - found.q).max() < 1e-5
+    assert abs(theirs.iterations - found.iterations) <= 2, "rounding may add a step"
+
+
+@pytest.mark.slow
+def test_the_jump_is_drawn(jumped: tuple[Any, Any, Any], tmp_path: Path) -> None:
+    from jump_plots import animate, plot
+
+    plot(jumped[2], tmp_path / "jump.png")
+    animate(jumped[2], tmp_path / "jump.gif")
+    assert (tmp_path / "jump.png").stat().st_size > 20_000
+    assert (tmp_path / "jump.gif").read_bytes().startswith(b"GIF89a")

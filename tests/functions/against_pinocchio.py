@@ -72,6 +72,10 @@ LONG = frozenset(
         "rk4_step_derivatives",
         "semi_implicit_euler",
         "semi_implicit_euler_derivatives",
+        "inverse_dynamics_second_derivatives",
+        "inverse_dynamics_second_derivatives_packed",
+        "forward_dynamics_second_derivatives",
+        "forward_dynamics_second_derivatives_packed",
     }
 )
 """Functions whose compilation takes long, all together."""

@@ -12,6 +12,7 @@ from random_trees import RandomTree
 
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics import motion
+from psdmc.dynamics.choices import ByChoices, Choices
 from psdmc.functions import RECIPES
 from psdmc.lower import carriers, kernels, limb_search, search
 from psdmc.lower.branches import limbs_in
@@ -19,7 +20,7 @@ from psdmc.lower.carrier_columns import STATES, _sampled_columns
 from psdmc.lower.factored import Arrangement, Recording, RobotConstants, trace_dynamics
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import LimbSearch
-from psdmc.lower.search import Search
+from psdmc.lower.search import ALL_CHOICES, Search
 from psdmc.lower.tableau import Tableau
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program import pipeline
@@ -106,28 +107,46 @@ def test_choices_are_compared_on_so_many_operations_and_the_found_ones_first(
     found, start = searched()
     recipe = RECIPES["coriolis_matrix"]
     start = replace(start, choices=replace(start.choices, fold=True))
-    traced: list[Arrangement] = []
+    traced: list[Choices] = []
     record = Recording.of
 
     def counted(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Recording:
-        traced.append(arrangement)
+        traced.append(arrangement.choices.choices)
         return record(recipe, arrangement, robot)
 
     monkeypatch.setattr(Recording, "of", staticmethod(counted))
-    found._costs.clear()
+    monkeypatch.setattr(found, "_costs", ByChoices())
     (*programs,) = found.rearrangements(recipe, start)
     assert many == COUNT or len(programs) == 1
     every = len(traced)
-    assert every == len({each.choices for each in traced})  # what is taken is not traced again
+    assert every == len(set(traced))  # what is taken is not traced again
     longest = max(cost(program).total for program in programs)
     for limit, least in ((0, 1), (2.5 * longest, 2)):
         traced.clear()
-        found._costs.clear()
+        monkeypatch.setattr(found, "_costs", ByChoices())
         monkeypatch.setattr(search, name, limit)
 
         assert list(found.rearrangements(recipe, start))
-        assert traced[0].choices == start.choices
+        assert traced[0] == start.choices
         assert least <= len(traced) <= max(1, limit / (0.8 * longest)) < every
+
+
+@pytest.mark.parametrize("function", ["inverse_dynamics", "mass_matrix"])
+def test_choices_that_a_trace_does_not_tell_apart_are_traced_once(
+    monkeypatch: pytest.MonkeyPatch, function: str
+) -> None:
+    """And have the cost of their own traces."""
+    found, start = searched()
+    monkeypatch.setattr(found, "_costs", ByChoices())
+    recipe, traced, record = RECIPES[function], [], Recording.of
+    monkeypatch.setattr(Recording, "of", staticmethod(lambda *given: traced.append(given) or record(*given)))
+    arranged = [replace(start, choices=choices) for choices in ALL_CHOICES]
+
+    counted = [found.cost(recipe, each) for each in arranged]
+
+    assert len(traced) < len(arranged)
+    assert counted == [cost(trace_dynamics(recipe, each, found.robot)) for each in arranged]
+    assert len(set(counted)) > 1
 
 
 @pytest.mark.parametrize(("many", "rounds"), [(COUNT, 2), (COUNT - 1, 1)], ids=["usual", "large"])

@@ -25,7 +25,7 @@ from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import Placement
 from psdmc.robot.reference import Reference
 
-INVERSE, FORWARD = DERIVATIVES[:4], DERIVATIVES[4:]
+INVERSE, FORWARD = DERIVATIVES[:5], (*DERIVATIVES[5:], "forward_dynamics_second_derivatives")
 COUNT = 11
 """States: no whole number of vectors."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psdmc.backends.c.adapters import with_own_kernels
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
@@ -9,9 +10,8 @@ from psdmc.backends.protocol import BackEnd, Emission
 
 
 def _files(given: Emission) -> dict[str, str]:
-    return package_files(
-        package_view(given.info, given.kernels, given.options, given.references, given.adapters)
-    )
+    package = package_view(given.info, given.kernels, given.options, given.references, given.adapters)
+    return package_files(with_own_kernels(package, given.kernels))
 
 
 def _entry(robot: str) -> tuple[str, str]:

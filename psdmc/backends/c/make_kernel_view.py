@@ -66,7 +66,9 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         pivot_order=tuple(
             slot.index for slot, _ in kernel.single.outputs if positive and slot.vector == positive.name
         ),
-        cost=f"calls of {function.calls}" if kernel.is_loop_of_calls else str(cost(kernel.single)),
+        cost=f"calls of {' and '.join(function.calls)}"
+        if kernel.is_loop_of_calls
+        else str(cost(kernel.single)),
         lowering=kernel.lowering,
         limbs=_limbs(kernel, sizes, options),
         places=kernel.places,

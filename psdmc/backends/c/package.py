@@ -31,7 +31,6 @@ from psdmc.backends.options import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
-from psdmc.garbage import collecting_rarely
 from psdmc.program.kernel import Kernel
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.target import Target
@@ -47,6 +46,7 @@ class PackageView:
     robot       identifier with which every C name starts
     references  inputs and expected results for the self-test; None: no self-test
     adapters    names of the other programs, such as CasADi, for which the package has files
+    private     functions for one state that only adapters call; no header declares them
     """
 
     robot: str
@@ -55,13 +55,20 @@ class PackageView:
     functions: tuple[FunctionView, ...]
     references: ReferenceView | None
     adapters: tuple[str, ...] = ()
+    private: tuple[FunctionView, ...] = ()
+
+    @property
+    def alone(self) -> PackageView:
+        """Return the same package without functions for many states."""
+        target = replace(self.target, forms=self.target.forms[:1])
+        return replace(self, options=replace(self.options, target=target))
 
     @property
     def adapter_libraries(self) -> dict[str, tuple[str, ...]]:
         """Return the adapters (files for other programs) whose C file becomes a separate shared library,
         lib<robot>_<name>. Each adapter has the C files that its library needs in addition. The files for CasADi already
         include the code of the package, and need none."""
-        sources = {"casadi": (), "casadi_theta": (), "fmu": self.sources}
+        sources = {"casadi": (), "casadi_theta": (), "casadi_hessian": (), "fmu": self.sources}
         return {name: sources[name] for name in self.adapters if name in sources}
 
     @property
@@ -204,16 +211,21 @@ class PackageView:
         return tuple(kernel for function in self.functions for kernel in function.kernels)
 
     @property
+    def _all_kernels(self) -> tuple[KernelView, ...]:
+        """The kernels of all functions, with those that only adapters call."""
+        return (*self.kernels, *(kernel for function in self.private for kernel in function.kernels))
+
+    @property
     def is_mixed(self) -> bool:
         """Return whether a function of the package needs both kinds of storage. One output is then written straight
         into the array of the caller, and another is first collected in a block on the stack."""
-        return any(kernel.is_mixed for kernel in self.kernels)
+        return any(kernel.is_mixed for kernel in self._all_kernels)
 
     @property
     def fails_in_several(self) -> bool:
         """Return whether a failed function of the package sets several outputs to NaN, or an output that is no vector
         with one entry per joint."""
-        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self.kernels)
+        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self._all_kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
@@ -224,7 +236,7 @@ class PackageView:
     @property
     def has_parts(self) -> bool:
         """Whether some body is several functions."""
-        return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels)
+        return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self._all_kernels)
 
     @property
     def has_thin_products(self) -> bool:
@@ -234,12 +246,14 @@ class PackageView:
     @property
     def has_clears(self) -> bool:
         """Whether some body clears runs of zeros."""
-        return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)
+        return any(
+            kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self._all_kernels
+        )
 
     @property
     def calls(self) -> tuple[CallView, ...]:
         """Operations of some kernel that are macros."""
-        bodies = [body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body)]
+        bodies = [body for kernel in self._all_kernels for body in (kernel.single_body, kernel.lanes_body)]
         found = {op for body in bodies for op in body.calls}
         found |= {op for kernel in self.kernels if kernel.regions for op in kernel.regions.calls}
         return call_views(frozenset(found))
@@ -280,7 +294,6 @@ class PackageView:
         return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
-@collecting_rarely()
 def package_view(
     info: PackageInfo,
     kernels: Mapping[str, Kernel],

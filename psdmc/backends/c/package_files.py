@@ -101,10 +101,13 @@ def library_files(package: PackageView) -> dict[str, str]:
         files[f"src/{vector.name}.h"] = render(
             "limbs.h.jinja", package=package, limbs=vector, calls=package.limb_calls(vector.count)
         )
-    for function in package.functions:
+    for function, shown in (
+        *((each, package) for each in package.functions),
+        *((each, package.alone) for each in package.private),
+    ):
         for unit in function.units:
             files[f"src/{unit.name}.c"] = render(
-                "regions.c.jinja" if unit.is_regions else "function.c.jinja", package=package, function=unit
+                "regions.c.jinja" if unit.is_regions else "function.c.jinja", package=shown, function=unit
             )
         for kernel in function.kernels:
             if kernel.regions:

@@ -104,21 +104,25 @@ def symbolic(case: Case) -> Any:
 
 def _generated(case: Case) -> Path:
     """The C file that the writer makes; its other output is beside it."""
-    command = [str(_writer()), "robot.txt", "generated", *_all_ways(case)]
+    writer = program_on_symbols("casadi_writer.cpp", source("casadi_writer.cpp"))
+    command = [str(writer), "robot.txt", "generated", *_all_ways(case)]
     return built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)})
 
 
 @lru_cache
-def _writer() -> Path:
-    """The program that writes C; it is compiled once for all robots, unoptimised: it runs for a tenth of a second."""
+def program_on_symbols(file: str, text: str) -> Path:
+    """A C++ program that runs Pinocchio on CasADi's symbols, from the name and text of its file, which may include
+    pinocchio_model.hpp and serial_joints.hpp. It is compiled once for all robots, unoptimised: it runs for a tenth of a
+    second."""
     casadi, prefix = _casadi(), pinocchio_prefix()
-    names = ("casadi_writer.cpp", "pinocchio_model.hpp", "serial_joints.hpp")
+    name = Path(file).stem
+    sources = {file: text} | {each: source(each) for each in ("pinocchio_model.hpp", "serial_joints.hpp")}
     command = [cxx(), "-std=c++17", "-O0", "-DNDEBUG", INSTANTIATED, *DEFINES, *includes(prefix)]
-    command += ["-isystem", str(casadi / "include"), "casadi_writer.cpp", "-o", "casadi_writer"]
+    command += ["-isystem", str(casadi / "include"), file, "-o", name]
     command += [f"-L{prefix / 'lib'}", f"-L{casadi}", "-lcasadi", "-lpinocchio_default"]
     command += [f"-Wl,-rpath,{prefix / 'lib'}", f"-Wl,-rpath,{casadi}", f"-Wl,-rpath-link,{prefix / 'lib'}"]
     depends = [version_of("pin"), version_of("casadi")]
-    return built("casadi_writer", command, {name: source(name) for name in names}, depends)
+    return built(name, command, sources, depends)
 
 
 def _casadi() -> Path:

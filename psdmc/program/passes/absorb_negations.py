@@ -90,7 +90,7 @@ def _into_producers(program: Program) -> Program:
     return Program(moved, tuple((slot, new_index[i]) for slot, i in program.outputs))
 
 
-def _negate(body: list[Instr], uses: list[int], index: int) -> bool:
+def _negate(body: list[Instr], uses: Sequence[int], index: int) -> bool:
     """Change the sign of a value in place where that costs nothing and no other instruction uses it. Returns whether it
     was done."""
     instr = body[index]

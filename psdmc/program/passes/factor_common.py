@@ -4,6 +4,7 @@ subtracted."""
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psdmc.program.passes.drop_unused import drop_unused
@@ -77,7 +78,7 @@ def _grouped_sums(program: Program) -> dict[int, tuple[_Term, ...]]:
     return found
 
 
-def _share_nothing(body: tuple[Instr, ...], uses: list[int], args: tuple[int, ...]) -> bool:
+def _share_nothing(body: tuple[Instr, ...], uses: Sequence[int], args: tuple[int, ...]) -> bool:
     """Whether a sum has just these two terms, and they have no factor in common: true for most sums."""
     first, second = args
     ops = [body[a][0] if uses[a] == 1 else None for a in args]
@@ -88,7 +89,7 @@ def _share_nothing(body: tuple[Instr, ...], uses: list[int], args: tuple[int, ..
     return set(_factors(body, uses, first)).isdisjoint(_factors(body, uses, second))
 
 
-def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
+def _parts_of_larger_sums(program: Program, uses: Sequence[int]) -> list[bool]:
     inside = [False] * len(program.body)
     for op, args, _, _ in program.body:
         if op in _SUMS:
@@ -98,7 +99,7 @@ def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
     return inside
 
 
-def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[tuple[int, list[int]]]:
+def _signed_factors(body: tuple[Instr, ...], uses: Sequence[int], index: int) -> list[tuple[int, list[int]]]:
     """Sign and factors of each term of a chain of sums, left to right. Written with a stack, since chains can be
     thousands long."""
     terms: list[tuple[int, list[int]]] = []
@@ -142,7 +143,7 @@ def _shares_a_factor(terms: list[tuple[int, list[int]]]) -> bool:
     return False
 
 
-def _factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[int]:
+def _factors(body: tuple[Instr, ...], uses: Sequence[int], index: int) -> list[int]:
     """Of a product that nothing else uses, left to right."""
     factors: list[int] = []
     stack = [index]

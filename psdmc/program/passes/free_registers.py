@@ -35,17 +35,18 @@ def free_registers(program: Program) -> Program:
     Gives:  a sum of live values over all instructions that is no larger than before.
     """
     while True:
-        best = min((program, *(_Listing(program, tie).listed() for tie in TIES)), key=live_values)
-        if best is program:
+        orders = [_Listing(program, tie).listed() for tie in TIES]
+        alive = [live_values(program, order) for order in orders]
+        if min(alive) >= live_values(program):
             return program
-        program = best
+        program = reordered(program, orders[alive.index(min(alive))])
 
 
 class _Listing:
     """One order. Loads and constants come first: they count for nothing."""
 
     def __init__(self, program: Program, tie: Tie) -> None:
-        self.program, self.tie = program, tie
+        self.tie = tie
         self.args = [tuple(dict.fromkeys(instr.args)) for instr in program.body]
         self.users: list[list[int]] = [[] for _ in program.body]
         for i, args in enumerate(self.args):
@@ -57,7 +58,7 @@ class _Listing:
         self.time = [0] * len(program)
         self.ready: list[tuple[int, int, int, int]] = []
 
-    def listed(self) -> Program:
+    def listed(self) -> list[int]:
         placed = [not args for args in self.args]
         for i, args in enumerate(self.args):
             if args and not self.unknown[i]:
@@ -67,7 +68,7 @@ class _Listing:
             if not placed[i]:
                 placed[i] = True
                 self._place(i)
-        return reordered(self.program, self.order)
+        return self.order
 
     def _offer(self, i: int) -> None:
         """As an instruction that can come next; again where it has become one that ends a life."""

@@ -3,6 +3,8 @@ order, few values are alive (computed and still needed) at a time."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from psdmc.program.program import Program
@@ -21,15 +23,20 @@ def schedule(program: Program) -> Program:
     Gives:  a sum of live values over all instructions that is no larger than before.
     """
     order = _depth_first(program)
-    candidate = reordered(program, order)
-    return candidate if live_values(candidate) < live_values(program) else program
+    return reordered(program, order) if live_values(program, order) < live_values(program) else program
 
 
-def live_values(program: Program) -> int:
+def live_values(program: Program, order: Sequence[int] | None = None) -> int:
     """Return the number of values that are still needed after an instruction, summed over all instructions. Inputs and
-    constants do not count."""
+    constants do not count. `order` is another order of the instructions that are needed; None: the PROGRAM's own."""
     arguments, users = program.arguments()
-    here = np.arange(len(program.body))
+    here = np.arange(len(program.body) if order is None else len(order))
+    if order is not None:
+        place = np.full(len(program.body), -1)
+        place[list(order)] = here
+        arguments, users = place[arguments], place[users]
+        ascending = np.argsort(users, kind="stable")[np.count_nonzero(users < 0) :]
+        arguments, users = arguments[ascending], users[ascending]
     last = here.copy()
     last[arguments] = users  # ascending: the last one stays
     computed = np.zeros(len(here), bool)

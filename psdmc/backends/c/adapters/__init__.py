@@ -5,25 +5,35 @@ Users choose adapters with `emit-c --with`. Each adapter is written by one modul
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from psdmc.backends.c.adapters import casadi, fmu, wheel
+from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
+from psdmc.program.kernel import Kernel
 from psdmc.robot.mechanism import Mechanism
 
 ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
-    "casadi": casadi.files,
-    "casadi_theta": casadi.files_by_theta,
+    casadi.FIRST: casadi.files_of(casadi.FIRST),
+    casadi.BY_THETA: casadi.files_of(casadi.BY_THETA),
+    casadi.HESSIANS: casadi.files_of(casadi.HESSIANS),
     "wheel": wheel.files,
     "fmu": fmu.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
-NEEDS = {"casadi": casadi.needed, "casadi_theta": casadi.needed_by_theta, "fmu": fmu.needed}
+NEEDS = {
+    casadi.FIRST: casadi.needed,
+    casadi.BY_THETA: casadi.needed_by_theta,
+    casadi.HESSIANS: casadi.needed,
+    "fmu": fmu.needed,
+}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
-REMARKS = {"casadi": casadi.remark, "casadi_theta": casadi.remark}
+REMARKS = dict.fromkeys((casadi.FIRST, casadi.BY_THETA, casadi.HESSIANS), casadi.remark)
 """By name, the function that says what users should know of an adapter's functions of a robot."""
 
 
@@ -48,8 +58,25 @@ def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -
     return list(found)
 
 
-def remarks(robot: Mechanism, adapters: Sequence[str], functions: Sequence[str]) -> tuple[str, ...]:
+def remarks(
+    robot: Mechanism, adapters: Sequence[str], functions: Sequence[str], l: int = 0
+) -> tuple[str, ...]:
     """Return remarks for users about the chosen adapters, one clause each. An example says how CasADi treats the
-    quaternions of this robot."""
-    found = (REMARKS[adapter](robot, functions) for adapter in chosen(adapters) if adapter in REMARKS)
+    quaternions of this robot.
+
+    l  number of base parameters
+    """
+    found = (REMARKS[adapter](robot, functions, l) for adapter in chosen(adapters) if adapter in REMARKS)
     return tuple(dict.fromkeys(reason for reason in found if reason is not None))
+
+
+def with_own_kernels(package: PackageView, kernels: Mapping[str, Kernel]) -> PackageView:
+    """Return the package with the functions that only its adapters call. No header declares these functions.
+
+    kernels  the arithmetic of the package's functions, by name
+    """
+    alone = package.alone
+    own = casadi.own_kernels(kernels, package.adapters, package.info, package.target.costs)
+    views = [make_kernel_view(kernel, package.info.sizes, package.robot, alone.options) for kernel in own]
+    functions = (FunctionView(one.name, one.function.meaning, "", one.function, (one,)) for one in views)
+    return replace(package, private=tuple(functions))

@@ -10,30 +10,48 @@ by empty sparsity patterns. Matrices are stored column by column, without their 
 CasADi differentiates by the entries of q. If q contains quaternions, CasADi's f normalizes them before it calls the
 generated function. The generated derivative is by the rates (the tangent vector). The adapter multiplies this
 derivative by d tangent / dq.
+
+casadi_kernels.py makes the derivatives that no generated function computes from PROGRAMs: Jacobians of other functions, and
+second derivatives. For these, CasADi looks for jac_adj1_f, the Jacobian of the gradient adj1_f.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 
+from psdmc.backends.c.adapters.casadi_kernels import (
+    ADJOINT,
+    JACOBIAN,
+    SECOND,
+    THETA,
+    Derived,
+    has_small_jacobian,
+    matrix_of,
+    shape_of_input,
+)
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
 from psdmc.backends.info import PackageInfo
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
-from psdmc.program.signature import Q
+from psdmc.program.kernel import Kernel
+from psdmc.program.signature import Q, Sizes
 from psdmc.recipes.recipe import Polynomials
 from psdmc.robot.mechanism import Mechanism
+from psdmc.target.costs import Costs
 
 DERIVATIVES, GRADIENT, DIRECTION = "_derivatives", "_vjp", "_jvp"
 """Endings of function names: a function that puts out d output / d input as d<output>_d<input>; one that reads a
 cotangent last and puts out grad_<input>; and one that reads d<input> after all inputs and puts out d<output>."""
 
-PARAMETERS, THETA = "_parameters", "theta_b"
-"""What follows GRADIENT where the gradient by theta_b, the last output, is among them; and the name of theta_b."""
+PARAMETERS = "_parameters"
+"""What follows GRADIENT where the gradient by theta_b, the last output, is among them."""
+
+FIRST, BY_THETA, HESSIANS = "casadi", "casadi_theta", "casadi_hessian"
+"""The adapters: functions with first derivatives; the same with theta_b as an input; and with second derivatives."""
 
 LINEAR = (Polynomials.TORQUE, Polynomials.GRAVITY, Polynomials.SOLVED)
 """Torques that are the regressor times theta_b, and accelerations of such torques."""
@@ -152,65 +170,111 @@ def _has_blocks(name: str) -> bool:
     return all(len(o.axes) == 1 and f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
-def files(package: PackageView) -> dict[str, str]:
-    """Return the C file of the adapter as a mapping from its path to its text. The file includes the C files of the
-    package and is compiled to a separate shared library. Raises InputError if CasADi cannot call the functions of the
-    package."""
-    return _files(package, theta=False)
+def _is_by_program(name: str, sizes: Sizes, theta: bool = False) -> bool:
+    """True if psdmc makes the Jacobian of a function from its PROGRAM: no function computes it, and it is not too large."""
+    if not _is_differentiated(name):
+        return False
+    recipe = RECIPES[name]
+    is_known = _has_blocks(name) and (not theta or recipe.polynomials in LINEAR)
+    return not is_known and has_small_jacobian(recipe.signature, sizes, theta)
 
 
-def files_by_theta(package: PackageView) -> dict[str, str]:
-    """Return the C file of the adapter as a mapping from its path to its text. The functions of this file take theta_b
-    (the base parameters) as their last input."""
-    return _files(package, theta=True)
+def _is_differentiated(name: str) -> bool:
+    """True if a function has inputs, and does not compute derivatives or the tangent map."""
+    ending = (DERIVATIVES, GRADIENT, PARAMETERS, DIRECTION, MAP)
+    return name in RECIPES and bool(RECIPES[name].signature.inputs) and not name.endswith(ending)
 
 
-def _files(package: PackageView, theta: bool) -> dict[str, str]:
-    view = casadi_view(package, theta)
-    path = f"{view.library}/{view.robot}_{view.library}.c"
-    return {path: render("adapters/casadi.c.jinja", view=view)}
+def own_kernels(
+    kernels: Mapping[str, Kernel], adapters: Sequence[str], info: PackageInfo, costs: Costs
+) -> list[Kernel]:
+    """Return the kernels of derivatives that these adapters need in addition to the functions of the package."""
+    found: list[Kernel] = []
+    for kernel in kernels.values():
+        name, derived = kernel.function.name, Derived(kernel, info, costs)
+        if kernel.is_loop_of_calls or not any(_is_of(adapter, kernel) for adapter in adapters):
+            continue
+        if _is_by_program(name, info.sizes, kernel.theta):
+            found.append(derived.jacobian)
+        if HESSIANS in adapters and not kernel.theta and _is_differentiated(name):
+            found += [derived.adjoint, derived.second]
+    return found
 
 
-def remark(robot: Mechanism, functions: Sequence[str]) -> str | None:
+def _is_of(adapter: str, kernel: Kernel | KernelView) -> bool:
+    """True if the library of an adapter has this variant of a function."""
+    wants = kernel.theta == (adapter == BY_THETA and kernel.function.theta)
+    return adapter in (FIRST, BY_THETA, HESSIANS) and wants
+
+
+def files_of(adapter: str) -> Callable[[PackageView], dict[str, str]]:
+    """Return the function that makes the C file of an adapter, as a mapping from its path to its text.
+
+    The file includes the C files of the package and is compiled to a separate shared library. The function raises
+    InputError if CasADi cannot call the functions of the package.
+    """
+
+    def files(package: PackageView) -> dict[str, str]:
+        view = casadi_view(package, adapter)
+        path = f"{view.library}/{view.robot}_{view.library}.c"
+        return {path: render("adapters/casadi.c.jinja", view=view)}
+
+    return files
+
+
+def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
     """Return a text for users that says how the CasADi functions of this robot treat quaternions and which lack
-    derivatives. Return None if q has exactly one entry for each rate."""
+    derivatives. Return None if q has exactly one entry for each rate.
+
+    l  number of base parameters
+    """
     if robot.nq == robot.nv:
         return None
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
     whose = "a floating base" if robot.has_free_root else f"joint {wide.name!r}"
-    without = [name for name in functions if not _has_blocks(name)]
+    rows, frames = robot.rows_of_contacts, len(robot.frames)
+    sizes = Sizes(len(robot.own_joints), robot.nq, robot.nv, l, frames, rows_of_contacts=rows)
+    without = [name for name in functions if not (_has_blocks(name) or _is_by_program(name, sizes))]
     rest = f"; without derivatives: {', '.join(without)}" if without else ""
     return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"
 
 
-def casadi_view(package: PackageView, theta: bool = False) -> CasadiView:
-    """Return what the template of the CasADi adapter prints for a package. If `theta` is true, the CasADi functions
-    take theta_b (the base parameters) as their last input.
+def casadi_view(package: PackageView, adapter: str = FIRST) -> CasadiView:
+    """Return what the template of a CasADi adapter prints for a package.
 
     Raises InputError if the package computes in float. Also raises InputError if the base parameters are unknown and
     not an input.
     """
-    info = package.info
+    info, theta = package.info, adapter == BY_THETA
     if package.real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
-    chosen = (kernel for kernel in package.kernels if kernel.theta == (theta and kernel.function.theta))
-    kernels = {kernel.function.name: kernel for kernel in chosen}
+    endings = (JACOBIAN, ADJOINT, SECOND) if adapter == HESSIANS else (JACOBIAN,)
+    units = {
+        unit.name: kernel
+        for function in (*package.functions, *package.private)
+        for unit in function.units
+        for kernel in unit.kernels
+        if _is_of(adapter, kernel)
+        and (function in package.functions or function.signature.name.endswith(endings))
+    }
+    kernels = {kernel.function.name: kernel for kernel in units.values()}
     if not kernels:
         raise InputError(
             "CasADi needs the base parameters, and this model's are unknown",
             "calibrate the model first, or write --with casadi_theta, which takes theta_b as an input",
         )
     made = _Externals(kernels, info)
-    externals = tuple(one for kernel in kernels.values() for one in made.of(kernel))
+    own = {function.name for function in package.functions}
+    externals = tuple(one for name, kernel in kernels.items() if name in own for one in made.of(kernel))
     tangent = kernels[MAP].outputs[0] if info.units else None
     longest = (vector.size for kernel in kernels.values() for vector in kernel.inputs)
     return CasadiView(
         robot=package.robot,
-        library="casadi_theta" if theta else "casadi",
+        library=adapter,
         externals=externals,
         patterns=made.patterns.all,
         hidden=tuple(sorted({symbol for external in externals for symbol in external.symbols})),
-        sources=tuple(f"{kernel.function.name}.c" for kernel in kernels.values()),
+        sources=tuple(f"{unit}.c" for unit in units),
         zeros=max((*longest, info.l if theta else 0), default=1),
         units=info.units,
         nq=info.nq,
@@ -238,7 +302,7 @@ class _Patterns:
         return self._named(_numbers(shape, frozenset(zero)))
 
     def unread(self, shape: Sequence[int]) -> str:
-        rows, columns = _matrix(shape)
+        rows, columns = matrix_of(shape)
         return self._named((rows, columns, *[0] * (columns + 1)))
 
     def _named(self, numbers: tuple[int, ...]) -> str:
@@ -249,13 +313,8 @@ class _Patterns:
         return tuple(Pattern(name, numbers) for numbers, name in self._names.items())
 
 
-def _matrix(shape: Sequence[int]) -> tuple[int, int]:
-    """Rows and columns: the last axis is that of columns, a vector is a column."""
-    return (prod(shape[:-1]), shape[-1]) if len(shape) > 1 else (prod(shape), 1)
-
-
 def _numbers(shape: Sequence[int], zero: frozenset[int]) -> tuple[int, ...]:
-    rows, columns = _matrix(shape)
+    rows, columns = matrix_of(shape)
     if not zero:
         return (rows, columns, 1)
     kept = [[row for row in range(rows) if row * columns + column not in zero] for column in range(columns)]
@@ -277,27 +336,26 @@ class _Externals:
         patterns, name, call = self.patterns, kernel.function.name, _Call(kernel, kernel, self)
         own = [(output.name, call.at(output.name), patterns.of(output.shape)) for output in kernel.outputs]
         yield call.external("", self._inputs(kernel), own)
-        if any(output.axes == Q.axes for output in kernel.function.outputs):
-            return
-        other = self.kernels.get(name + DERIVATIVES)
+        other, by_program = (self.kernels.get(name + ending) for ending in (DERIVATIVES, JACOBIAN))
         is_known = not kernel.theta or RECIPES[name].polynomials in LINEAR
-        if other is not None and is_known and _has_blocks(name):
+        if by_program is not None:
+            yield self._by_program("jac_", kernel, by_program)
+        elif other is not None and _has_blocks(name) and is_known:
             yield self._jacobian(kernel, other)
         gradient = self.kernels.get(name + GRADIENT + PARAMETERS * kernel.theta)
+        adjoint, second = (self.kernels.get(name + ending) for ending in (ADJOINT, SECOND))
         if gradient is not None and len(kernel.outputs) == 1:
             yield self._reverse(kernel, gradient)
+        elif adjoint is not None:
+            yield self._by_program("adj1_", kernel, adjoint)
+        if second is not None:
+            yield self._by_program("jac_adj1_", kernel, second)
         direction = self.kernels.get(name + DIRECTION)
         if direction is not None and len(kernel.outputs) == 1 and self.info.units and not kernel.theta:
             yield self._forward(kernel, direction)
 
     def _inputs(self, kernel: KernelView) -> tuple[Argument, ...]:
-        """The inputs. A matrix has one column per row of ours, so that the numbers have the same order in memory."""
-        found = [
-            Argument(
-                i.name, self.patterns.of(tuple(reversed(_matrix(i.shape))) if len(i.shape) > 1 else (i.size,))
-            )
-            for i in kernel.inputs
-        ]
+        found = [Argument(i.name, self.patterns.of(shape_of_input(i.shape))) for i in kernel.inputs]
         return (*found, *([Argument(THETA, self.patterns.of((self.info.l,)))] if kernel.theta else []))
 
     def _inputs_and_outputs(self, kernel: KernelView) -> tuple[Argument, ...]:
@@ -307,7 +365,7 @@ class _Externals:
 
     def _jacobian(self, kernel: KernelView, other: KernelView) -> External:
         call, inputs = _Call(kernel, other, self), self._inputs_and_outputs(kernel)
-        shown = []
+        shown: list[tuple[str, int, str]] = []
         for output in kernel.outputs:
             for k, vector in enumerate(kernel.inputs):
                 block = next(one for one in other.outputs if one.name == f"d{output.name}_d{vector.name}")
@@ -320,6 +378,46 @@ class _Externals:
                 at, shape = call.by_theta()
                 shown.append((f"jac_{output.name}_{THETA}", at, self.patterns.of(shape)))
         return call.external("jac_", inputs, shown)
+
+    def _by_program(self, prefix: str, kernel: KernelView, called: KernelView) -> External:
+        """Return the external function of a derivative that one kernel computes in the form that CasADi expects."""
+        inputs, call = self._inputs_and_outputs(kernel), _Call(kernel, called, self)
+        seeds = [
+            Argument(f"adj_{one.name}", self.patterns.of(one.shape))
+            for one in kernel.outputs
+            if prefix != "jac_"
+        ]
+        given = [f"given(arg[{len(inputs) + k}])" for k in range(len(seeds))]
+        zero = {one.name: one.zero if prefix != "adj1_" else () for one in called.outputs}
+        shown = [
+            (one.name, call.at(one.name), self.patterns.of(one.shape, zero[one.name]))
+            for one in called.outputs
+        ]
+        if prefix == "jac_adj1_":
+            shown, seeds = self._with_unread(kernel, shown, seeds)
+        return call.external(prefix, (*inputs, *seeds), shown, given)
+
+    def _with_unread(
+        self, kernel: KernelView, shown: list[tuple[str, int, str]], seeds: list[Argument]
+    ) -> tuple[list[tuple[str, int, str]], list[Argument]]:
+        """Insert what CasADi expects but nobody reads: blocks for the function's outputs, and the gradients as inputs.
+
+        shown  the blocks of the gradients' Jacobian, by inputs and weights
+        seeds  the weights
+        """
+        found, blocks = [], iter(shown)
+        for one in kernel.inputs:
+            found += [next(blocks) for _ in kernel.inputs]
+            found += [
+                (f"jac_adj_{one.name}_out_{output.name}", 0, self.patterns.unread((one.size, output.size)))
+                for output in kernel.outputs
+            ]
+            found += [next(blocks) for _ in seeds]
+        unread = (
+            Argument(f"out_adj_{i.name}", self.patterns.unread(shape_of_input(i.shape)))
+            for i in kernel.inputs
+        )
+        return found, [*seeds, *unread]
 
     def _reverse(self, kernel: KernelView, gradient: KernelView) -> External:
         """The function that takes one cotangent to the gradients by all inputs. CasADi adds them up."""

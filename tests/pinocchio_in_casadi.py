@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi
 import numpy as np
 import pinocchio
@@ -22,12 +24,56 @@ def inverse_dynamics(model: pinocchio.Model) -> casadi.Function:
 
 def acceleration(model: pinocchio.Model) -> casadi.Function:
     """(q, qd, tau) -> qdd of the same robot."""
-    q, qd, tau = symbols(model, "tau")
-    still = casadi.SX.zeros(model.nv)
-    bias = torques(model, q, qd, still, model.gravity.linear)
-    columns = [torques(model, q, still, casadi.SX(e), np.zeros(3)) for e in np.eye(model.nv)]
-    qdd = casadi.solve(casadi.horzcat(*columns), tau - bias)
-    return casadi.Function("acceleration", [q, qd, tau], [qdd])
+    return solved(inverse_dynamics(model))
+
+
+def solved(inverse: casadi.Function) -> casadi.Function:
+    """(q, qd, tau) -> qdd, from a function (q, qd, qdd) -> tau."""
+    q, qd, tau = (casadi.SX.sym(name, inverse.size1_in(k)) for k, name in enumerate(("q", "qd", "tau")))
+    still = casadi.SX.zeros(qd.numel())
+    at_rest = inverse(q, qd, still)
+    columns = [inverse(q, qd, casadi.SX(e)) - at_rest for e in np.eye(qd.numel())]
+    return casadi.Function(
+        "acceleration", [q, qd, tau], [casadi.solve(casadi.horzcat(*columns), tau - at_rest)]
+    )
+
+
+def following(inverse: casadi.Function, spread: np.ndarray, offset: np.ndarray) -> casadi.Function:
+    """The same of a robot whose joints' positions are spread @ q + offset."""
+    q, qd, qdd = (casadi.SX.sym(name, spread.shape[1]) for name in ("q", "qd", "qdd"))
+    tau = inverse(spread @ q + offset, spread @ qd, spread @ qdd)
+    return casadi.Function("torques", [q, qd, qdd], [spread.T @ tau])
+
+
+def hessian(found: casadi.Function, move: Callable[[casadi.SX, casadi.SX], casadi.SX]) -> casadi.Function:
+    """(q, qd, third, cotangent) -> second derivatives of cotangent . found(move(q, x), qd + y, third + z) by (x, y, z) at
+    zero, of a function of q, qd and a third vector."""
+    q, qd, third = (casadi.SX.sym(name, found.size1_in(k)) for k, name in enumerate(("q", "qd", "third")))
+    nv = qd.numel()
+    x, cotangent = casadi.SX.sym("x", 3 * nv), casadi.SX.sym("cotangent", nv)
+    value = casadi.dot(cotangent, found(move(q, x[:nv]), qd + x[nv : 2 * nv], third + x[2 * nv :]))
+    second = casadi.substitute(casadi.hessian(value, x)[0], x, casadi.SX.zeros(3 * nv))
+    return casadi.Function("hessian", [q, qd, third, cotangent], [second])
+
+
+def stepped(model, q, x):
+    """q (+) x, as Pinocchio's `integrate`, up to terms of second order in x: a screw of each free joint, and a turn of each
+    ball joint."""
+    parts = []
+    for joint in list(model.joints)[1:]:
+        own, way = q[joint.idx_q : joint.idx_q + joint.nq], x[joint.idx_v : joint.idx_v + joint.nv]
+        if joint.nq == 1:
+            parts.append(own + way)
+            continue
+        slip, spin = along_axes(joint, way)
+        turn, place = moved(joint, own)
+        if joint.nq == 7:
+            parts.append(place + turn @ (slip + casadi.cross(spin, slip) / 2))
+        v, w, half = own[-4:-1], own[-1], spin / 2
+        cosine = 1 - casadi.dot(half, half) / 2
+        parts.append(cosine * v + w * half + casadi.cross(v, half))
+        parts.append(cosine * w - casadi.dot(v, half))
+    return casadi.vertcat(*parts)
 
 
 def torques(model, q, qd, qdd, gravity):

@@ -1,0 +1,60 @@
+"""Second derivatives of the weighted torques of inverse dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivatives
+from psdmc.program.signature import QD, QDD, Q, Signature
+from psdmc.recipes.directions import COTANGENT, hessian_of, weighted
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    q, qd, qdd, weights = (g.inputs[name] for name in ("q", "qd", "qdd", COTANGENT.name))
+    found = inverse_dynamics_second_derivatives(
+        g.frames, g.bodies, q, qd, qdd, weights, g.base_acceleration, g.choices
+    )
+    return {"hessian": found.hessian}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    states = [given[name] for name in ("q", "qd", "qdd", COTANGENT.name)]
+    return {"hessian": robot.torque_hessian(*states)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """Differences of the gradient."""
+
+    def gradient(*states: Array) -> list[Array]:
+        return [
+            weighted(given[COTANGENT.name], block) for block in robot.inverse_dynamics_derivatives(*states)
+        ]
+
+    return {"hessian": robot.second_derivatives(gradient, *(given[name] for name in ("q", "qd", "qdd")))}
+
+
+RECIPE = Recipe(
+    Signature(
+        "inverse_dynamics_second_derivatives",
+        198,
+        "symmetric matrix of second derivatives of cotangent . tau by (q, qd, qdd)",
+        (Q, QD, QDD, COTANGENT),
+        (hessian_of(QDD, "nxa"),),
+        theta=True,
+        summary="Compute the second derivatives of the sum of cotangent[i] * tau[i] by q, qd and qdd.",
+    ),
+    "second derivatives of inverse dynamics",
+    trace,
+    reference,
+    "computeRNEADerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+    in_limbs=True,
+)
