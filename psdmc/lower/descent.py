@@ -13,8 +13,8 @@ ROUNDING = 1e-6
 
 
 class Descent:
-    """The state of a search: the cheapest arrangement so far, and the number of candidates that may still be tried. An
-    arrangement is a choice of frames, parameters and recursion."""
+    """The state of a search: the cheapest form of the code so far, and how many candidates may still be tried. The form
+    is a choice of link frames, nonzero link parameters and options of the recursion (an arrangement)."""
 
     arrangement: Arrangement
 

@@ -119,8 +119,9 @@ class LimbSearch:
         self._weights: ByChoices[float] = ByChoices()
 
     def best(self, start: Arrangement) -> LimbArrangement | None:
-        """Return the cheapest arrangement (frames, parameters) with limbs in SIMD lanes, searched from `start`. Return
-        None if the function or the target processor does not allow any."""
+        """Return the cheapest form of the code that computes limbs (such as legs) in SIMD lanes, one limb per lane. The
+        search for link frames and nonzero link parameters begins at `start`. Return None if the function or the target
+        processor does not allow any."""
         if not self.costs.has_vectors or self._is_eliminated(start):
             return None
         ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]

@@ -197,7 +197,8 @@ class Search:
         return best
 
     def uncarried(self, reframed: Reframed) -> Arrangement:
-        """Return the arrangement with these frames in which no link parameter represents another one.
+        """Return a form of the code (an arrangement) with the given link frames, in which no link parameter represents
+        another one.
 
         Carriers (parameters that represent others) are chosen by the columns of all joints' torques together. On robots
         of many scales, a small joint's part of these columns is so small that its digits are lost. The returned

@@ -147,8 +147,8 @@ def _is_text(entry: Mapping[str, Any], key: str) -> bool:
 def _friction(
     value: object, chain: Mechanism, offsets: bool, folder: Path | None, faults: list[str]
 ) -> tuple[tuple[Effect, ...], Content]:
-    """The effects of `friction`, and the table with what it says of offsets and the laws themselves. A text or a list of
-    texts names users' own laws, which all joints have."""
+    """Return what the key `friction` of a log description adds to the motor torques. Also return the table of `friction`,
+    completed with offsets and the laws themselves. A text or a list of texts names users' own laws, for all joints."""
     if isinstance(value, str) or (
         isinstance(value, list) and value and all(isinstance(x, str) for x in value)
     ):
