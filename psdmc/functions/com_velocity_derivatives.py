@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from psdmc.dynamics.centroidal import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
-from psdmc.functions import com_jacobian
+from psdmc.functions import centroidal_momentum_derivatives
 from psdmc.functions.com_velocity import INPUTS, VELOCITY
 from psdmc.program.signature import Signature, derivative_of
 from psdmc.recipes.placed import PlacedRobot, on_both
@@ -28,15 +26,11 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:
-        pin.computeForwardKinematicsDerivatives(model, data, q, qd, np.zeros(model.nv))
-        pin.centerOfMass(model, data, q, qd)
-        return np.reshape(pin.getCenterOfMassVelocityDerivatives(model, data), (3, model.nv))
-
-    by_qd = com_jacobian.RECIPE.pinocchio(robot, given)["J"]
-    return {"dv_dq": robot.each(slopes, given["q"], given["qd"]), "dv_dqd": by_qd}
+    """Divide Pinocchio's derivatives of the momentum by the mass. Its getCenterOfMassVelocityDerivatives divides by the
+    masses of subtrees, and returns NaN if a last link has none."""
+    found = centroidal_momentum_derivatives.RECIPE.pinocchio(robot, given)
+    mass = sum(inertia.mass for inertia in list(robot.model.inertias)[1:])
+    return {"dv_dq": found["dh_dq"][:, :3] / mass, "dv_dqd": found["dh_dqd"][:, :3] / mass}
 
 
 RECIPE = Recipe(
@@ -52,7 +46,7 @@ RECIPE = Recipe(
     ),
     "derivatives of the centre of mass's velocity",
     *on_both(values, INPUTS),
-    "getCenterOfMassVelocityDerivatives",
+    "computeCentroidalDynamicsDerivatives",
     pinocchio,
     needs=Needs.STANDARD,
     beside="com_jacobian",

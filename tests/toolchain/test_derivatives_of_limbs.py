@@ -94,10 +94,14 @@ def test_derivatives_are_pinocchios_in_every_layout(
     variants = {"": []} | ({"_theta": [theta_b]} if functions is INVERSE else {})
     for function in functions:
         expected = RECIPES[function].pinocchio(oracle, {k: v.astype(float) for k, v in given.items()})
+        exact = EXACT[real]
+        if function.startswith("forward_dynamics_second_derivatives"):  # solves with the mass matrix twice
+            worst = np.linalg.cond(oracle.mass_matrix(given["q"].astype(float))).max()
+            exact = max(exact, 2 * sizes.nv * float(worst) * float(np.finfo(real).eps))
         for way, found in _every_layout(compiled, package, function, given, sizes, variants):
             for block, values in expected.items():
                 error = np.abs(found[block].reshape(values.shape) - values).max()
-                assert error <= EXACT[real] * np.abs(values).max(), (function, way, block)
+                assert error <= exact * np.abs(values).max(), (function, way, block)
 
 
 def _states(tree: RandomTree, sizes: Sizes, real: str) -> dict[str, np.ndarray]:

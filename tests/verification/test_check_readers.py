@@ -12,6 +12,7 @@ from slow_cases import slow_but_for
 
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.provenance import provenance
+from psdmc.functions import RECIPES
 from psdmc.robot import dh_chain, urdf_chain
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement
@@ -25,20 +26,12 @@ BODY = (
 )
 
 
-OF_THE_TIP = (
-    "Jacobian",
-    "forward kinematics",
-    "frame Jacobian",
-    "frame drift",
-    "derivatives of frame velocities",
-    "inverse dynamics with wrenches",
-    "operational-space inertia",
-    "contact Jacobian",
-    "contact drift",
-    "Delassus matrix",
-    "constrained forward dynamics",
-    "impulses of an impact",
-)
+OF_THE_TIP = {
+    recipe.title
+    for recipe in RECIPES.values()
+    if {"frames", "contacts", "contact_rows"}
+    & {axis for each in (*recipe.signature.inputs, *recipe.signature.outputs) for axis in each.axes}
+} | {"Jacobian"}
 """Functions that a frame's place matters to."""
 
 

@@ -135,7 +135,7 @@ class Derived:
             outputs=tuple(outputs),
             products=(),
             thin=(),
-            calls=None,
+            calls=(),
             normalizes=True,
         )
         stored = _storing(program, [PIVOTS, *(quantity.name for quantity in outputs)])
