@@ -29,23 +29,33 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
     program_matches_pinocchio(NAME, robot)
 
 
-@pytest.mark.parametrize("name", ["two", "small"])
+@pytest.mark.parametrize("name", ["two", pytest.param("small", marks=pytest.mark.slow)])
 def test_along_tangents_it_is_pinocchios(name: str) -> None:
     is_pinocchios(NAME, name, 1e-9, in_c=name == "small")
 
 
-@settings(max_examples=12)
-@given(trees())
-def test_of_random_trees_it_is_casadis(own: HessianTree) -> None:
+def is_casadis(own: HessianTree) -> None:
     found = RECIPES[NAME].reference(own.arrays, own.given)["hessian"]
     assert error(found, own.expected("tau")) < EXACT
+
+
+@settings(max_examples=3)
+@given(trees())
+def test_of_random_trees_it_is_casadis(own: HessianTree) -> None:
+    is_casadis(own)
+
+
+@pytest.mark.slow
+@settings(max_examples=40)
+@given(trees())
+def test_of_many_random_trees_it_is_casadis(own: HessianTree) -> None:
+    is_casadis(own)
 
 
 @settings(max_examples=6)
 @given(followers())
 def test_of_trees_with_mimic_joints_it_is_casadis(own: HessianTree) -> None:
-    found = RECIPES[NAME].reference(own.arrays, own.given)["hessian"]
-    assert error(found, own.expected("tau")) < EXACT
+    is_casadis(own)
 
 
 def test_it_is_what_fifty_digit_differences_of_the_gradient_say() -> None:

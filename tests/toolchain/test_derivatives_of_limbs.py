@@ -25,7 +25,7 @@ from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import Placement
 from psdmc.robot.reference import Reference
 
-INVERSE, FORWARD = DERIVATIVES[:5], (*DERIVATIVES[5:], "forward_dynamics_second_derivatives")
+INVERSE, FORWARD, SECOND = DERIVATIVES[:5], DERIVATIVES[5:], ("forward_dynamics_second_derivatives",)
 COUNT = 11
 """States: no whole number of vectors."""
 
@@ -64,6 +64,7 @@ CASES = [
     *((name, INVERSE, "float64", "clang") for name in (EQUAL, UNEQUAL)),
     *((name, FORWARD, "float64", "gcc") for name in TREES),
     (UNEQUAL, FORWARD, "float64", "clang"),
+    *((name, SECOND, "float64", "gcc") for name in TREES),
 ]
 QUICK = [
     (EQUAL, FORWARD, "float64", "gcc"),
