@@ -453,7 +453,10 @@ class _Plan:
 
     @property
     def links(self) -> int:
-        """Return the number of links whose masses and inertias are multiplied by a random factor, which may be zero."""
+        """Return the number of links whose masses and inertias are multiplied by random factors.
+
+        The number is zero if the option `spread` is zero, because all factors are then one.
+        """
         return len(self.model.mechanism) if self.what.spread else 0
 
     def drawn(self, shares: Array) -> dict[str, Array]:

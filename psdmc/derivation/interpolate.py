@@ -43,9 +43,10 @@ def nodes(joint: JointType) -> Array:
 
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
-    """Return (len(q), size) the values at each position q of the `size` functions in a joint's degree-two polynomials.
+    """Return the values of a joint's basis functions at the joint positions q, in an array (len(q), size).
 
-    An example is 1, q, q^2.
+    The `size` basis functions have a degree of at most two in q, or in sin q and cos q. They are 1, q and q^2 for a
+    prismatic joint, and 1, sin q, cos q, sin q cos q and cos^2 q for a revolute joint.
     """
     rows = (q, sine(q), cosine(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)

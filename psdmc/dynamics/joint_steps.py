@@ -100,13 +100,18 @@ class Step:
     drift: Vector | None = None
 
     def to_link(self, v: Vector) -> Vector:
-        """Return a vector along the axes of `offset` and `velocity`, given along this joint's orientation (see the
-        class)."""
+        """Rotate the vector v from this joint's axes into the axes in which `offset` and `velocity` are given.
+
+        These are the axes of the parent's link. But if this joint and its parent share an orientation (`joins`), they
+        are the shared axes, and v is returned unchanged.
+        """
         return v if self.joins else to_previous(self.frame, inward(self.own, v))
 
     def to_orientation(self, v: Vector) -> Vector:
-        """Return a vector along the parent's orientation (see the class), given along the axes of `offset` and
-        `velocity`."""
+        """Rotate the vector v from the axes in which `offset` and `velocity` are given into the parent joint's axes.
+
+        If this joint and its parent share an orientation (`joins`), v is returned unchanged.
+        """
         return v if self.joins else inward(self.turn, v)
 
     def to_parent(self, wrench: Wrench) -> Wrench:

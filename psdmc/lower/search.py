@@ -197,12 +197,13 @@ class Search:
         return best
 
     def uncarried(self, reframed: Reframed) -> Arrangement:
-        """Return a form of the code (an arrangement) with the given link frames, in which no link parameter represents
-        another one.
+        """Return a form of the code (an arrangement) with the given link frames and with all link parameters that
+        theta_b contains.
 
-        Carriers (parameters that represent others) are chosen by the columns of all joints' torques together. On robots
-        of many scales, a small joint's part of these columns is so small that its digits are lost. The returned
-        arrangement keeps these digits.
+        Other arrangements set as many link parameters as possible to zero. The parameters left, called carriers, take
+        over the effects of the others on the torques. psdmc chooses carriers from the matrix A in tau = A x, where x has
+        all link parameters. A column of A has entries for all joints. The entry of a joint with tiny torques can be so
+        small beside the others that rounding spoils its digits. The returned arrangement keeps these digits.
         """
         carriers, transfer = every_parameter(reframed, self.robot.representative)
         return Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0], is_basis=False)

@@ -33,8 +33,10 @@ WHOLE = "All"
 
 
 class Remark(str):
-    """A sentence for people, with a code by which programs recognise it. The code is empty if no program depends on the
-    sentence."""
+    """A sentence for people, with `code`, a machine-readable identifier by which programs recognise the sentence.
+
+    `code` is empty if no program depends on the sentence.
+    """
 
     code: str
 
@@ -45,8 +47,10 @@ class Remark(str):
 
 
 def code_of(text: str) -> str:
-    """Return the code of a sentence that is a Remark (sentence with a code for programs); empty for any other
-    sentence."""
+    """Return the machine-readable identifier of a sentence, such as 'weak', by which programs recognise the sentence.
+
+    Only a Remark (a sentence with an identifier) has one. For any other sentence, the result is an empty string.
+    """
     return getattr(text, "code", "")
 
 

@@ -14,20 +14,20 @@ from psdmc.program.signature import Signature
 class Kernel:
     """A generated function and the PROGRAMs (lists of scalar operations) that compute it.
 
-    function  which quantities it reads and writes
-    theta     whether it also reads theta_b, the base parameters, at run time
-    single    operations for one state, in the best order for one state; empty if `regions` are too long to be written
-              out
-    batch     operations for one state in each SIMD lane (slot of a vector), in the best order for lanes; may be the
-              object `single`
-    lowering  the method that made it: 'expanded' (from polynomials) or 'factored' (from recursive algorithms)
-    before    if matrix products at the function's end are computed in loops: the operations before these loops, used
-              for one state and for lanes. `single` and `batch` have the products written out
-    places    for a function whose output is a vector of matrix entries: (row, column) of each entry
-    limbs     the function for one state, with equal limbs (such as legs) in the lanes of vectors, if that is cheaper on
-              some machine; else None
-    regions   the function as loops and calls of other functions, from which C is printed; None: C is printed from
-              `single` and `batch`
+    function  name, inputs and outputs of the function
+    theta     True: the base parameters theta_b are an argument of the function; False: they are no argument
+    single    PROGRAM for one state, in the best order for one state; has no outputs if the code only calls other
+              functions in loops
+    batch     PROGRAM for code that computes one state per SIMD lane (slot of a vector), in the best order for such code;
+              may be the object `single`
+    lowering  how the operations were found: 'expanded' (from polynomials) or 'factored' (from recursive algorithms)
+    before    PROGRAM without the matrix products at the function's end, if the C code computes these products in loops;
+              else None. `single` and `batch` contain the products
+    limbs     code for one state that computes equal limbs, such as legs, in the lanes of SIMD vectors; None: such code
+              is cheaper on no machine
+    places    (row, column) of each entry of the output, for a function that returns matrix entries as a vector
+    regions   loops, and calls of other functions, from which the C code is printed; None: the C code is printed from the
+              other fields
     """
 
     function: Signature

@@ -1,8 +1,10 @@
-"""The cost of a function with limbs, stage by stage. A stage is a part that equal limbs, or the core outside the limbs,
-compute. Costs are counted on PROGRAMs (lists of operations), or on a trace that is not yet a PROGRAM.
+"""Counts the operations of code that computes equal limbs, such as legs, at the same time. The code is a sequence of
+stages. A stage computes values of one group of equal limbs, or values of the core (all joints outside the limbs).
 
-A search compares some hundred arrangements, and only the cheapest are divided into stages. The cost of a trace equals
-the cost of the stages that `limb_stages.staged` would return.
+Operations are counted on PROGRAMs (lists of operations to generate), or on traces (recorded operations that are not yet
+divided into stages). To find the cheapest code, psdmc compares hundreds of possible forms of the code. It counts the
+operations of most forms on their traces, because to divide a trace into stages takes longer. The number of operations
+of a trace equals that of the stages that `limb_stages.staged` would return.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def semi_implicit(
 
     by_q, by_qd, by_tau   derivatives (nv, nv) of the accelerations
     slopes                for each joint of several rates, such as a ball joint, the derivatives of the new position by
-                          the old one and by the motion; None for a joint of one rate
+                          the old position and by the displacement (rates times dt); None for a joint of one rate
 
     Changes of the state are small motions along the joint rates. They are d qd_next = d qd + dt d qdd and, for joints
     of one rate, d q_next = d q + dt d qd_next.
@@ -120,9 +120,13 @@ def semi_implicit_on_arrays(
     by_q: Array, by_qd: Array, by_tau: Array, dt: Array, slopes: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Return the Jacobians A (k, 2 nv, 2 nv) and B (k, 2 nv, nv) of a semi-implicit Euler step for k states, in NumPy.
-    They are products of the Jacobians of two parts: the change of rates, then the change of positions.
+    A semi-implicit Euler step changes the joint rates first, then the positions. A and B are products of the Jacobians
+    of these two changes.
 
-    `slopes` are two arrays (k, nv, nv): the derivatives of the new position by the old one and by the motion.
+    by_q, by_qd, by_tau  derivatives (k, nv, nv) of the joint accelerations by positions, rates and torques
+    dt                   (k, 1) lengths of the steps, s
+    slopes               two arrays (k, nv, nv): derivatives of the new positions by the old positions, and by the
+                         displacements (new joint rates times dt)
     """
     by_start, by_way = slopes
     n, h = by_q.shape[-1], dt[..., None]
@@ -134,8 +138,11 @@ def semi_implicit_on_arrays(
 
 
 def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:
-    """Return the derivatives of the new position of a motion at constant rates, two arrays (k, nv, nv) for k states.
-    The first is by the old position, the second by the motion `way` (k, nv), which is rates times duration."""
+    """Return the derivatives of joint positions after a motion at constant joint rates, for k states.
+
+    The result is two arrays (k, nv, nv). The first has the derivatives by the positions before the motion. The second
+    has the derivatives by the displacements `way` (k, nv), which are the joint rates times the duration.
+    """
     count, nv = way.shape
     by_start, by_way = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
     first = first_rates(frames)

@@ -71,10 +71,14 @@ class Body:
     """A body in the 3D picture: the position of its centre of mass, and the ellipsoid that shows its inertia.
 
     joint      number of the joint frame with which the body moves
-    mass       kg; com (3,) m in the joint frame; place (3,) m, the centre of mass in the frame of the link
-    half_axes  (3,) m, semi-axes of the solid ellipsoid of this mass and inertia, ascending; zero if there is none
-    root       (3, 3) m, symmetric: maps the unit sphere to the ellipsoid about `com`, in the joint frame
-    fault      why no real body has this mass and inertia; "" for all others
+    mass       kg
+    com        (3,) m, centre of mass in the joint frame
+    place      (3,) m, the centre of mass again, but in the frame of the link
+    half_axes  (3,) m, ascending: semi-axes of the solid ellipsoid that has this mass and inertia; zero for a
+               semi-axis whose square would be negative
+    root       (3, 3) m, symmetric matrix in the joint frame: com + root u, for all unit vectors u, is the surface of the
+               ellipsoid
+    fault      text that says why no real body can have this mass and inertia; empty if no fault was found
     """
 
     link: str

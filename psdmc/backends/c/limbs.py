@@ -203,8 +203,9 @@ class StageView:
 
 @dataclass(frozen=True, slots=True)
 class SharesView:
-    """The rows of one group of limbs in a matrix product after a function with limbs (such as legs). In these rows, an
-    output is Y - T x.
+    """The code of the rows of one group of equal limbs, such as legs, in an output matrix. ThinView explains the matrix.
+
+    The rows are Y - T x, where x are rows of the core (all joints outside the limbs).
 
     vector   C name of the factor T
     width    number of limbs
@@ -220,18 +221,26 @@ class SharesView:
 
 @dataclass(frozen=True, slots=True)
 class ThinView:
-    """The matrix products at the end of a function with limbs (such as legs). For the core (everything outside limbs),
-    the rows of an n x n output are x = -V E. For a limb, they are Y - T x.
+    """The C code that finishes X = -M^-1 D, with the mass matrix M (n, n) of a robot with limbs, such as legs.
 
-    arrays   names and lengths of the vectors with V, T and E
-    outputs  names of the output matrices
-    rights   names of the right factors E
-    known    for each output, how many of its first columns are stored already
-    n        number of columns
-    places   where the core's rows begin in an output
-    begins   where the core's rows begin in E
-    rows     C text of the core's rows
-    groups   rows of the limbs, group by group
+    If X is the inverse mass matrix, D is minus the identity. If X has derivatives of accelerations, D has derivatives
+    of torques. The rows c of M belong to the core (all joints outside the limbs), and the rows l to one limb. Earlier
+    code has eliminated the limbs, which gives these matrices:
+
+        T = M_ll^-1 M_lc        V = (M_cc - sum over limbs of M_cl T)^-1
+        Y = -M_ll^-1 D_l        E = D_c - sum over limbs of T^T D_l
+
+    The code here computes the rows X_c = -V E of the core, and then the rows X_l = Y - T X_c of each limb.
+
+    arrays   names and lengths of the C arrays of V, T and E
+    outputs  names of the output matrices X; at first, their rows of limbs contain Y
+    rights   for each output, the name of the array E
+    known    for each output, how many of its first columns are complete already
+    n        number of columns of an output
+    places   for each row of the core, the index of its first entry in an output
+    begins   for each row of the core, the index of its first entry in E
+    rows     for each row of the core, C text of the row's entry of V E
+    groups   for each group of equal limbs, the code of the limbs' rows
     """
 
     arrays: tuple[tuple[str, int], ...]

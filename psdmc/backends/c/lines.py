@@ -104,8 +104,12 @@ class Cleared:
 
 @dataclass(frozen=True, slots=True)
 class GroupStore:
-    """A C statement `vector[index ...] = texts` that stores several outputs at once, in batch code that writes into the
-    rows of the output array. Other code stores these outputs one by one."""
+    """One C statement that stores four neighbouring outputs, `vector[index]` to `vector[index + 3]`.
+
+    The statement is a call of the macro STORE_GROUP with the C texts of the four values. It takes effect in code that
+    computes one state per SIMD lane and writes each state into a row of the output array. In all other code, the
+    macro does nothing, and one statement per output (class Store) stores the values.
+    """
 
     vector: str
     index: int

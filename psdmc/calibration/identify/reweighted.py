@@ -43,7 +43,11 @@ def squares(n: int, variance: float) -> Sandwich:
 
 
 def huber_sandwich(weighted: Array, use: NDArray[np.bool_], bound: float, share: float) -> Sandwich:
-    """Return the covariance factors of a fit with Huber's weights, which reduce the effect of outliers.
+    """Return the factors that change the covariance of least squares into that of a fit with Huber's weights.
+
+    Huber's weights reduce the effect of outliers. Each of the n joints (columns of `weighted`) has one factor for the
+    matrix B and one for the matrix C of the covariance B^-1 C B^-1 (see the class Sandwich). One more factor, `unit`,
+    is for all joints together. It multiplies the inverse of the sum of w x x' over the fit's rows x with weights w.
 
     weighted  (N, n) sqrt(w) u: residuals u in standard deviations times the root of their weights w
     use       (N, n) True: the sample is used

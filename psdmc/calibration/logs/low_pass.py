@@ -116,7 +116,11 @@ def position_noise(position: Array, filtered: Array, in_band: float) -> Array:
 
 
 def smallest_steps(position: Array) -> Array:
-    """Return the smallest difference (n,) between two readings: the encoder's step for a joint that hardly moves."""
+    """Return for each joint the smallest difference (n,) between two different position readings, rad or m.
+
+    The result is zero for a joint whose readings are all equal. If a joint hardly moves, its readings are neighbouring
+    counts of the encoder. The smallest difference is then one encoder step.
+    """
     steps = np.zeros(position.shape[1])
     for k, column in enumerate(position.T):
         values = np.unique(column)

@@ -106,8 +106,16 @@ class Harness:
 
 @dataclass(frozen=True, slots=True)
 class PlantRow:
-    """One joint of a standard DH table with its link; m, rad, kg, kg m^2 about the centre of mass, along the link's
-    frame."""
+    """One joint of a standard DH table, and the link after the joint.
+
+    slides         True: prismatic joint; False: revolute joint
+    a, d           m, lengths of the DH convention
+    alpha, theta   rad, angles of the DH convention
+    drive_inertia  kg m^2, or kg for a prismatic joint
+    mass           kg
+    com            m, centre of mass of the link in the link's frame
+    inertia_com    kg m^2, inertia matrix of the link about its centre of mass, along the axes of the link's frame
+    """
 
     name: str
     slides: bool

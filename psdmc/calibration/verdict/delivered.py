@@ -1,8 +1,9 @@
-"""Measures how well a calibrated model file predicts logs. All figures are computed from the content of the file, and
-none from the fit.
+"""Computes how well the torques that a calibrated model file predicts agree with measured torques of logs. All
+predicted torques are computed anew from the numbers in the file. The torques and errors that the fit computed are not used.
 
-For a calibration from plain logs, torques come from the Newton-Euler algorithm on the file's theta_b, and not from the
-regressor.
+The logs may be runs of a campaign: motor, gravity, friction and inertia runs that psdmc plans. For these runs, the
+torques of the bodies come from the regressor, the matrix Y in tau = Y theta_b with the base parameters theta_b of the
+file. For other logs, the torques of the bodies come from the Newton-Euler algorithm instead.
 """
 
 from __future__ import annotations
