@@ -22,8 +22,14 @@ from psdmc.robot.reference import OnCoordinates
 STATES = 100
 SEED = 14_631
 
-FEW = 8
-"""States of second derivatives, whose oracle, differences of Pinocchio's derivatives, takes 8 to 24 calls per joint."""
+FEW, SLOW = 8, ("second_derivatives", "rk4_step_derivatives")
+"""States of functions with such words in their names, whose comparison takes long."""
+
+MOST_RATES = 24
+"""Joint rates up to which second derivatives are compared: each rate takes 2 to 8 calls of Pinocchio's derivatives."""
+
+PACKED = {recipe.packs.function for recipe in RECIPES.values() if recipe.packs is not None}
+"""Functions whose values another function packs."""
 
 NOTHING = 1e-9
 """Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot
@@ -49,6 +55,7 @@ def function_errors(
     arrays = RobotOnArrays.of(model, theta)
     # States and all else that functions read, (STATES, ...) each.
     rng = np.random.default_rng(SEED)
+    known: dict[str, Mapping[str, Array]] = {}
     chain = model.mechanism
     sizes = Sizes(
         model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=chain.rows_of_contacts
@@ -63,8 +70,12 @@ def function_errors(
         if recipe.polynomials is not None:
             continue
         lack = _lacking(model, recipe, robot, solvable)
-        states = few if "second_derivatives" in recipe.signature.name else given
-        yield recipe, np.nan if lack else _error(recipe, arrays, robot, states, theta, least), lack or ""
+        states = few if any(word in recipe.signature.name for word in SLOW) else given
+        yield (
+            recipe,
+            np.nan if lack else _error(recipe, arrays, robot, states, theta, least, known),
+            lack or "",
+        )
 
 
 def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvable: bool) -> str | None:
@@ -73,6 +84,8 @@ def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvabl
         return lack_of_standard_parameters(model)
     if recipe.needs is Needs.POSITIVE_MASS and not solvable:
         return "the mass matrix is singular"
+    if "second_derivatives" in recipe.signature.name and model.nv > MOST_RATES:
+        return f"differences of Pinocchio's derivatives take long with more than {MOST_RATES} joint rates"
     # From positions to positions, or to the way between them.
     places = not recipe.signature.theta and all(
         q.axes in (("nq",), ("nv",), ("nv", "nq")) for q in recipe.signature.outputs
@@ -91,13 +104,21 @@ def _error(
     given: Mapping[str, Array],
     theta: Array,
     least: float,
+    known: dict[str, Mapping[str, Array]] | None = None,
 ) -> float:
+    """The largest error of a function. `known` keeps the expected values of functions that others pack."""
     with in_any_order():
         found = recipe.reference(arrays, given)
     if recipe.packs is not None:
         packing, recipe = recipe.packs, RECIPES[recipe.packs.function]
         found = unpacked(packing, recipe, arrays, found[VALUES.name])
-    expected = _expected(recipe, robot, given)
+    known, name = {} if known is None else known, recipe.signature.name if known is not None else ""
+    expected = known.get(name)
+    if expected is None:
+        with in_any_order():
+            expected = _expected(recipe, robot, given)
+    if name in PACKED:
+        known[name] = expected
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
     if recipe.gradient is not None:
