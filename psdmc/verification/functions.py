@@ -22,14 +22,12 @@ from psdmc.robot.reference import OnCoordinates
 STATES = 100
 SEED = 14_631
 
-FEW, SLOW = 8, ("second_derivatives", "rk4_step_derivatives")
-"""States of functions with such words in their names, whose comparison takes long."""
+FEW, SLOW = 8, ("second_derivatives", "with_wrenches_")
+"""States of functions with such words in their names: second derivatives, whose expected values are differences of
+Pinocchio's derivatives, and derivatives under wrenches, which share the recursion of those without."""
 
 MOST_RATES = 24
 """Joint rates up to which second derivatives are compared: each rate takes 2 to 8 calls of Pinocchio's derivatives."""
-
-PACKED = {recipe.packs.function for recipe in RECIPES.values() if recipe.packs is not None}
-"""Functions whose values another function packs."""
 
 NOTHING = 1e-9
 """Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot
@@ -55,7 +53,6 @@ def function_errors(
     arrays = RobotOnArrays.of(model, theta)
     # States and all else that functions read, (STATES, ...) each.
     rng = np.random.default_rng(SEED)
-    known: dict[str, Mapping[str, Array]] = {}
     chain = model.mechanism
     sizes = Sizes(
         model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=chain.rows_of_contacts
@@ -73,7 +70,7 @@ def function_errors(
         states = few if any(word in recipe.signature.name for word in SLOW) else given
         yield (
             recipe,
-            np.nan if lack else _error(recipe, arrays, robot, states, theta, least, known),
+            np.nan if lack else _error(recipe, arrays, robot, states, theta, least),
             lack or "",
         )
 
@@ -104,21 +101,14 @@ def _error(
     given: Mapping[str, Array],
     theta: Array,
     least: float,
-    known: dict[str, Mapping[str, Array]] | None = None,
 ) -> float:
-    """The largest error of a function. `known` keeps the expected values of functions that others pack."""
     with in_any_order():
         found = recipe.reference(arrays, given)
     if recipe.packs is not None:
         packing, recipe = recipe.packs, RECIPES[recipe.packs.function]
         found = unpacked(packing, recipe, arrays, found[VALUES.name])
-    known, name = {} if known is None else known, recipe.signature.name if known is not None else ""
-    expected = known.get(name)
-    if expected is None:
-        with in_any_order():
-            expected = _expected(recipe, robot, given)
-    if name in PACKED:
-        known[name] = expected
+    with in_any_order():
+        expected = _expected(recipe, robot, given)
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
     if recipe.gradient is not None:
