@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
+from psdmc.dynamics.slices import first_rates, leading
+from psdmc.dynamics.solve import inner_product
 from psdmc.dynamics.tangent_steps import step_slopes
 from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
+from psdmc.program.regions import Call, Column, For, Reader, Region, Regions, Slice, straight
 from psdmc.program.signature import Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -29,6 +33,10 @@ if TYPE_CHECKING:
 STEP = semi_implicit_euler.RECIPE
 ACCELERATIONS = forward_dynamics_derivatives.RECIPE
 
+STRAIGHT = 8
+"""Rates up to which the C is a straight line, so that batches have lanes. Of more rates, the derivatives of forward dynamics
+are called: their function keeps equal limbs in lanes, and products in loops."""
+
 
 def trace(g: Ingredients) -> Outputs:
     (dt,) = g.inputs[DT.name]
@@ -43,6 +51,103 @@ def trace(g: Ingredients) -> Outputs:
         "B": by_torque,
         "pivot": found["pivot"],
     }
+
+
+def regions(frames: Sequence[Frame]) -> Regions | None:
+    """Return the function's body as a call of forward dynamics' derivatives and loops, for robots of more rates than
+    STRAIGHT. The arrays are:
+
+    by_q, by_qd, by_tau  nv x nv, derivatives of the accelerations
+    step                 dt
+    start_J, way_J       of joint J of n rates, n x n: derivatives of the new position by the old one, and by the new
+                         rates
+    """
+    first = first_rates(frames)
+    nv = first[-1]
+    if nv <= STRAIGHT:
+        return None
+    wide = {i: frame.joint.nv for i, frame in enumerate(leading(frames)) if frame.joint.nv > 1}
+
+    def stepped_state(read: Reader) -> dict[str, Column]:
+        (dt,) = read(DT.name, 1)
+        rates = stepped(read("qd", nv), read("qdd", nv), dt)
+        nq = sum(frame.joint.nq for frame in leading(frames))
+        q_next = integrated(frames, read("q", nq), [dt * rate for rate in rates])
+        found = {"q_next": q_next, "qd_next": rates, "step": [dt]}
+        for i, own in enumerate(step_slopes(frames, rates, dt)):
+            if own is not None:
+                found[f"start_{i}"] = [x for row in own.by_start for x in row]
+                found[f"way_{i}"] = [dt * x for row in own.by_way for x in row]
+        return {name: Column(values) for name, values in found.items()}
+
+    blocks = (("by_q", "A", 0, 2 * nv), ("by_qd", "A", nv, 2 * nv), ("by_tau", "B", 0, nv))
+    arrays = {"qdd": nv, "step": 1, **{name: nv * nv for name, *_ in blocks}}
+    arrays |= {f"{name}_{i}": n * n for i, n in wide.items() for name in ("start", "way")}
+    body: tuple[Region, ...] = (
+        Call(
+            ACCELERATIONS.name,
+            (("q", 0), ("qd", 0), ("tau", 0)),
+            (("qdd", 0), *((name, 0) for name, *_ in blocks)),
+            nv,
+        ),
+        straight(stepped_state),
+        *(_scaled(nv, *block) for block in blocks),
+        _plus_unit(nv, nv * 2 * nv + nv, 2 * nv),
+        *_positions(first, wide, nv),
+    )
+    return Regions(arrays, body)
+
+
+def _scaled(nv: int, block: str, into: str, column: int, width: int) -> For:
+    """Rows of the new rates: derivatives of the accelerations times dt."""
+
+    def scaled(read: Reader) -> dict[str, Column]:
+        return {"entry": Column([read("step", 1)[0] * read("own", 1)[0]])}
+
+    rows = Slice("row", block, 0, nv), Slice("target", into, nv * width + column, width)
+    return For(nv, rows, (For(nv, (Slice("own", "row"), Slice("entry", "target")), (straight(scaled),)),))
+
+
+def _positions(first: Sequence[int], wide: Mapping[int, int], nv: int) -> Iterator[For]:
+    """Rows of the new positions: what rates' rows move them by, and one by the old position. Neighbouring joints of one
+    rate share a loop. `wide` has the number of rates of the other joints."""
+
+    def moved(read: Reader) -> dict[str, Column]:
+        return {"entry": Column([read("step", 1)[0] * read("rate", 1)[0]])}
+
+    starts = [0, *(first[i + 1] for i in wide)]
+    for start, end in zip(starts, [*(first[i] for i in wide), nv], strict=True):
+        for matrix, width in (("A", 2 * nv), ("B", nv)) if end > start else ():
+            rows = Slice("entry", matrix, start * width), Slice("rate", matrix, (nv + start) * width)
+            yield For((end - start) * width, rows, (straight(moved),))
+        if end > start:
+            yield _plus_unit(end - start, start * 2 * nv + start, 2 * nv)
+    for i, n in wide.items():
+        for matrix, width in (("A", 2 * nv), ("B", nv)):
+            yield _turned(i, n, first[i], matrix, width, nv)
+        block = Slice("target", "A", first[i] * 2 * nv + first[i], 2 * nv), Slice("row", f"start_{i}", 0, n)
+        yield For(n, block, (For(n, (Slice("entry", "target"), Slice("own", "row")), (straight(_added),)),))
+
+
+def _turned(i: int, n: int, first: int, matrix: str, width: int, nv: int) -> For:
+    """Columns of the new position of a joint of several rates."""
+
+    def turned(read: Reader) -> dict[str, Column]:
+        way, rates = read(f"way_{i}", n * n), read("rate", n, width)
+        return {"entry": Column([inner_product(way[k * n : k * n + n], rates) for k in range(n)], width)}
+
+    columns = Slice("entry", matrix, first * width), Slice("rate", matrix, (nv + first) * width)
+    return For(width, columns, (straight(turned),))
+
+
+def _added(read: Reader) -> dict[str, Column]:
+    return {"entry": Column([read("entry", 1)[0] + read("own", 1)[0]])}
+
+
+def _plus_unit(count: int, first: int, width: int) -> For:
+    """One more in each entry of A's diagonal block."""
+    one = straight(lambda read: {"entry": Column([read("entry", 1)[0] + 1.0])})
+    return For(count, (Slice("entry", "A", first, width + 1),), (one,))
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -74,6 +179,7 @@ RECIPE = Recipe(
         summary="Compute the state after one step of semi-implicit Euler, and that state's derivatives by q, qd and tau.",
         factorises=STEP.signature.factorises,
         spoilt=STEP.signature.spoilt,
+        calls=(ACCELERATIONS.name,),
     ),
     "Jacobians of a step of semi-implicit Euler",
     trace,
@@ -81,4 +187,5 @@ RECIPE = Recipe(
     "aba, computeABADerivatives, dIntegrate",
     pinocchio,
     shares="inverse_dynamics",
+    regions=regions,
 )

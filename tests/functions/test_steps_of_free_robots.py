@@ -57,10 +57,10 @@ def test_a_step_is_pinocchios(function: str, name: str) -> None:
     is_pinocchios(function, name, exact=1e-9, in_c=False)
 
 
-@pytest.mark.parametrize("name", ["hand", *(["small"] if WHOLE else [])])
+@pytest.mark.parametrize("name", ["two", "hand", *(["small", "free"] if WHOLE else [])])
 def test_the_steps_jacobians_are_pinocchios(name: str) -> None:
-    """Chained from computeABADerivatives and dIntegrate."""
-    is_pinocchios("semi_implicit_euler_derivatives", name, exact=1e-9, in_c=name == "small")
+    """Chained from computeABADerivatives and dIntegrate. The C is a straight line (two) or calls and loops."""
+    is_pinocchios("semi_implicit_euler_derivatives", name, exact=1e-9)
 
 
 JACOBIANS = [
