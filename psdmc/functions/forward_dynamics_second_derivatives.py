@@ -40,7 +40,7 @@ from psdmc.recipes.directions import COTANGENT, COTANGENT_OF_QDD, hessian_of, we
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -70,7 +70,7 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, "pivot": pivots}
 
 
-def regions(frames: Sequence[Frame]) -> Regions | None:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions | None:
     """Calls and loops, of robots of more rates than STRAIGHT."""
     return _regions(frames) if _rates(frames) > STRAIGHT else None
 

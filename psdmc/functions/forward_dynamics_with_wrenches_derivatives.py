@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.named_frames import local_jacobians
+from psdmc.dynamics.scalar import ZERO, Scalar
+from psdmc.dynamics.slices import first_rates, leading
 from psdmc.dynamics.solve import inner_product
 from psdmc.functions import (
     forward_dynamics_derivatives,
     forward_dynamics_with_wrenches,
     inverse_dynamics_with_wrenches_derivatives,
 )
+from psdmc.program.regions import Call, Column, For, Reader, Regions, Slice, straight
 from psdmc.program.signature import QDD, Signature, derivative_of
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.recipes.wrenches import acceleration_derivatives, jacobians_transposed, loads, wrenches_on_links
+from psdmc.recipes.wrenches import (
+    WRENCHES,
+    acceleration_derivatives,
+    jacobians_transposed,
+    loads,
+    wrenches_of_links,
+    wrenches_on_links,
+)
 from psdmc.reproducible import inverse, times
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -24,6 +39,12 @@ if TYPE_CHECKING:
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE
 TORQUES = inverse_dynamics_with_wrenches_derivatives.RECIPE
 WITHOUT = forward_dynamics_derivatives.RECIPE.signature
+STRAIGHT = 8
+"""Rates up to which the C is a straight line, so that batches have lanes. Of more rates, the derivatives of forward dynamics
+without wrenches are called: their function keeps equal limbs in lanes."""
+
+MASSLESS = Body(0.0, ZERO, (0.0,) * 6)
+
 BLOCKS = tuple(derivative_of(QDD, quantity) for quantity in ACCELERATIONS.signature.inputs)
 
 
@@ -38,6 +59,94 @@ def trace(g: Ingredients) -> Outputs:
         [[inner_product(row, column) for column in frame] for frame in columns] for row in found["dqdd_dtau"]
     ]
     return {**found, "dqdd_dwrenches": by_wrenches}
+
+
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions | None:
+    """Return the function's body for robots of more rates than STRAIGHT. Wrenches w at the named frames act as the torques
+    J^T w, which are constant in the called derivatives of forward dynamics. Their derivatives by q add to the result.
+
+    The arrays are:
+
+    load  tau + J^T w
+    turn  nv x nv, d (J^T w) / d q
+    push  nv x 6 per named frame, J^T
+    """
+    nv = first_rates(frames)[-1]
+    if nv <= STRAIGHT:
+        return None
+    width = 6 * len(named)
+    rows: dict[str, list[tuple[int, ...]]] = {}
+
+    def loaded(read: Reader) -> dict[str, Column]:
+        q, wrenches = read("q", sum(frame.joint.nq for frame in leading(frames))), read(WRENCHES.name, width)
+        jacobians = local_jacobians(frames, named, q)
+        push = [[row[k] for each in jacobians for row in each] for k in range(nv)]
+        still, none = [0.0] * nv, [0.0] * len(frames)
+        massless = inverse_dynamics_derivatives(
+            frames,
+            [MASSLESS] * len(frames),
+            none,
+            q,
+            still,
+            still,
+            ZERO,
+            external=wrenches_of_links(named, wrenches),
+        )
+        turn = [[-x for x in row] for row in massless.by_q]
+        for name, matrix in (("turn", turn), ("push", push)):
+            rows[name] = [
+                tuple(k for k, x in enumerate(column) if not _is_zero(x))
+                for column in zip(*matrix, strict=True)
+            ]
+        load = [tau + inner_product(row, wrenches) for tau, row in zip(read("tau", nv), push, strict=True)]
+        stored = {"turn": [x for row in turn for x in row], "push": [x for row in push for x in row]}
+        return {name: Column(values) for name, values in {"load": load, **stored}.items()}
+
+    first = straight(loaded)
+    call = Call(
+        WITHOUT.name,
+        (("q", 0), ("qd", 0), ("load", 0)),
+        tuple((output.name, 0) for output in WITHOUT.outputs),
+        nv,
+    )
+    by_q, *_, by_wrenches = (block.name for block in BLOCKS)
+    return Regions(
+        {"load": nv, "turn": nv * nv, "push": nv * width},
+        (
+            first,
+            call,
+            *_products(rows["turn"], "turn", by_q, nv, added=True),
+            *_products(rows["push"], "push", by_wrenches, nv, added=False),
+        ),
+    )
+
+
+def _products(
+    kept: Sequence[tuple[int, ...]], matrix: str, output: str, nv: int, added: bool
+) -> Iterator[For]:
+    """M^-1 times a matrix, or its sum with the output. `kept` has each column's rows that are not zero. Neighbouring
+    columns with the same rows share a loop."""
+    width = len(kept)
+    for rows, numbers in groupby(range(width), key=kept.__getitem__):
+        own = tuple(numbers)
+        if added and not rows:
+            continue
+
+        def entry(read: Reader, rows: Sequence[int] = rows) -> dict[str, Column]:
+            inverse_row, column = read("inverse_i", nv, nv), read("column", nv, width)
+            total: Scalar = read("entry", 1)[0] if added else 0.0
+            for k in rows:
+                total = total + inverse_row[k] * column[k]
+            return {"entry": Column([total])}
+
+        inner = For(
+            nv, (Slice("inverse_i", "dqdd_dtau"), Slice("entry", "output", 0, width)), (straight(entry),)
+        )
+        yield For(len(own), (Slice("column", matrix, own[0]), Slice("output", output, own[0])), (inner,))
+
+
+def _is_zero(x: Scalar) -> bool:
+    return isinstance(x, float) and x == 0.0
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -68,6 +177,7 @@ RECIPE = Recipe(
         "tau and wrenches.",
         factorises=ACCELERATIONS.signature.factorises,
         products=WITHOUT.products,
+        calls=(WITHOUT.name,),
     ),
     "derivatives of forward dynamics with wrenches",
     trace,
@@ -75,4 +185,5 @@ RECIPE = Recipe(
     "computeABADerivatives with fext",
     pinocchio,
     shares="inverse_dynamics",
+    regions=regions,
 )

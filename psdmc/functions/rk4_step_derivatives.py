@@ -32,7 +32,7 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import A, B, step_on_arrays, stepped
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -65,7 +65,7 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, "pivot": pivots}
 
 
-def regions(frames: Sequence[Frame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions:
     """Return the function's body as loops and calls of forward dynamics: it computes the state after dt and its
     derivatives.
 

@@ -25,7 +25,7 @@ from psdmc.recipes.steps import (
     step_on_arrays,
     stepped,
 )
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -53,7 +53,7 @@ def trace(g: Ingredients) -> Outputs:
     }
 
 
-def regions(frames: Sequence[Frame]) -> Regions | None:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions | None:
     """Return the function's body as a call of forward dynamics' derivatives and loops, for robots of more rates than
     STRAIGHT. The arrays are:
 

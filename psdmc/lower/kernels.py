@@ -186,12 +186,14 @@ class _Lowered:
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
-        regions = recipe.regions(self.geometry.unmoved.frames) if recipe.regions else None
+        unmoved = self.geometry.unmoved
+        regions = recipe.regions(unmoved.frames, unmoved.named) if recipe.regions else None
         if regions is not None:
             program = NOTHING
             if self.model.nv <= TRACED:
                 arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
-                program = trace_dynamics(recipe, arranged, self._search(theta).robot)
+                traced = trace_dynamics(recipe, arranged, self._search(theta).robot)
+                program = written_out(traced, recipe.signature.products)
             return Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
         candidates: list[Kernel] = []
         expanded = self._expanded(recipe, theta) if self._may_expand(recipe) else None

@@ -163,8 +163,9 @@ class Recipe:
     benched      whether `make bench` measures the function
     packs        the entries of another function's matrix that the function stores. The code of the other function is
                  generated, and all other entries are left out. `trace` and `pinocchio` compute the whole matrix
-    regions      the function's body as loops and calls, from which C is printed; `trace` executes this body. None, also
-                 for one robot: C is printed from code without loops
+    regions      the function's body as loops and calls, from which C is printed; `trace` computes the same. It is made
+                 from the joint frames and the named frames. None, also for one robot: C is printed from code without
+                 loops
     """
 
     signature: Signature
@@ -187,7 +188,7 @@ class Recipe:
     default_where_wide: bool = False
     benched: bool = False
     packs: Packing | None = None
-    regions: Callable[[Sequence[Frame]], Regions | None] | None = None
+    regions: Callable[[Sequence[Frame], Sequence[NamedFrame]], Regions | None] | None = None
 
     def __post_init__(self) -> None:
         if self.needs is None and self.signature.factorises:

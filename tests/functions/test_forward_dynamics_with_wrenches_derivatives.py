@@ -20,7 +20,7 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
 
 
 def test_it_is_pinocchios_where_joints_have_several_coordinates() -> None:
-    is_pinocchios("forward_dynamics_with_wrenches_derivatives", "small", 1e-9, in_c=False)
+    is_pinocchios("forward_dynamics_with_wrenches_derivatives", "small", 1e-9)
 
 
 @pytest.mark.parametrize("robot", ["small", "hand"])
