@@ -48,9 +48,9 @@ RECIPE = Recipe(
         (Q, QD, TAU, WRENCHES),
         (QDD,),
         theta=True,
-        summary="Compute the joint accelerations that torques cause while external wrenches act on the named "
-        "frames: qdd = M(q)^-1 (tau + J^T wrenches - h(q, qd)). M is the mass matrix, h the sum of the Coriolis, "
-        "centrifugal and gravity torques, and J the Jacobian of the frames along their own axes.",
+        summary="Compute the joint accelerations that torques and external wrenches cause: qdd = M(q)^-1 (tau + J^T "
+        "wrenches - h(q, qd)). M is the mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, "
+        "and J the Jacobian of the named frames along their own axes.",
         factorises=(MASS_MATRIX,),
         spoilt="accelerations",
     ),

@@ -54,7 +54,7 @@ RECIPE = Recipe(
         (TAU, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD),
         theta=True,
         summary="Compute the torques tau of inverse dynamics, and the gradients by q, qd and qdd of a weighted sum "
-        "of them. The weighted sum is the sum of cotangent[i] * tau[i].",
+        "of tau. The weighted sum is the sum of cotangent[i] * tau[i].",
     ),
     "gradient of inverse dynamics",
     trace,

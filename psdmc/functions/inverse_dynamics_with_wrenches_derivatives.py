@@ -59,8 +59,8 @@ RECIPE = Recipe(
         TORQUES.inputs,
         OUTPUTS,
         theta=True,
-        summary="Compute the derivatives by q, qd, qdd and wrenches of the joint torques tau of a motion while "
-        "external wrenches act on the named frames.",
+        summary="Compute the derivatives by q, qd, qdd and wrenches of the joint torques tau of a motion under "
+        "external wrenches.",
     ),
     "derivatives of inverse dynamics with wrenches",
     trace,

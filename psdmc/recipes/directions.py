@@ -36,13 +36,7 @@ _ENTRY = {each: OF_Q if each is Q else f"{each.name}[j]" for each in (Q, QD, QDD
 """What an entry per joint rate belongs to."""
 
 DQ, DQD, DQDD, DTAU = (
-    replace(
-        each,
-        name=f"d{each.name}",
-        axes=("nv",),
-        largest=1.0,
-        means=f"direction in {each.name}: entry j is the change of {entry}",
-    )
+    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"entry j is the change of {entry}")
     for each, entry in _ENTRY.items()
 )
 """Directions of inputs, and derivatives of outputs along them."""
@@ -58,11 +52,7 @@ GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
     for each, entry in _ENTRY.items()
 )
 GRADIENT_THETA = Quantity(
-    "grad_theta_b",
-    ("l",),
-    means="gradient of the weighted sum by theta_b: entry j is the derivative by theta_b[j]",
-    unit="J",
-    powers=(-1,),
+    "grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b", unit="J", powers=(-1,)
 )
 """Derivatives of the weighted sum of outputs by each input."""
 

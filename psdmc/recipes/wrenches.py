@@ -32,12 +32,7 @@ WRENCHES = Quantity(
     powers=(0, -1),
 )
 
-DWRENCHES = replace(
-    WRENCHES,
-    name="dwrenches",
-    largest=1.0,
-    means="direction in wrenches: entry [k, m] is the change of wrenches[k, m]",
-)
+DWRENCHES = replace(WRENCHES, name="dwrenches", largest=1.0, means="change of wrenches along the direction")
 
 GRADIENT_WRENCHES = Quantity(
     "grad_wrenches",
