@@ -49,8 +49,8 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
     mj_model  MuJoCo's MjModel of the robot, whose joints have the names of the model's. Joints that only the MjModel has
               get their values from its qpos0. None: MuJoCo has the joints of the model, in the model's order
 
-    Raises InputError if q has another shape, or if the model has a joint of a type that MuJoCo lacks (planar joint). Raises
-    InputError also if `mj_model` lacks a joint of the model.
+    Raises InputError if q has another shape, or if MuJoCo cannot have a joint of the model, such as a planar joint.
+    Raises InputError also if `mj_model` lacks a joint of the model.
     """
     layout = _Layout.of("to_qpos", model, mj_model)
     values = layout.checked("q", q, layout.nq)

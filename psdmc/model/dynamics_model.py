@@ -150,7 +150,7 @@ class DynamicsModel(Answers):
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """Return the matrix E, (5n, p) uint8, whose columns are the exponents of the p monomials.
+        """Return the matrix E, (5n, p) uint8 for n joints, whose columns are the exponents of the p monomials.
 
         The rows are the exponents of q, sin q, cos q, qd and qdd, in this order, each with one row per joint. E is None if
         the model was derived with `expand=False`.
