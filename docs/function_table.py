@@ -73,7 +73,7 @@ def _row(recipe: Recipe) -> str:
     default = "yes" if recipe.default else "floating base" if recipe.default_where_wide else ""
     cells = (
         f"`{recipe.name}`",
-        function.summary,
+        function.summary.partition(". ")[0].removesuffix(".") + ".",
         ", ".join(map(_shape, function.inputs)),
         ", ".join(map(_shape, function.outputs)),
         "yes" if function.theta else "",

@@ -44,7 +44,7 @@ class InputError(PsdmcError):
 
 
 class DerivationError(PsdmcError):
-    """psdmc cannot derive a model with the given options, although the robot file has no mistake.
+    """psdmc raises this error if it cannot derive a model with the given options, although the robot file has no mistake.
 
     For example, the matrices E and P (the formula of the torques) of a robot with many joints can need too much memory.
     The option `expand=False` leaves out E and P. If a psdmc command fails with a DerivationError, its exit status is 3.

@@ -41,13 +41,16 @@ OF_QUATERNION = {"free": (0, 1, 2, 4, 5, 6, 3), "ball": (1, 2, 3, 0)}
 
 
 def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = None) -> Array:
-    """Return MuJoCo's qpos (..., nq of MuJoCo) of positions q (..., nq).
+    """Convert joint positions q, (..., nq), to MuJoCo's qpos, (..., nq of MuJoCo), and return qpos.
+
+    The order of the joints can differ. Quaternions are x, y, z, w in q, and w, x, y, z in qpos.
 
     model     the model that q belongs to, or the path of its file
-    mj_model  MuJoCo's MjModel of the robot. Joints are matched by name. Joints that only the MjModel has get their values
-              from qpos0. None: MuJoCo has the joints of the model, in the model's order
+    mj_model  MuJoCo's MjModel of the robot, whose joints have the names of the model's. Joints that only the MjModel has
+              get their values from its qpos0. None: MuJoCo has the joints of the model, in the model's order
 
-    Raises InputError if an array has another shape, or if MuJoCo has no such joint.
+    Raises InputError if q has another shape, or if MuJoCo cannot have a joint of the model, such as a planar joint.
+    Raises InputError also if `mj_model` lacks a joint of the model.
     """
     layout = _Layout.of("to_qpos", model, mj_model)
     values = layout.checked("q", q, layout.nq)
@@ -58,19 +61,20 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
 
 
 def from_qpos(model: DynamicsModel | str | Path, qpos: ArrayLike, mj_model: Any = None) -> Array:
-    """Return the positions q (..., nq) for MuJoCo's qpos (..., nq of MuJoCo). `to_qpos` explains the other arguments.
+    """Convert MuJoCo's qpos, (..., nq of MuJoCo), to the joint positions q, (..., nq), of a model, and return q.
 
-    Entries of qpos for mimic joints, and for joints that the model does not have, are ignored.
+    Entries of qpos for mimic joints and for joints that the model lacks have no effect. `to_qpos` explains the other
+    arguments.
     """
     layout = _Layout.of("from_qpos", model, mj_model)
     return np.asarray(layout.checked("qpos", qpos, len(layout.rest))[..., layout.places[layout.own_places]])
 
 
 def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_model: Any = None) -> Array:
-    """Return MuJoCo's qvel (..., nv of MuJoCo) for rates qd (..., nv) at positions q (..., nq), both in psdmc's
-    convention.
+    """Convert joint rates qd, (..., nv), at joint positions q, (..., nq), to MuJoCo's qvel, (..., nv of MuJoCo).
 
-    `to_qpos` explains the other arguments. Joints that only MuJoCo has get the rate zero.
+    q and qd are in psdmc's convention. A floating base's linear velocity is along the base's axes in qd, and along the
+    world's axes in qvel. Joints that only MuJoCo has get the rate zero. `to_qpos` explains the other arguments.
     """
     layout = _Layout.of("to_qvel", model, mj_model)
     rates = layout.checked("qd", qd, layout.nv)
@@ -84,10 +88,10 @@ def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_m
 def from_qvel(
     model: DynamicsModel | str | Path, q: ArrayLike, qvel: ArrayLike, mj_model: Any = None
 ) -> Array:
-    """Return the rates qd (..., nv) for MuJoCo's qvel (..., nv of MuJoCo) at positions q (..., nq), both in psdmc's
-    convention.
+    """Convert MuJoCo's qvel, (..., nv of MuJoCo), at joint positions q, (..., nq), to joint rates qd, (..., nv).
 
-    `to_qpos` explains the other arguments. For a state of MuJoCo, first compute q = from_qpos(model, qpos).
+    q and qd are in psdmc's convention. For a state of MuJoCo, first compute q = from_qpos(model, qpos). `to_qpos`
+    explains the other arguments.
     """
     layout = _Layout.of("from_qvel", model, mj_model)
     here, rates = layout.broadcast(
@@ -156,8 +160,8 @@ class _Layout:
         return len(self.own_speeds)
 
     def checked(self, name: str, values: ArrayLike, size: int) -> Array:
-        """Return the values as an array of floats, (..., size). Raises InputError if the last axis has another
-        length."""
+        """Return the values as an array of floats, (..., size). Raises InputError if the last axis is not of length
+        `size`."""
         array = real_array(f"{self.what}: {name}", values)
         if array.shape[-1:] != (size,):
             raise InputError(
@@ -177,8 +181,8 @@ class _Layout:
         return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
-        """Rotate the linear rates of a floating base from the base's axes to the world's axes. If `back` is true,
-        rotate them from the world's axes to the base's axes."""
+        """Return joint rates with the linear velocity of a floating base rotated from the base's axes to the world's
+        axes. If `back` is true, it is rotated from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

@@ -183,11 +183,11 @@ def validate(
     changed, the attributes `load` and `named` say what explains the logs.
 
     model             a calibrated model, or the path of its file
-    logs              paths of logs, of a log description (TOML), or of a campaign folder, of which psdmc uses the exciting
-                      motions without a load. psdmc judges all logs together
+    logs              paths of logs, of a log description (TOML), or of a campaign folder. Of a campaign, psdmc uses the
+                      exciting motions without a load. psdmc judges all logs together
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the log
                       description or of the model
-    naming            topic and joint names of the logs
+    naming            topic of the joint states in the logs, and joint names that differ from the model's
     regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
 

@@ -46,8 +46,8 @@ RECIPE = Recipe(
         INPUTS,
         tuple(derivative_of(MOMENTUM, quantity) for quantity in INPUTS),
         theta=False,
-        summary="Compute the derivatives by q and qd of the linear momentum of all links, and of their angular momentum "
-        "about their centre of mass.",
+        summary="Compute the derivatives by q and qd of the centroidal momentum h. h is the linear momentum of all "
+        "links, then their angular momentum about their centre of mass, along the axes of the base frame.",
     ),
     "derivatives of the centroidal momentum",
     *on_both(values, INPUTS),

@@ -75,8 +75,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the matrix A(q) of centroidal momentum: A qd is the robot's linear momentum, then "
-        "its angular momentum about its centre of mass.",
+        summary="Compute the centroidal momentum matrix A(q): A qd is the linear momentum of all links, then their "
+        "angular momentum about their centre of mass.",
     ),
     "centroidal momentum matrix",
     trace,

@@ -23,7 +23,7 @@ RATE = Quantity(
     "hdot",
     ("6",),
     means="rate of the linear momentum (N), then of the angular momentum about the centre of mass (N m), along the axes of "
-    "the base frame, without drive inertias",
+    "the base frame; drive inertias are not included",
     unit="J",
     powers=(-1,),
 )
@@ -53,8 +53,8 @@ RECIPE = Recipe(
         INPUTS,
         (RATE,),
         theta=False,
-        summary="Compute the rates of the linear momentum of all links, and of their angular momentum about their centre of "
-        "mass.",
+        summary="Compute the time derivative of the centroidal momentum: of the linear momentum of all links, and "
+        "of their angular momentum about their centre of mass.",
     ),
     "rate of the centroidal momentum",
     *on_both(values, INPUTS),

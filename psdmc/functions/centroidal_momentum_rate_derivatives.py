@@ -46,8 +46,9 @@ RECIPE = Recipe(
         INPUTS,
         OUTPUTS,
         theta=False,
-        summary="Compute the derivatives by q, qd and qdd of the rates of linear momentum, and of angular momentum about "
-        "the centre of mass.",
+        summary="Compute the derivatives by q, qd and qdd of hdot, the time derivative of the centroidal momentum "
+        "h. h is the linear momentum of all links, then their angular momentum about their centre of mass, along "
+        "the axes of the base frame.",
     ),
     "derivatives of the centroidal momentum's rate",
     *on_both(values, INPUTS),

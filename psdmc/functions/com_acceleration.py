@@ -21,7 +21,7 @@ INPUTS = (Q, QD, QDD)
 ACCELERATION = Quantity(
     "a",
     ("3",),
-    means="acceleration of the centre of mass, without gravity, m/s^2, along the axes of the base frame",
+    means="acceleration of the centre of mass, m/s^2, along the axes of the base frame; gravity is not added",
     unit="m/s^2",
 )
 
@@ -49,7 +49,7 @@ RECIPE = Recipe(
         INPUTS,
         (ACCELERATION,),
         theta=False,
-        summary="Compute the acceleration of the centre of mass of all links in the base frame.",
+        summary="Compute the acceleration of the centre of mass of all links, along the axes of the base frame.",
     ),
     "acceleration of the centre of mass",
     *on_both(values, INPUTS),

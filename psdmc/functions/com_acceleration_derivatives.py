@@ -42,8 +42,8 @@ RECIPE = Recipe(
         INPUTS,
         OUTPUTS,
         theta=False,
-        summary="Compute the derivatives by q, qd and qdd of the acceleration of the centre of mass of all links in the "
-        "base frame.",
+        summary="Compute the derivatives by q, qd and qdd of the acceleration a of the centre of mass of all links. "
+        "a is along the axes of the base frame.",
     ),
     "derivatives of the centre of mass's acceleration",
     *on_both(values, INPUTS),

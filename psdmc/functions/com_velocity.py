@@ -46,7 +46,7 @@ RECIPE = Recipe(
         INPUTS,
         (VELOCITY,),
         theta=False,
-        summary="Compute the velocity of the centre of mass of all links in the base frame.",
+        summary="Compute the velocity of the centre of mass of all links, along the axes of the base frame.",
     ),
     "velocity of the centre of mass",
     *on_both(values, INPUTS),

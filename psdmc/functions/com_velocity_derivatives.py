@@ -42,7 +42,8 @@ RECIPE = Recipe(
         INPUTS,
         tuple(derivative_of(VELOCITY, quantity) for quantity in INPUTS),
         theta=False,
-        summary="Compute the derivatives by q and qd of the velocity of the centre of mass of all links in the base frame.",
+        summary="Compute the derivatives by q and qd of the velocity v of the centre of mass of all links. v is "
+        "along the axes of the base frame.",
     ),
     "derivatives of the centre of mass's velocity",
     *on_both(values, INPUTS),

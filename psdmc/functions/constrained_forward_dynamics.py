@@ -50,7 +50,7 @@ ERROR = Quantity(
     "error",
     ("contact_rows",),
     largest=0.01,
-    means="how far each contact is from where it should be, m and rad along the axes of the base frame; kp multiplies it",
+    means="displacement of each contact from where it should be, m and rad along the axes of the base frame",
     unit="1",
     powers=(1,),
     default=0.0,
@@ -58,8 +58,8 @@ ERROR = Quantity(
 FORCES = Quantity(
     "forces",
     ("contact_rows",),
-    means="what the world exerts on the robot, zero where a contact is not active: force (N) for each contact, then moment "
-    "(N m) about the contact's origin for a surface, along the axes of the base frame",
+    means="what the world exerts on the contacts, along the axes of the base frame; zero for contacts that are not active. "
+    "A point has a force (N); a surface has a force and then a moment (N m) about the contact's origin",
     unit="J",
     powers=(-1,),
 )
@@ -124,8 +124,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, ACTIVE, MU, KP, KD, ERROR),
         (QDD, FORCES),
         theta=True,
-        summary="Compute the joint accelerations and the contact forces that torques cause while the active contacts do not "
-        "accelerate.",
+        summary="Compute the joint accelerations and the contact forces that torques cause. The active contacts "
+        "accelerate by -kp error - kd J qd - mu forces, which is 0 by default. J is the Jacobian of the contacts.",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "constrained forward dynamics",

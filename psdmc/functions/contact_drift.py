@@ -47,9 +47,18 @@ RECIPE = Recipe(
         320,
         "accelerations of all contacts at constant qd (dJ/dt qd), base frame",
         (Q, QD),
-        (Quantity("drift", ("contact_rows",), means=ROW_WORDS, unit="1/s^2", powers=(1,)),),
+        (
+            Quantity(
+                "drift",
+                ("contact_rows",),
+                means=f"accelerations of the contacts (m/s^2, rad/s^2): {ROW_WORDS}",
+                unit="1/s^2",
+                powers=(1,),
+            ),
+        ),
         theta=False,
-        summary="Compute (dJ/dt) qd of all contacts, their accelerations if qdd = 0, along the axes of the base frame.",
+        summary="Compute the accelerations that all contacts have if qdd = 0, along the axes of the base frame. "
+        "They are (dJ/dt) qd, with the Jacobian J of the contacts.",
     ),
     "contact drift",
     trace,

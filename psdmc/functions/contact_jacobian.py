@@ -49,7 +49,7 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("contact_rows", "nv"),
-                means=f"{ROW_WORDS}; column j for qd[j]",
+                means=f"Jacobian. Its column j is for qd[j], and its rows are those of the contacts: {ROW_WORDS}",
                 unit="1",
                 powers=(1, -1),
             ),

@@ -61,14 +61,14 @@ RECIPE = Recipe(
             Quantity(
                 "C",
                 ("nv", "nv"),
-                means="the matrix C; C qd is in N m, or N for sliding joints",
+                means="Coriolis matrix; C qd is in N m, or N for sliding joints",
                 unit="J s",
                 powers=(-1, -1),
             ),
         ),
         theta=True,
-        summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques, and "
-        "dM/dt - 2 C is skew-symmetric.",
+        summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques. With the mass "
+        "matrix M, dM/dt - 2 C is skew-symmetric.",
     ),
     "Coriolis matrix",
     trace,

@@ -52,13 +52,14 @@ RECIPE = Recipe(
             Quantity(
                 "D",
                 ("contact_rows", "contact_rows"),
-                means=f"symmetric matrix; rows and columns: {ROW_WORDS}",
+                means=f"symmetric matrix. Its rows, and likewise its columns, are those of the contacts: {ROW_WORDS}",
                 unit="1/(J s^2)",
                 powers=(1, 1),
             ),
         ),
         theta=True,
-        summary="Compute the Delassus matrix J M^-1 J^T of all contacts, J being the Jacobian of contact_jacobian.",
+        summary="Compute the Delassus matrix J M^-1 J^T of all contacts, with the Jacobian J as in "
+        "`contact_jacobian` and the mass matrix M.",
         factorises=(MASS_MATRIX,),
     ),
     "Delassus matrix",

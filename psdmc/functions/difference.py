@@ -21,7 +21,7 @@ FROM, TO = (
         "q0",
         ("nq",),
         np.pi,
-        means="joint positions at the start: rad, m or unit quaternions",
+        means="joint positions at the start, as q1",
         unit="1",
         powers=(1,),
     ),
@@ -29,7 +29,7 @@ FROM, TO = (
         "q1",
         ("nq",),
         np.pi,
-        means="joint positions at the end: rad, m or unit quaternions",
+        means="joint positions at the end",
         unit="1",
         powers=(1,),
     ),
@@ -37,7 +37,7 @@ FROM, TO = (
 WAY = Quantity(
     "v",
     ("nv",),
-    means="displacement: q1 - q0 for joints with one coordinate; for a quaternion the rotation vector (rad) "
+    means="displacement: q1 - q0 for joints with one coordinate; for a quaternion, the rotation vector (rad) "
     "of the shorter rotation from q0 to q1, along the axes of the body at q0",
     unit="1",
     powers=(1,),

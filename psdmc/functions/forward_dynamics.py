@@ -38,8 +38,8 @@ RECIPE = Recipe(
         (Q, QD, TAU),
         (QDD,),
         theta=True,
-        summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)), h "
-        "being the Coriolis, centrifugal and gravity torques.",
+        summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)). M is the mass "
+        "matrix, h the sum of the Coriolis, centrifugal and gravity torques.",
         factorises=(MASS_MATRIX,),
         spoilt="accelerations",
     ),

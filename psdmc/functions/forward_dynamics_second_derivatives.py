@@ -252,7 +252,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, COTANGENT_OF_QDD),
         (hessian_of(TAU, "nxu"),),
         theta=True,
-        summary="Compute the second derivatives of the sum of cotangent[i] * qdd[i] by q, qd and tau.",
+        summary="Compute the second derivatives by q, qd and tau of a weighted sum of the accelerations qdd of "
+        "forward dynamics. The weighted sum is the sum of cotangent[i] * qdd[i].",
         factorises=ACCELERATIONS.signature.factorises,
         calls=(TORQUES.name, ACCELERATIONS.name),
     ),

@@ -11,6 +11,7 @@ RECIPE = packed(
     forward_dynamics_second_derivatives.RECIPE,
     216,
     "entries of the lower triangle of cotangent . qdd's second derivatives that can differ from zero, row by row",
-    "Compute the lower triangle of forward_dynamics_second_derivatives: the entries that can differ from zero, row by row.",
+    "Compute the entries that can differ from zero in the lower triangle of the matrix that "
+    "`forward_dynamics_second_derivatives` returns, row by row.",
     Packing(forward_dynamics_second_derivatives.RECIPE.name, acceleration_hessian_places, is_triangle=True),
 )

@@ -48,8 +48,9 @@ RECIPE = Recipe(
         (Q, QD, TAU, WRENCHES),
         (QDD,),
         theta=True,
-        summary="Compute the joint accelerations that torques and external wrenches cause: qdd = M(q)^-1 (tau + J^T wrench "
-        "for each named frame - h(q, qd)).",
+        summary="Compute the joint accelerations that torques and external wrenches cause: qdd = M(q)^-1 (tau + J^T "
+        "wrenches - h(q, qd)). M is the mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, "
+        "and J the Jacobian of the named frames along their own axes.",
         factorises=(MASS_MATRIX,),
         spoilt="accelerations",
     ),

@@ -173,8 +173,8 @@ RECIPE = Recipe(
         ACCELERATIONS.signature.inputs,
         (QDD, *BLOCKS),
         theta=True,
-        summary="Compute the accelerations qdd that torques and external wrenches cause, and their derivatives by q, qd, "
-        "tau and wrenches.",
+        summary="Compute the accelerations qdd that torques cause under external wrenches, and their derivatives by "
+        "q, qd, tau and wrenches.",
         factorises=ACCELERATIONS.signature.factorises,
         products=WITHOUT.products,
         calls=(WITHOUT.name,),

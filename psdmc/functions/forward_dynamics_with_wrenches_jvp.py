@@ -53,8 +53,8 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.inputs, *DIRECTIONS),
         (*ACCELERATIONS.signature.outputs, replace(DQDD, means="derivative of qdd along the direction")),
         theta=True,
-        summary="Compute the accelerations qdd under external wrenches, and their derivative dqdd along the direction "
-        "(dq, dqd, dtau, dwrenches).",
+        summary="Compute the accelerations qdd that torques cause under external wrenches, and their derivative "
+        "dqdd along the direction (dq, dqd, dtau, dwrenches).",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "forward dynamics with wrenches along a direction",

@@ -65,8 +65,8 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.inputs, COTANGENT_OF_QDD),
         (*ACCELERATIONS.signature.outputs, *GRADIENTS),
         theta=True,
-        summary="Compute the accelerations qdd under external wrenches, and the gradients of "
-        "the sum of cotangent[i] * qdd[i] by q, qd, tau and wrenches.",
+        summary="Compute the accelerations qdd under external wrenches, and the gradients by q, qd, tau and "
+        "wrenches of a weighted sum of qdd. The weighted sum is the sum of cotangent[i] * qdd[i].",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "gradient of forward dynamics with wrenches",

@@ -21,8 +21,8 @@ INPUTS = (Q, QD, QDD)
 ACCELERATION = Quantity(
     "a",
     ("frames", "6"),
-    means="linear acceleration of the frame's origin (m/s^2), without gravity, then angular acceleration (rad/s^2), along "
-    "the axes of the base frame",
+    means="linear acceleration of the frame's origin (m/s^2), then angular acceleration (rad/s^2), along "
+    "the axes of the base frame; gravity is not added",
     unit="1/s^2",
     powers=(0, 1),
 )
@@ -52,7 +52,8 @@ RECIPE = Recipe(
         INPUTS,
         (ACCELERATION,),
         theta=False,
-        summary="Compute the acceleration J qdd + (dJ/dt) qd of each named frame along the axes of the base frame.",
+        summary="Compute the acceleration of each named frame, along the axes of the base frame. It is J qdd + "
+        "(dJ/dt) qd, with the Jacobian J of the frame.",
     ),
     "frame acceleration",
     *on_both(values, INPUTS),

@@ -62,8 +62,8 @@ RECIPE = Recipe(
         INPUTS,
         OUTPUTS,
         theta=False,
-        summary="Compute the derivatives by q, qd and qdd of each named frame's acceleration, which is expressed in the "
-        "base frame.",
+        summary="Compute the derivatives by q, qd and qdd of the acceleration a of each named frame. a has three "
+        "linear entries, then three angular ones, along the axes of the base frame.",
     ),
     "derivatives of frame accelerations",
     *on_both(values, INPUTS),

@@ -48,7 +48,7 @@ RECIPE = Recipe(
                 "J",
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for qd[j]",
+                "column j is for qd[j]",
                 unit="1",
                 powers=(0, 1, -1),
             ),

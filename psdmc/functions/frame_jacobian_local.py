@@ -39,7 +39,7 @@ RECIPE = Recipe(
                 "J",
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s), along the axes of "
-                "the named frame; column j for qd[j]",
+                "the named frame; column j is for qd[j]",
                 unit="1",
                 powers=(0, 1, -1),
             ),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psdmc.dynamics.named_frames import frame_velocity_slopes
-from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.program.signature import OF_Q, QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -56,15 +56,14 @@ RECIPE = Recipe(
             Quantity(
                 "dv_dq",
                 ("frames", "6", "nv"),
-                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for q[j] (with a ball joint or floating base: for v[j] of a small displacement "
-                "integrate(q, v))",
+                means=f"derivatives of v by q: entry [k, i, j] is the derivative of v[k, i] by {OF_Q}",
                 unit="1/s",
                 powers=(0, 1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the derivatives by q of each named frame's velocity, which is expressed in the base frame.",
+        summary="Compute the derivatives by q of the velocity v of each named frame. v has three linear entries, "
+        "then three angular ones, along the axes of the base frame.",
     ),
     "derivatives of frame velocities",
     trace,

@@ -37,22 +37,23 @@ RESTITUTION = Quantity(
     "restitution",
     largest=1.0,
     least=0.0,
-    means="share of the contacts' velocity that is reversed, 0 to 1",
+    means="coefficient of restitution e, 0 to 1: after the impact, active contacts have -e times their velocity before it",
     unit="1",
     default=0.0,
 )
 IMPULSES = Quantity(
     "impulses",
     ("contact_rows",),
-    means="impulse from the world on the robot, zero where a contact is not active: N s for each contact, then N m s about "
-    "the contact's origin for a surface, along the axes of the base frame",
+    means="what the world exerts on the contacts, along the axes of the base frame; zero for contacts that are not active. "
+    "A point has a linear impulse (N s); a surface has a linear and then an angular impulse (N m s) about the contact's "
+    "origin",
     unit="J s",
     powers=(-1,),
 )
 
 TOUCHING = replace(
     CONTACTS,
-    failure=f"{CONTACTS.failure}, or restitution is not from 0 to 1",
+    failure=f"restitution is not from 0 to 1\n{CONTACTS.failure}",
     error=f"{CONTACTS.error}, or restitution = {{restitution:g}} is not from 0 to 1",
 )
 
@@ -102,7 +103,8 @@ RECIPE = Recipe(
         (Q, BEFORE, ACTIVE, RESTITUTION, MU),
         (AFTER, IMPULSES),
         theta=True,
-        summary="Compute the joint rates after an impact, and the impulses that stop or reverse the active contacts.",
+        summary="Compute the joint rates after an impact, and the impulses that stop the active contacts or reverse "
+        "their velocity.",
         factorises=(MASS_MATRIX, TOUCHING),
     ),
     "impulses of an impact",

@@ -19,7 +19,8 @@ WAY = Quantity(
     "v",
     ("nv",),
     3.0,
-    means="displacement, a rate times a time: rad or m; for quaternions a rotation vector in the body frame at q",
+    means="displacement, rates times a time: rad or m; for a quaternion, a rotation vector (rad) along the axes of the "
+    "body at q",
     unit="1",
     powers=(1,),
 )

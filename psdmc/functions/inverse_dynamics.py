@@ -35,8 +35,8 @@ RECIPE = Recipe(
         (Q, QD, QDD),
         (TAU,),
         theta=True,
-        summary="Compute the joint torques of a motion: tau = M(q) qdd + h(q, qd), h being the Coriolis, "
-        "centrifugal and gravity torques.",
+        summary="Compute the joint torques of a motion: tau = M(q) qdd + h(q, qd). M is the mass matrix, h the sum "
+        "of the Coriolis, centrifugal and gravity torques.",
     ),
     "inverse dynamics",
     trace,

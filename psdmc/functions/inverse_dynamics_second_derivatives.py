@@ -48,7 +48,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, COTANGENT),
         (hessian_of(QDD, "nxa"),),
         theta=True,
-        summary="Compute the second derivatives of the sum of cotangent[i] * tau[i] by q, qd and qdd.",
+        summary="Compute the second derivatives by q, qd and qdd of a weighted sum of the torques tau of inverse "
+        "dynamics. The weighted sum is the sum of cotangent[i] * tau[i].",
     ),
     "second derivatives of inverse dynamics",
     trace,

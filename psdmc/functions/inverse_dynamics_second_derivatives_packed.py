@@ -11,6 +11,7 @@ RECIPE = packed(
     inverse_dynamics_second_derivatives.RECIPE,
     199,
     "entries of the lower triangle of cotangent . tau's second derivatives that can differ from zero, row by row",
-    "Compute the lower triangle of inverse_dynamics_second_derivatives: the entries that can differ from zero, row by row.",
+    "Compute the entries that can differ from zero in the lower triangle of the matrix that "
+    "`inverse_dynamics_second_derivatives` returns, row by row.",
     Packing(inverse_dynamics_second_derivatives.RECIPE.name, torque_hessian_places, is_triangle=True),
 )

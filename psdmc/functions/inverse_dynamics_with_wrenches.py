@@ -45,8 +45,9 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
-        summary="Compute the joint torques of a motion under external wrenches: M(q) qdd + h(q, qd), minus J^T wrench "
-        "for each named frame.",
+        summary="Compute the joint torques of a motion under external wrenches on the named frames: tau = M(q) qdd "
+        "+ h(q, qd) - J^T wrenches. M is the mass matrix, h the sum of the Coriolis, centrifugal and gravity "
+        "torques, and J the Jacobian of the frames along their own axes.",
     ),
     "inverse dynamics with wrenches",
     trace,

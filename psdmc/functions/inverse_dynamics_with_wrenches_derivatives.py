@@ -59,7 +59,8 @@ RECIPE = Recipe(
         TORQUES.inputs,
         OUTPUTS,
         theta=True,
-        summary="Compute the derivatives of the torques tau of inverse dynamics with wrenches by q, qd, qdd and wrenches.",
+        summary="Compute the derivatives by q, qd, qdd and wrenches of the joint torques tau of a motion under "
+        "external wrenches.",
     ),
     "derivatives of inverse dynamics with wrenches",
     trace,

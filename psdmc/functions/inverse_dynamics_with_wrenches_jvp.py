@@ -53,8 +53,8 @@ RECIPE = Recipe(
         (*TORQUES.signature.inputs, *DIRECTIONS),
         (*TORQUES.signature.outputs, replace(DTAU, means="derivative of tau along the direction")),
         theta=True,
-        summary="Compute the torques tau under external wrenches, and their derivative dtau along the direction "
-        "(dq, dqd, dqdd, dwrenches).",
+        summary="Compute the joint torques tau of a motion under external wrenches, and their derivative dtau along "
+        "the direction (dq, dqd, dqdd, dwrenches).",
     ),
     "inverse dynamics with wrenches along a direction",
     trace,

@@ -46,7 +46,7 @@ RECIPE = Recipe(
                 "J",
                 ("6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for qd[j]",
+                "column j is for qd[j]",
                 unit="1",
                 powers=(1, -1),
             ),

@@ -55,8 +55,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute (dJ/dt) qd of each named frame, the frame's acceleration if qdd = 0, along the axes of "
-        "the base frame.",
+        summary="Compute the acceleration that each named frame has if qdd = 0, along the axes of the base frame. "
+        "It is (dJ/dt) qd, with the Jacobian J of the frame.",
     ),
     "frame drift",
     trace,

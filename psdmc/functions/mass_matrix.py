@@ -37,7 +37,7 @@ RECIPE = Recipe(
             Quantity(
                 "M",
                 ("nv", "nv"),
-                means="symmetric matrix, both triangles filled; kg m^2 (with sliding joints also kg m and kg)",
+                means="symmetric matrix, both triangles filled; kg m^2, with sliding joints also kg m and kg",
                 unit="J s^2",
                 powers=(-1, -1),
             ),

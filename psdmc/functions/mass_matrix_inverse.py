@@ -50,7 +50,7 @@ RECIPE = Recipe(
             Quantity(
                 "Minv",
                 ("nv", "nv"),
-                means="symmetric matrix, both triangles filled; SI units",
+                means="symmetric matrix, both triangles filled; 1/(kg m^2), with sliding joints also 1/(kg m) and 1/kg",
                 unit="1/(J s^2)",
                 powers=(1, 1),
             ),

@@ -57,8 +57,8 @@ RECIPE = Recipe(
             Quantity(
                 "h",
                 ("6",),
-                means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame, "
-                "without drive inertias",
+                means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame; "
+                "drive inertias are not included",
                 unit="J s",
                 powers=(-1,),
             ),

@@ -39,13 +39,14 @@ RECIPE = Recipe(
             Quantity(
                 "h",
                 ("nv",),
-                means="the sum of these torques (N m), or forces (N) of sliding joints",
+                means="sum of the torques (N m), or forces (N) of sliding joints",
                 unit="J",
                 powers=(-1,),
             ),
         ),
         theta=True,
-        summary="Compute the sum h(q, qd) = C(q, qd) qd + g(q) of the Coriolis, centrifugal and gravity torques.",
+        summary="Compute the sum of the Coriolis, centrifugal and gravity torques: h(q, qd) = C(q, qd) qd + g(q). C "
+        "is the Coriolis matrix, g the gravity torques.",
     ),
     "nonlinear effects",
     trace,

@@ -33,8 +33,8 @@ SEEN_BY_FRAMES = SymmetricMatrix(
     Structure.BLOCKS,
     ("frames",),
     number="the number, from 0, of the named frame at which J M^-1 J^T + mu I is not positive definite",
-    failure="J M^-1 J^T + mu I of a frame is not positive definite (for example, if mu = 0 and the frame cannot move in "
-    "all six directions)",
+    failure="mu is negative\nJ M^-1 J^T + mu I of a frame is not positive definite, for example because mu = 0 and the "
+    "frame cannot move in all six directions",
     error="frame {frames!r}: J M^-1 J^T + mu I is not positive definite at mu = {mu:g}",
     hint="give mu > 0, such as 1e-3, or a pose in which the frame can move in all six directions",
 )
@@ -114,14 +114,14 @@ RECIPE = Recipe(
                 "Lambda",
                 ("frames", "6", "6"),
                 means="symmetric matrix of each frame, along the axes of the base frame: three linear rows and "
-                "columns, then three angular ones; kg, kg m and kg m^2",
+                "columns (kg), then three angular ones (kg m^2); kg m if one is linear and one angular",
                 unit="kg m^2",
                 powers=(0, -1, -1),
             ),
         ),
         theta=True,
-        summary="Compute the operational-space inertia (J M^-1 J^T + mu I)^-1 of each named frame, J being the Jacobian of "
-        "frame_jacobian.",
+        summary="Compute the operational-space inertia (J M^-1 J^T + mu I)^-1 of each named frame. J is the frame's "
+        "Jacobian as in `frame_jacobian`, M the mass matrix, and I the identity matrix.",
         factorises=(MASS_MATRIX, SEEN_BY_FRAMES),
     ),
     "operational-space inertia",

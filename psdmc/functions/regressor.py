@@ -37,13 +37,14 @@ RECIPE = Recipe(
             Quantity(
                 "Y",
                 ("nv", "l"),
-                means="regressor: row i is for tau[i], column j for theta_b[j]",
+                means="regressor: row i is for tau[i], column j for theta_b[j]; SI units",
                 unit="J",
                 powers=(-1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the regressor Y(q, qd, qdd), with which the torques of inverse dynamics are tau = Y theta_b.",
+        summary="Compute the regressor Y(q, qd, qdd): the torques of inverse dynamics are tau = Y theta_b, with the "
+        "base parameters theta_b.",
     ),
     "joint-torque regressor",
     trace,

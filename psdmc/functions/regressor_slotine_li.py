@@ -61,14 +61,14 @@ RECIPE = Recipe(
             Quantity(
                 "Y",
                 ("nv", "l"),
-                means="regressor: row i is for joint torque i, column j for theta_b[j]",
+                means="regressor: row i is for the torque of joint rate i, column j for theta_b[j]; SI units",
                 unit="J",
                 powers=(-1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the regressor Y of adaptive control (Slotine and Li, 1987), with Y theta_b = M(q) qdd_r + "
-        "C(q, qd) qd_r + g(q).",
+        summary="Compute the regressor Y of Slotine and Li's adaptive control (1987): Y theta_b = M(q) qdd_r + C(q, "
+        "qd) qd_r + g(q). M is the mass matrix, C the Coriolis matrix, and g the gravity torques.",
     ),
     "Slotine-Li regressor",
     trace,

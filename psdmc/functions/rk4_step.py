@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MASS_MATRICES = MASS_MATRIX.in_blocks(
     "4",
     number=f"{MASS_MATRIX.number}, + n times the stage of the step",
-    failure=f"{MASS_MATRIX.failure} or in a stage of the step",
+    failure=f"{MASS_MATRIX.failure} or at an intermediate point of its step",
 )
 
 State = tuple[Sequence[Scalar], Sequence[Scalar]]

@@ -48,13 +48,14 @@ RECIPE = Recipe(
             Quantity(
                 "T",
                 ("nv", "nq"),
-                means="row i, column j: derivative of v[i], the displacement, by q[j]; zero along a quaternion",
+                means="entry [i, j] is the derivative of v[i] by q[j]; v = 0 if dq only changes the length of quaternions",
                 unit="1",
                 powers=(1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the matrix T = dv/dq: dq, a small change of the entries of q, moves the joints by v = T dq.",
+        summary="Compute the matrix T that converts a small change dq of the entries of q into the displacement v = "
+        "T dq of the joints.",
         normalizes=True,
     ),
     "map from entries of q to the tangent",

@@ -45,16 +45,17 @@ class DynamicsModel(Answers):
 
     A model has the same methods as a compiled robot (the result of `psdmc.compile`), such as `forward_dynamics`, but it
     computes them in NumPy. In arguments and results, q has the shape (..., nq), and rates, accelerations and torques have
-    the shape (..., nv). All numbers are in SI units. The dots stand for batch axes, if any.
+    the shape (..., nv). The dots (...) stand for batch axes, if any. All numbers are in SI units.
 
     expansion    the matrices E and P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
-    B            (l, 11n) matrix that computes base parameters from the links' standard parameters x: theta_b = B @ x
-    mechanism    the robot: joints, link frames, gravity, limits, and standard parameters (11 per link)
+    B            (l, 11n) matrix that computes base parameters from the standard parameters x of the n links:
+                 theta_b = B @ x. Each link has 11: mass, first moments (3), inertias (6) and drive inertia
+    mechanism    the robot: joints, link frames, gravity, limits, and standard parameters
     certificate  (nv,) largest difference between the torques of the model and of the Newton-Euler algorithm at random
                  states, divided by the largest torque; one number per entry of tau
-    provenance   plain JSON values: text, hash and format of the robot file, options, tolerances, and angles that
-                 psdmc made exact
+    provenance   plain JSON values: text, hash and format of the robot file, options, tolerances, and the angles
+                 that psdmc replaced by exact right angles (option `snap` of `derive`)
     calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
     """
 
@@ -121,7 +122,10 @@ class DynamicsModel(Answers):
 
     @property
     def contacts(self) -> dict[str, int]:
-        """Return the names of the contacts with their rows, 3 for a point and 6 for a surface, in the order of forces."""
+        """Return, by name of contact, the number of force components: 3 for a point, 6 for a surface (force, then moment).
+
+        `constrained_forward_dynamics` and other functions return contact forces in the order of this dictionary.
+        """
         return {frame.name: frame.rows for frame in self.mechanism.contacts}
 
     @property
@@ -146,10 +150,10 @@ class DynamicsModel(Answers):
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """Return the matrix E, (5n, p) uint8, whose columns are the exponents of the p monomials.
+        """Return the matrix E, (5n, p) uint8 for n joints, whose columns are the exponents of the p monomials.
 
-        The rows are the exponents of q, sin q, cos q, qd and qdd, n rows each. E is None if the model was derived with
-        `expand=False`.
+        The rows are the exponents of q, sin q, cos q, qd and qdd, in this order, each with one row per joint. E is None if
+        the model was derived with `expand=False`.
         """
         return None if self.expansion is None else self.expansion.E
 
@@ -157,7 +161,8 @@ class DynamicsModel(Answers):
     def P(self) -> tuple[sparse.csr_array, ...] | None:
         """Return the sparse matrices P[i], (p, l), one per joint torque i: tau[i] = y(state) @ P[i] @ theta_b.
 
-        y(state) are the values of the p monomials. P is None if the model was derived with `expand=False`.
+        y(state) holds the values of the model's p monomials, and theta_b the l base parameters. P is None if the model
+        was derived with `expand=False`.
         """
         return None if self.expansion is None else self.expansion.P
 
@@ -173,7 +178,7 @@ class DynamicsModel(Answers):
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Return, for each of the l base parameters, the index of its pivot among the 11n standard parameters.
+        """Return, for each of the l base parameters, the index of its pivot among the 11n standard parameters of the links.
 
         Each base parameter is a sum of standard parameters with factors. Its pivot is the first standard parameter that
         has the factor one in this sum and is in no other base parameter.
@@ -313,8 +318,8 @@ class DynamicsModel(Answers):
             out        array into which psdmc writes the result; optional
 
         This method uses NumPy; a robot from `psdmc.compile` is hundreds of times faster. The torque of joint i is
-        y @ P[i] @ theta_b, with the values y of the model's monomials at q, qd and qdd. If the model was derived with
-        `expand=False`, it has no monomials, and the method uses the Newton-Euler algorithm.
+        y @ P[i] @ theta_b, with the attribute `P` and the values y of the model's monomials at q, qd and qdd. A model
+        that was derived with `expand=False` has no monomials, so the method uses the Newton-Euler algorithm.
         """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
@@ -338,7 +343,7 @@ class DynamicsModel(Answers):
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
-        """Compute the regressor Y, (..., nv, l), with which the torques of inverse dynamics are tau = Y theta_b.
+        """Compute the regressor Y, (..., nv, l): with base parameters theta_b, the torques of a motion are tau = Y theta_b.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2

@@ -34,7 +34,7 @@ class SymmetricMatrix:
     structure  which entries are zero
     axes       shape of the array of pivots, in words such as nv; for blocks, that of the array with one sign per block
     number     words for the number, from 0, of the pivot or sign that is not positive; C returns this number plus 1
-    failure    the reason, in Python's documentation: words that follow "If "
+    failure    the reason, in Python's documentation: words that follow "if "; several reasons are one line each
     unit       unit of the pivots
     powers     how the unit depends on the axes, as in Quantity
     error      one line that Python raises as an error; {axis} stands for the name of an entry of that axis (such as

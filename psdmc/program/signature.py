@@ -276,7 +276,7 @@ Q = Quantity(
     "q",
     ("nq",),
     math.pi,
-    "joint positions: rad or m, or a unit quaternion for a ball joint or floating base",
+    "joint positions, rad or m; a ball joint or floating base has a unit quaternion (x, y, z, w)",
     "1",
     (1,),
 )
@@ -286,6 +286,9 @@ TAU = Quantity(
     "tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints", unit="J", powers=(-1,)
 )
 """Those of q, qd and qdd if states are drawn."""
+
+OF_Q = "q[j] (with a ball joint or floating base: x[j], where a small x moves q to integrate(q, x))"
+"""What an entry of a derivative by q belongs to."""
 
 
 def jacobian_of(output: str, by: str) -> Quantity:
@@ -298,15 +301,14 @@ def jacobian_of(output: str, by: str) -> Quantity:
 def derivative_of(above: Quantity, below: Quantity) -> Quantity:
     """Return the Quantity of the derivatives of one quantity by another. Its axes are those of the first, then those of
     the second, or nv if the second is q."""
-    of_q = "q[j] (with a ball joint or floating base: for v[j] of a small displacement integrate(q, v))"
-    entry = of_q if below.name == Q.name else f"{below.name}[j]"
     axes = ("nv",) if below.axes == Q.axes else below.axes
-    rows = f"row i for {above.name}[i]" if len(above.axes) == 1 else f"the axes of {above.name}"
-    columns = f"column j for {entry}" if len(axes) == 1 else f"then the axes of {below.name}"
+    row, column = "i" if len(above.axes) == 1 else "k, i", "j" if len(axes) == 1 else "k, m"
+    entry = OF_Q if below.name == Q.name else f"{below.name}[{column}]"
     return Quantity(
         f"d{above.name}_d{below.name}",
         (*above.axes, *axes),
-        means=f"derivatives of {above.name} by {below.name}: {rows}, {columns}",
+        means=f"derivatives of {above.name} by {below.name}: entry [{row}, {column}] is the derivative of "
+        f"{above.name}[{row}] by {entry}",
         unit=str(times(above.dimension, below.dimension, -1)),
         powers=(*_powers(above), *(-power for power in _powers(below))),
     )

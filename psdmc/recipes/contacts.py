@@ -20,7 +20,7 @@ from psdmc.robot.mechanism import Array, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "three linear rows for each contact, then three angular ones for a surface, along the axes of the base frame"
+ROW_WORDS = "three linear ones for a point; three linear, then three angular ones for a surface; along the base frame's axes"
 
 ACTIVE = Quantity(
     "active",
@@ -36,7 +36,8 @@ MU = Quantity(
     "mu",
     largest=1.0,
     least=0.1,
-    means="regularisation, 0 or more: 1/kg on the three linear axes, 1/(kg m^2) on the three angular axes",
+    means="regularisation, 0 or more: added to the diagonal of J M^-1 J^T, with the Jacobian J and the mass matrix M; "
+    "1/kg in linear rows, 1/(kg m^2) in angular rows",
     unit="1/kg",
     default=0.0,
 )
@@ -47,8 +48,8 @@ CONTACTS = SymmetricMatrix(
     ("contacts",),
     number="the number, from 0, of the contact at which J M^-1 J^T + mu I of the active contacts is not positive definite, "
     "or whose active is neither 0 nor 1",
-    failure="J M^-1 J^T + mu I of the active contacts is not positive definite (for example, if mu = 0 and two contacts "
-    "hold the same motion), mu is negative, or an entry of active is neither 0 nor 1",
+    failure="an entry of active is neither 0 nor 1\nmu is negative\nJ M^-1 J^T + mu I of the active contacts is not "
+    "positive definite, for example because mu = 0 and two active contacts prevent the same motion",
     error="contact {contacts!r}: J M^-1 J^T + mu I of the active contacts is not positive definite at mu = {mu:g}, or "
     "active is not 0 or 1",
     hint="give active 0 or 1 for each contact, and mu > 0, such as 1e-6, if contacts hold more motions than the robot has",

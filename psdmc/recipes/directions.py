@@ -14,7 +14,7 @@ from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program import dimensions
 from psdmc.program.replay import substituted
-from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
+from psdmc.program.signature import OF_Q, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -26,23 +26,17 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 COTANGENT = Quantity(
-    "cotangent", ("nv",), means="weights: cotangent[i] multiplies output i in the sum", unit="1", powers=(1,)
+    "cotangent", ("nv",), means="weights of the sum: cotangent[i] multiplies tau[i]", unit="1", powers=(1,)
 )
 """Of torques; their weighted sum, and that of accelerations, has the unit of energy here."""
 
-COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
+COTANGENT_OF_QDD = replace(COTANGENT, means=COTANGENT.means.replace("tau", "qdd"), unit="J s^2", powers=(-1,))
 
-OF_Q = "q[j] (with a ball joint or floating base: a tangent vector with the components of qd)"
-"""What an entry of a derivative by q belongs to."""
-
-_ENTRY = {
-    each: f"{each.name}; entry j is for {OF_Q if each is Q else f'{each.name}[j]'}"
-    for each in (Q, QD, QDD, TAU)
-}
+_ENTRY = {each: OF_Q if each is Q else f"{each.name}[j]" for each in (Q, QD, QDD, TAU)}
 """What an entry per joint rate belongs to."""
 
 DQ, DQD, DQDD, DTAU = (
-    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"direction: change of {entry}")
+    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"entry j is the change of {entry}")
     for each, entry in _ENTRY.items()
 )
 """Directions of inputs, and derivatives of outputs along them."""
@@ -51,7 +45,7 @@ GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
     Quantity(
         f"grad_{each.name}",
         ("nv",),
-        means=f"gradient of the weighted sum by {entry}",
+        means=f"gradient of the weighted sum by {each.name}: entry j is the derivative by {entry}",
         unit=str(dimensions.times(dimensions.dimension_of("J"), each.dimension, -1)),
         powers=(-each.powers[0],),
     )
@@ -66,8 +60,8 @@ GRADIENT_THETA = Quantity(
 def hessian_of(last: Quantity, axis: str) -> Quantity:
     """The symmetric matrix of second derivatives of a weighted sum by q, qd and a third quantity."""
     means = (
-        f"symmetric matrix of second derivatives of the weighted sum by (q, qd, {last.name}): rows and columns nv each for "
-        f"{OF_Q}, for qd[j] and for {last.name}[j]"
+        "symmetric matrix of the second derivatives of the weighted sum. The first nv rows and columns are for q, the next "
+        f"nv for qd, the last nv for {last.name}. In those for q, number j is for {OF_Q}"
     )
     return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
 

@@ -24,13 +24,11 @@ DT = Quantity("dt", (), 0.01, "length of the step, s: one number for all states,
 Q_NEXT = Quantity(
     "q_next",
     ("nq",),
-    means="joint positions after the step, rad or m, with quaternions of unit length",
+    means="new joint positions, rad or m, with quaternions of unit length",
     unit="1",
     powers=(1,),
 )
-QD_NEXT = Quantity(
-    "qd_next", ("nv",), means="joint rates after the step, rad/s or m/s", unit="1/s", powers=(1,)
-)
+QD_NEXT = Quantity("qd_next", ("nv",), means="new joint rates, rad/s or m/s", unit="1/s", powers=(1,))
 A = Quantity(
     "A",
     ("nx", "nx"),

@@ -26,18 +26,18 @@ WRENCHES = Quantity(
     "wrenches",
     ("frames", "6"),
     largest=20.0,
-    means="what the world exerts on each named frame: force (N), then moment (N m) about the frame's origin, "
+    means="wrench that the world exerts on each named frame: force (N), then moment (N m) about the frame's origin, "
     "along the axes of the frame",
     unit="J",
     powers=(0, -1),
 )
 
-DWRENCHES = replace(WRENCHES, name="dwrenches", largest=1.0, means="direction: change of wrenches")
+DWRENCHES = replace(WRENCHES, name="dwrenches", largest=1.0, means="change of wrenches along the direction")
 
 GRADIENT_WRENCHES = Quantity(
     "grad_wrenches",
     WRENCHES.axes,
-    means="gradient of the weighted sum by wrenches",
+    means="gradient of the weighted sum by wrenches: entry [k, m] is the derivative by wrenches[k, m]",
     unit="1",
     powers=(0, 1),
 )

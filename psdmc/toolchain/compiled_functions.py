@@ -105,7 +105,10 @@ class RobotFacts:
 
     @property
     def contacts(self) -> dict[str, int]:
-        """Return the names of the contacts with their rows, 3 for a point and 6 for a surface, in the order of forces."""
+        """Return, by name of contact, the number of force components: 3 for a point, 6 for a surface (force, then moment).
+
+        `constrained_forward_dynamics` and other functions return contact forces in the order of this dictionary.
+        """
         return dict(self._interface.contacts)
 
     @property

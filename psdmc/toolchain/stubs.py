@@ -64,8 +64,8 @@ def documentation(function: Signature) -> str:
         for q in function.inputs
     ]
     theta = (
-        "(l,) base parameters to use instead of the model's, or (..., l), one set per state. SI units; optional if the "
-        "model's are known"
+        "(l,) base parameters (combinations of masses and inertias) that replace the model's, or (..., l), one set per "
+        "state. SI units; optional if the model's are known"
     )
     given += [("theta_b", theta)] if function.theta else []
     written = (
@@ -78,38 +78,48 @@ def documentation(function: Signature) -> str:
     axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
     axes |= {"l"} if function.theta else set()
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
-    failures = [textwrap.fill(" ".join(_failures(function)), 100)] if function.factorises else []
     lengths = [(size, meaning) for size, meaning in _SIZES.items() if size in {*axes, *lead}]
-    parts = [_rows(given), returned, _rows(made), *failures, "In these shapes:", _rows(lengths)]
+    parts = [_rows(given), returned, _rows(made), *_failures(function), "In these shapes:", _rows(lengths)]
     return "\n\n".join([function.summary, *parts])
 
 
 _SIZES = {
-    "...": "batch axes, with one entry per state; a single state has none",
+    "...": "batch axes, if the call computes many states; none for one state",
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
-    "nx": "2 nv: the first nv are for q (ball joint or floating base: for small motions along qd), the last nv for qd",
-    "nxa": "3 nv: those of nx, then nv for qdd (nx = 2 nv: nv for q, nv for qd)",
-    "nxu": "3 nv: those of nx, then nv for tau (nx = 2 nv: nv for q, nv for qd)",
-    "l": "number of base parameters",
-    "frames": "number of named frames",
-    "contacts": "number of contacts",
-    "contact_rows": "number of rows of all contacts: 3 for a point, 6 for a surface",
+    "nx": "2 nv: the first nv are for q (ball joint or floating base: for x in integrate(q, x)), the last nv for qd",
+    "nxa": "3 nv: nv for q, nv for qd and nv for qdd",
+    "nxu": "3 nv: nv for q, nv for qd and nv for tau",
+    "l": "number of base parameters, the entries of theta_b",
+    "frames": "number of named frames; `frame_names` lists them",
+    "contacts": "number of contacts: links or frames that can touch the world; `contacts` lists them",
+    "contact_rows": "number of rows of all contacts: 3 for each point, 6 for each surface, in the order of `contacts`",
     "nonzeros": "number of matrix entries that can differ from zero",
 }
 
 
 def _failures(function: Signature) -> list[str]:
-    """What happens where a matrix is not positive definite."""
-    return [
-        f"If {matrix.failure}, {'psdmc raises an InputError' if matrix.error else 'the results of that state are NaN'}."
-        for matrix in function.factorises
-    ]
+    """What happens where a matrix is not positive definite: paragraphs."""
+    found = []
+    for matrix in function.factorises:
+        if matrix.error:
+            cases = "\n".join(_filled(case, "- ") for case in matrix.failure.split("\n"))
+            found.append(f"Raises InputError in each of these cases:\n\n{cases}")
+        else:
+            found.append(_filled(f"If {matrix.failure}, the results of that state are NaN."))
+    return found
 
 
 def _rows(named: list[tuple[str, str]]) -> str:
     width = max(len(name) for name, _ in named)
-    return "\n".join(f"{name:{width}}  {text}" for name, text in named)
+    return "\n".join(_filled(text, f"{name:{width}}  ") for name, text in named)
+
+
+def _filled(text: str, lead: str = "") -> str:
+    """The text after a lead, in lines of equal indent."""
+    return textwrap.fill(
+        text, 118, initial_indent=lead, subsequent_indent=" " * len(lead), break_on_hyphens=False
+    )
 
 
 def stub(functions: Iterable[Signature]) -> str:
