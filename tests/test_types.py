@@ -81,12 +81,14 @@ def without_shapes(text: str) -> str:
     return text.replace("tuple[Any, ...]", "shape")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*PUBLIC, *OF_MODELS, *OF_ROBOTS, *OF_ERRORS])
 def test_nothing_is_any(seen: dict[str, str], name: str) -> None:
     result = without_shapes(seen[name]).rpartition(" -> ")[2]
     assert not re.search(r"\bAny\b", result), seen[name]
 
 
+@pytest.mark.slow
 def test_precision_is_part_of_the_type(seen: dict[str, str]) -> None:
     assert "float64" in seen["robot.gravity(q)"]
     assert "32" in seen["single.gravity(q)"]

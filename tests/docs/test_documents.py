@@ -29,8 +29,13 @@ LONG = [
     DOCS / "tutorials" / "controller.md",
     DOCS / "tutorials" / "quadruped.md",
     DOCS / "how-to" / "embedded.md",
+    *(
+        DOCS / "how-to" / f"{name}.md"
+        for name in ("casadi", "derivatives", "floating-base", "frames", "many-robots")
+    ),
+    DOCS / "pipeline.md",
 ]
-"""They plan the motion of six joints, or build packages: as long as all other documents together."""
+"""They plan the motion of six joints, or build packages: longer than all other documents together."""
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,7 @@ def test_it_is_symmetric_to_the_last_bit() -> None:
     np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
 
 
+@pytest.mark.slow
 def test_calls_and_loops_take_parameters_at_run_time() -> None:
     """Of a robot with more rates than are written out: in rows, for one state, and where nothing is a number."""
     own = wide_robot("small")

@@ -81,7 +81,7 @@ def every_kernel() -> dict[str, Kernel]:
     return lowered_once((model.content_hash, "every kernel", *names), lambda: lower(model, functions=names))
 
 
-@pytest.mark.parametrize("name", RECIPES)
+@pytest.mark.parametrize("name", slow_but_for(list(RECIPES)[::3], RECIPES))
 def test_a_package_of_any_one_function_compiles(name: str, tmp_path: Path) -> None:
     """Macros and helpers that one function needs do not come from another that happens to be there."""
     _need("gcc")

@@ -7,6 +7,7 @@ from fractions import Fraction
 import minimax
 import mpmath as mp
 import pytest
+from slow_cases import slow_but_for
 
 from psdmc.backends.c.trig_numbers import c_number, polynomial
 from psdmc.backends.trig_numbers import NUMBERS, Real
@@ -18,7 +19,7 @@ INDEX_DIGITS = {"double": 16, "float": 10}
 each_real = pytest.mark.parametrize("real", ["double", "float"])
 
 
-@each_real
+@pytest.mark.parametrize("real", slow_but_for(["double"], ["double", "float"]))
 def test_the_coefficients_are_the_minimax_fit(real: Real) -> None:
     numbers = NUMBERS[real]
     digits, terms = minimax.DIGITS[real], minimax.TERMS[real]
