@@ -177,10 +177,12 @@ def validate(
     regressor: Regressor | None = None,
     progress: Progress = silent,
 ) -> Validation:
-    """Test a calibrated model on logs that were not used to calibrate it. Returns an object with the verdict and figures.
+    """Test a calibrated model on logs that were not used to calibrate it. Returns an object with the verdict and the
+    errors of the torques.
 
     The attribute `word` of the result is "still valid", "drifted", "changed load" or "log not usable". If the robot has
-    changed, the attributes `load` and `named` say what explains the logs.
+    changed, the attribute `load` is the change of its load. If no load explains the logs, the attribute `named` has the
+    changed parameters that do.
 
     model             a calibrated model, or the path of its file
     logs              paths of logs, of a log description (TOML), or of a campaign folder. Of a campaign, psdmc uses the

@@ -21,7 +21,7 @@ FROM, TO = (
         "q0",
         ("nq",),
         np.pi,
-        means="joint positions at the start, as q1",
+        means="joint positions at the start, in the same form as q1",
         unit="1",
         powers=(1,),
     ),

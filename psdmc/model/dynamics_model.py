@@ -40,8 +40,8 @@ class DynamicsModel(Answers):
     """A model contains a robot's inverse dynamics as data: the torque of joint i is tau[i] = y(state) @ P[i] @ theta_b.
 
     `psdmc.derive` makes models. The vector y(state) holds the values of p monomials, which are products of powers of q,
-    sin q, cos q, qd and qdd. The columns of the matrix E are the exponents of the monomials. The matrices P[i] and the l
-    base parameters theta_b are constants of the robot.
+    sin q, cos q, qd and qdd. Each column of the matrix E has the exponents of one monomial. The matrices P[i] and the l
+    base parameters theta_b are constants of the robot. A model derived with `expand=False` has no E and P.
 
     A model has the same methods as a compiled robot (the result of `psdmc.compile`), such as `forward_dynamics`, but it
     computes them in NumPy. In arguments and results, q has the shape (..., nq), and rates, accelerations and torques have
@@ -56,7 +56,8 @@ class DynamicsModel(Answers):
                  states, divided by the largest torque; one number per entry of tau
     provenance   plain JSON values: text, hash and format of the robot file, options, tolerances, and the angles
                  that psdmc replaced by exact right angles (option `snap` of `derive`)
-    calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
+    calibrated   what a calibration found: the covariance of theta_b, and whether the logs were usable (the verdict);
+                 None if not calibrated
     """
 
     expansion: Expansion | None

@@ -287,7 +287,10 @@ TAU = Quantity(
 )
 """Those of q, qd and qdd if states are drawn."""
 
-OF_Q = "q[j] (with a ball joint or floating base: x[j], where a small x moves q to integrate(q, x))"
+OF_Q = (
+    "q[j]. If the robot has a ball joint or a floating base, q[j] here stands for entry x[j] of a small displacement x, "
+    "which moves q to integrate(q, x)"
+)
 """What an entry of a derivative by q belongs to."""
 
 
