@@ -14,6 +14,13 @@ from psdmc.lower.kernels import wanted
 from psdmc.real_arrays import real_array
 
 
+def test_functions_that_are_not_called_are_not_added() -> None:
+    """A small arm's step and its Jacobians are a straight line; a Runge-Kutta step calls at any size."""
+    robot = bundled_model("scara").mechanism
+    assert wanted("semi_implicit_euler_derivatives", robot) == ("semi_implicit_euler_derivatives",)
+    assert "forward_dynamics_derivatives" in wanted("rk4_step_derivatives", robot)
+
+
 def test_a_text_is_one_function() -> None:
     assert wanted("gravity") == wanted(["gravity"]) == ("gravity",)
     assert wanted("all") == wanted(["all"])

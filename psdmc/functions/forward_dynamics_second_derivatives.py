@@ -66,20 +66,15 @@ def trace(g: Ingredients) -> Outputs:
         blocks = [[x for row in found[name] for x in row] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau")]
         return [list(found["qdd"]), *blocks], list(found["pivot"])
 
-    found, pivots = run(_regions(g.frames), g.inputs, {"hessian": 9 * nv * nv}, call)
+    found, pivots = run(regions(g.frames), g.inputs, {"hessian": 9 * nv * nv}, call)
     return {**found, "pivot": pivots}
-
-
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions | None:
-    """Calls and loops, of robots of more rates than STRAIGHT."""
-    return _regions(frames) if _rates(frames) > STRAIGHT else None
 
 
 def _rates(frames: Sequence[Frame]) -> int:
     return sum(frame.joint.nv for frame in leading(frames))
 
 
-def _regions(frames: Sequence[Frame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions:
     """The formula above.
 
     slopes    3 x nv x nv, the derivatives of qdd by q, qd and tau
@@ -264,4 +259,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    straight=STRAIGHT,
 )

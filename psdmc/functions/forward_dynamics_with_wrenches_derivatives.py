@@ -61,9 +61,9 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, "dqdd_dwrenches": by_wrenches}
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions | None:
-    """Return the function's body for robots of more rates than STRAIGHT. Wrenches w at the named frames act as the torques
-    J^T w, which are constant in the called derivatives of forward dynamics. Their derivatives by q add to the result.
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+    """Return the function's body as a call of forward dynamics' derivatives and loops. Wrenches w at the named frames act
+    as the torques J^T w, which are constant in the called derivatives. Their derivatives by q add to the result.
 
     The arrays are:
 
@@ -72,8 +72,6 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions | N
     push  nv x 6 per named frame, J^T
     """
     nv = first_rates(frames)[-1]
-    if nv <= STRAIGHT:
-        return None
     width = 6 * len(named)
     rows: dict[str, list[tuple[int, ...]]] = {}
 
@@ -186,4 +184,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    straight=STRAIGHT,
 )

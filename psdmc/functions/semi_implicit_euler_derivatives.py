@@ -53,9 +53,8 @@ def trace(g: Ingredients) -> Outputs:
     }
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions | None:
-    """Return the function's body as a call of forward dynamics' derivatives and loops, for robots of more rates than
-    STRAIGHT. The arrays are:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions:
+    """Return the function's body as a call of forward dynamics' derivatives and loops. The arrays are:
 
     by_q, by_qd, by_tau  nv x nv, derivatives of the accelerations
     step                 dt
@@ -64,8 +63,6 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
     """
     first = first_rates(frames)
     nv = first[-1]
-    if nv <= STRAIGHT:
-        return None
     wide = {i: frame.joint.nv for i, frame in enumerate(leading(frames)) if frame.joint.nv > 1}
 
     def stepped_state(read: Reader) -> dict[str, Column]:
@@ -188,4 +185,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    straight=STRAIGHT,
 )

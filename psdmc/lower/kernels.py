@@ -116,7 +116,8 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
     if not names:
         raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
-    called = {other for name in names for other in known[name].calls}
+    calling = [name for name in names if robot is None or robot.nv > recipe_of(name).straight]
+    called = {other for name in calling for other in known[name].calls}
     return tuple(name for name in known if name in names or name in called)
 
 
@@ -187,8 +188,8 @@ class _Lowered:
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
         unmoved = self.geometry.unmoved
-        regions = recipe.regions(unmoved.frames, unmoved.named) if recipe.regions else None
-        if regions is not None:
+        if recipe.regions and self.model.nv > recipe.straight:
+            regions = recipe.regions(unmoved.frames, unmoved.named)
             program = NOTHING
             if self.model.nv <= TRACED:
                 arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)

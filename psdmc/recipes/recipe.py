@@ -164,8 +164,8 @@ class Recipe:
     packs        the entries of another function's matrix that the function stores. The code of the other function is
                  generated, and all other entries are left out. `trace` and `pinocchio` compute the whole matrix
     regions      the function's body as loops and calls, from which C is printed; `trace` computes the same. It is made
-                 from the joint frames and the named frames. None, also for one robot: C is printed from code without
-                 loops
+                 from the joint frames and the named frames. None: C is printed from code without loops
+    straight     number of joint rates up to which C is printed from code without loops although there are `regions`
     """
 
     signature: Signature
@@ -188,7 +188,8 @@ class Recipe:
     default_where_wide: bool = False
     benched: bool = False
     packs: Packing | None = None
-    regions: Callable[[Sequence[Frame], Sequence[NamedFrame]], Regions | None] | None = None
+    regions: Callable[[Sequence[Frame], Sequence[NamedFrame]], Regions] | None = None
+    straight: int = 0
 
     def __post_init__(self) -> None:
         if self.needs is None and self.signature.factorises:
