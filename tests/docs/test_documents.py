@@ -45,6 +45,8 @@ def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """What they build is not optimised: what they show does not depend on it."""
     if "\n$ cargo " in document.read_text(encoding="utf-8") and not is_installed("cargo"):
         pytest.skip("cargo is not installed")
+    if "\n$ c++ " in document.read_text(encoding="utf-8") and not is_installed("c++"):
+        pytest.skip("c++ is not installed")
     if "\n$ psdmc view " in document.read_text(encoding="utf-8"):
         pytest.importorskip("plotly")
     for library in re.findall(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -133,6 +134,7 @@ int main()
 """
 
 
+@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
 def test_the_cpp_class_has_it_too(arm: DynamicsModel, tmp_path: Path) -> None:
     write_sources(package(arm), tmp_path)
     (tmp_path / "main.cpp").write_text(MAIN)
