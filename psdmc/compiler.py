@@ -173,8 +173,8 @@ def emit_c(
     trig       how the code computes sines. "inline": by its own code, with libm only for angles over 1e5 rad;
                "freestanding": without libm; "libm": always with libm; None: the method of the target
     name       name of the robot in C, with which all symbols begin; None: the name of the model
-    force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
-               deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
+    force      True: also write into a folder with files of other programs, and over edited package files. psdmc deletes
+               no file of other programs. If such a file has the name of a package file, psdmc renames it to NAME.orig
     progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change theta_b for a load
     adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"

@@ -113,9 +113,8 @@ def solved(matrices: Array, right: Array) -> Array:
     shape = np.broadcast_shapes(matrices.shape[:-2], right.shape[:-2])
     wide = [np.broadcast_to(part, (*shape, *part.shape[-2:])) for part in (matrices, right)]
     if _any_order.get():
-        with suppress(
-            np.linalg.LinAlgError
-        ):  # of a matrix that is exactly singular, which the elimination accepts
+        # The elimination accepts a matrix that is exactly singular.
+        with suppress(np.linalg.LinAlgError):
             return np.asarray(np.linalg.solve(*wide))
     work = np.concatenate(wide, axis=-1).reshape(-1, n, n + right.shape[-1])
     each = np.arange(len(work))

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.slices import first_rates
-from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, inverse, solve
+from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, inverse, is_zero, solve
 
 Matrix = Sequence[Sequence[Scalar]]
 
@@ -196,7 +196,7 @@ def _eliminated(
     rates: tuple[int, ...], total: Callable[[Scalar], Scalar], core: Sequence[int], matrix: Matrix
 ) -> Limb:
     factors = _factorized(rates, [[matrix[i][j] for j in rates] for i in rates])
-    carriers = tuple(c for c in core if any(not _is_zero(matrix[k][c]) for k in rates))
+    carriers = tuple(c for c in core if any(not is_zero(matrix[k][c]) for k in rates))
     columns = [solve(factors, [matrix[k][c] for k in rates]) for c in carriers]
     shares = [[column[k] for column in columns] for k in range(len(rates))]
     return Limb(rates, carriers, total, factors, shares)
@@ -212,10 +212,6 @@ def _factorized(rates: Sequence[int], block: Matrix) -> Factors:
 def _product(row: Sequence[Scalar], vector: Sequence[Scalar], where: Sequence[int]) -> Scalar:
     """A part of a row times a vector."""
     return inner_product([row[k] for k in where], [vector[k] for k in where])
-
-
-def _is_zero(value: Scalar) -> bool:
-    return isinstance(value, float) and value == 0.0
 
 
 def any_limbs(frames: Sequence[Frame]) -> bool:

@@ -74,10 +74,11 @@ def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
 
 def _nonzero(row: Sequence[Scalar]) -> list[int]:
     """Where the entries are not the number zero."""
-    return [i for i, entry in enumerate(row) if not _is_zero(entry)]
+    return [i for i, entry in enumerate(row) if not is_zero(entry)]
 
 
-def _is_zero(entry: Scalar) -> bool:
+def is_zero(entry: Scalar) -> bool:
+    """Return whether an entry is the number zero, at every state."""
     return isinstance(entry, float) and entry == 0.0
 
 
@@ -118,7 +119,7 @@ def half_solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
     entry's joint and for all joints that this joint carries."""
     found = list(right)
     for k in reversed(range(len(found))):
-        if not _is_zero(found[k]):
+        if not is_zero(found[k]):
             for i in _nonzero(factors.lower[k]):
                 found[i] = found[i] - factors.lower[k][i] * found[k]
     return found

@@ -125,7 +125,7 @@ RECIPE = Recipe(
         (QDD, FORCES),
         theta=True,
         summary="Compute the joint accelerations and the contact forces that torques cause. The active contacts "
-        "accelerate by -kp error - kd J qd - mu forces, which is 0 by default. J is the Jacobian of the contacts.",
+        "accelerate by -kp * error - kd * J qd - mu * forces, with the Jacobian J of the contacts. This is 0 by default.",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "constrained forward dynamics",

@@ -45,10 +45,6 @@ from psdmc.robot.mechanism import Array, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-STRAIGHT = 8
-"""Rates up to which the C is a straight line: a KR6's executes 15 % fewer instructions than calls and loops, and batches
-have lanes. A quadruped's would be 38,000 operations, most of them products."""
-
 ACCELERATIONS, TORQUES = accelerations.RECIPE, torques.RECIPE
 
 
@@ -259,5 +255,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
-    straight=STRAIGHT,
 )

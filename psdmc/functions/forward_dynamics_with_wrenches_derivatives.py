@@ -12,7 +12,7 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.named_frames import local_jacobians
 from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.dynamics.slices import first_rates, leading
-from psdmc.dynamics.solve import inner_product
+from psdmc.dynamics.solve import inner_product, is_zero
 from psdmc.functions import (
     forward_dynamics_derivatives,
     forward_dynamics_with_wrenches,
@@ -27,7 +27,7 @@ from psdmc.recipes.wrenches import (
     acceleration_derivatives,
     jacobians_transposed,
     loads,
-    wrenches_of_links,
+    on_joint_frames,
     wrenches_on_links,
 )
 from psdmc.reproducible import inverse, times
@@ -39,10 +39,6 @@ if TYPE_CHECKING:
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE
 TORQUES = inverse_dynamics_with_wrenches_derivatives.RECIPE
 WITHOUT = forward_dynamics_derivatives.RECIPE.signature
-STRAIGHT = 8
-"""Rates up to which the C is a straight line, so that batches have lanes. Of more rates, the derivatives of forward dynamics
-without wrenches are called: their function keeps equal limbs in lanes."""
-
 MASSLESS = Body(0.0, ZERO, (0.0,) * 6)
 
 BLOCKS = tuple(derivative_of(QDD, quantity) for quantity in ACCELERATIONS.signature.inputs)
@@ -88,12 +84,12 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
             still,
             still,
             ZERO,
-            external=wrenches_of_links(named, wrenches),
+            external=on_joint_frames(named, wrenches),
         )
         turn = [[-x for x in row] for row in massless.by_q]
         for name, matrix in (("turn", turn), ("push", push)):
             rows[name] = [
-                tuple(k for k, x in enumerate(column) if not _is_zero(x))
+                tuple(k for k, x in enumerate(column) if not is_zero(x))
                 for column in zip(*matrix, strict=True)
             ]
         load = [tau + inner_product(row, wrenches) for tau, row in zip(read("tau", nv), push, strict=True)]
@@ -143,10 +139,6 @@ def _products(
         yield For(len(own), (Slice("column", matrix, own[0]), Slice("output", output, own[0])), (inner,))
 
 
-def _is_zero(x: Scalar) -> bool:
-    return isinstance(x, float) and x == 0.0
-
-
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     accelerations = ACCELERATIONS.reference(robot, given)
     by_q, by_qd, by_qdd, by_wrenches = TORQUES.reference(robot, {**given, **accelerations}).values()
@@ -184,5 +176,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
-    straight=STRAIGHT,
 )

@@ -28,6 +28,7 @@ from psdmc.program.regions import (
 )
 from psdmc.program.signature import Signature
 from psdmc.recipes.coordinate_maps import CoordinateMaps
+from psdmc.recipes.loops import added, copied, diagonal, filled
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import A, B, step_on_arrays, stepped
@@ -117,7 +118,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
                 (Slice("entry", "row"), Slice("by_q_k", "by_q"), Slice("by_v_k", "by_v")),
                 (straight(chained),),
             ),
-            _added(nv, Slice("entry", "row", 2 * nv), Slice("other", "to_tau_i")),
+            added(nv, Slice("entry", "row", 2 * nv), Slice("other", "to_tau_i")),
         ),
     )
     stage = (
@@ -134,30 +135,30 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
             (straight(turned),),
         ),
         chain,
-        _added(rows, Slice("entry", "total"), Slice("other", "rate"), "weight_k"),
-        _added(rows * width, Slice("entry", "totals"), Slice("other", "turn"), "weight_k"),
+        added(rows, Slice("entry", "total"), Slice("other", "rate"), "weight_k"),
+        added(rows * width, Slice("entry", "totals"), Slice("other", "turn"), "weight_k"),
         *_moved(frames, nq, nv, "rate", "turn", "reach_k"),
     )
     body = (
         straight(begun),
-        _filled("by_q", nv * width),
-        _filled("by_v", nv * width),
-        _diagonal(nv, Slice("entry", "by_q", 0, width + 1)),
-        _diagonal(nv, Slice("entry", "by_v", nv, width + 1)),
-        _filled("start", rows * width),
+        filled("by_q", nv * width),
+        filled("by_v", nv * width),
+        diagonal(nv, Slice("entry", "by_q", 0, width + 1)),
+        diagonal(nv, Slice("entry", "by_v", nv, width + 1)),
+        filled("start", rows * width),
         For(nv, (Slice("start_k", "start"), Slice("unit", "by_v", nv)), (straight(started),)),
-        _diagonal(nv, Slice("entry", "start", nq * width + nv, width + 1)),
-        _filled("total", rows),
-        _filled("totals", rows * width),
+        diagonal(nv, Slice("entry", "start", nq * width + nv, width + 1)),
+        filled("total", rows),
+        filled("totals", rows * width),
         For(4, (Slice("reach_k", "reach"), Slice("weight_k", "weight")), stage),
         *_moved(frames, nq, nv, "total", "totals"),
         straight(lambda read: {"q_next": Column(read("here", nq)), "qd_next": Column(read("there", nv))}),
         *(
-            _copied(nv, 2 * nv, (name, 0, width), ("A", k * 2 * nv * nv))
+            copied(nv, 2 * nv, (name, 0, width), ("A", k * 2 * nv * nv, 2 * nv))
             for k, name in enumerate(("by_q", "by_v"))
         ),
         *(
-            _copied(nv, nv, (name, 2 * nv, width), ("B", k * nv * nv))
+            copied(nv, nv, (name, 2 * nv, width), ("B", k * nv * nv, nv))
             for k, name in enumerate(("by_q", "by_v"))
         ),
     )
@@ -207,34 +208,6 @@ def _moved(
             (straight(pushed),),
         ),
     )
-
-
-def _filled(array: str, count: int) -> For:
-    """All entries are zero."""
-    return For(count, (Slice("entry", array),), (straight(lambda read: {"entry": Column([0.0])}),))
-
-
-def _diagonal(count: int, entry: Slice) -> For:
-    """These entries are one."""
-    return For(count, (entry,), (straight(lambda read: {"entry": Column([1.0])}),))
-
-
-def _added(count: int, entry: Slice, other: Slice, factor: str | None = None) -> For:
-    """Each entry becomes its sum with another one, times a factor."""
-
-    def added(read: Reader) -> dict[str, Column]:
-        more = read("other", 1)[0]
-        return {"entry": Column([read("entry", 1)[0] + (more * read(factor, 1)[0] if factor else more)])}
-
-    return For(count, (entry, other), (straight(added),))
-
-
-def _copied(rows: int, columns: int, source: tuple[str, int, int], target: tuple[str, int]) -> For:
-    """A block of a matrix (its array, first entry and width), as a matrix (array and first entry)."""
-    (array, first, width), (name, start) = source, target
-    copy = straight(lambda read: {"entry": Column(read("other", 1))})
-    inner = For(columns, (Slice("entry", "into"), Slice("other", "row")), (copy,))
-    return For(rows, (Slice("into", name, start, columns), Slice("row", array, first, width)), (inner,))
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -312,4 +285,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    straight=0,
 )

@@ -13,6 +13,7 @@ from psdmc.dynamics.tangent_steps import step_slopes
 from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.regions import Call, Column, For, Reader, Region, Regions, Slice, straight
 from psdmc.program.signature import Signature
+from psdmc.recipes.loops import added, copied, one_more
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import (
@@ -32,10 +33,6 @@ if TYPE_CHECKING:
 
 STEP = semi_implicit_euler.RECIPE
 ACCELERATIONS = forward_dynamics_derivatives.RECIPE
-
-STRAIGHT = 8
-"""Rates up to which the C is a straight line, so that batches have lanes. Of more rates, the derivatives of forward dynamics
-are called: their function keeps equal limbs in lanes, and products in loops."""
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -88,42 +85,32 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
             nv,
         ),
         straight(stepped_state),
-        *(_scaled(nv, *block) for block in blocks),
-        _plus_unit(nv, nv * 2 * nv + nv, 2 * nv),
+        *(
+            copied(nv, nv, (name, 0, nv), (into, nv * width + column, width), "step")
+            for name, into, column, width in blocks
+        ),
+        one_more(nv, Slice("entry", "A", nv * 2 * nv + nv, 2 * nv + 1)),
         *_positions(first, wide, nv),
     )
     return Regions(arrays, body)
 
 
-def _scaled(nv: int, block: str, into: str, column: int, width: int) -> For:
-    """Rows of the new rates: derivatives of the accelerations times dt."""
-
-    def scaled(read: Reader) -> dict[str, Column]:
-        return {"entry": Column([read("step", 1)[0] * read("own", 1)[0]])}
-
-    rows = Slice("row", block, 0, nv), Slice("target", into, nv * width + column, width)
-    return For(nv, rows, (For(nv, (Slice("own", "row"), Slice("entry", "target")), (straight(scaled),)),))
-
-
 def _positions(first: Sequence[int], wide: Mapping[int, int], nv: int) -> Iterator[For]:
     """Rows of the new positions: what rates' rows move them by, and one by the old position. Neighbouring joints of one
     rate share a loop. `wide` has the number of rates of the other joints."""
-
-    def moved(read: Reader) -> dict[str, Column]:
-        return {"entry": Column([read("step", 1)[0] * read("rate", 1)[0]])}
-
-    starts = [0, *(first[i + 1] for i in wide)]
-    for start, end in zip(starts, [*(first[i] for i in wide), nv], strict=True):
-        for matrix, width in (("A", 2 * nv), ("B", nv)) if end > start else ():
-            rows = Slice("entry", matrix, start * width), Slice("rate", matrix, (nv + start) * width)
-            yield For((end - start) * width, rows, (straight(moved),))
+    matrices = ("A", 2 * nv), ("B", nv)
+    starts, ends = [0, *(first[i + 1] for i in wide)], [*(first[i] for i in wide), nv]
+    for start, end in zip(starts, ends, strict=True):
         if end > start:
-            yield _plus_unit(end - start, start * 2 * nv + start, 2 * nv)
+            for name, width in matrices:
+                rates, rows = (name, (nv + start) * width, width), (name, start * width, width)
+                yield copied(end - start, width, rates, rows, "step")
+            yield one_more(end - start, Slice("entry", "A", start * 2 * nv + start, 2 * nv + 1))
     for i, n in wide.items():
-        for matrix, width in (("A", 2 * nv), ("B", nv)):
-            yield _turned(i, n, first[i], matrix, width, nv)
+        for name, width in matrices:
+            yield _turned(i, n, first[i], name, width, nv)
         block = Slice("target", "A", first[i] * 2 * nv + first[i], 2 * nv), Slice("row", f"start_{i}", 0, n)
-        yield For(n, block, (For(n, (Slice("entry", "target"), Slice("own", "row")), (straight(_added),)),))
+        yield For(n, block, (added(n, Slice("entry", "target"), Slice("other", "row")),))
 
 
 def _turned(i: int, n: int, first: int, matrix: str, width: int, nv: int) -> For:
@@ -135,16 +122,6 @@ def _turned(i: int, n: int, first: int, matrix: str, width: int, nv: int) -> For
 
     columns = Slice("entry", matrix, first * width), Slice("rate", matrix, (nv + first) * width)
     return For(width, columns, (straight(turned),))
-
-
-def _added(read: Reader) -> dict[str, Column]:
-    return {"entry": Column([read("entry", 1)[0] + read("own", 1)[0]])}
-
-
-def _plus_unit(count: int, first: int, width: int) -> For:
-    """One more in each entry of A's diagonal block."""
-    one = straight(lambda read: {"entry": Column([read("entry", 1)[0] + 1.0])})
-    return For(count, (Slice("entry", "A", first, width + 1),), (one,))
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -185,5 +162,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
-    straight=STRAIGHT,
 )

@@ -187,8 +187,8 @@ class _Lowered:
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
-        unmoved = self.geometry.unmoved
         if recipe.regions and self.model.nv > recipe.straight:
+            unmoved = self.geometry.unmoved
             regions = recipe.regions(unmoved.frames, unmoved.named)
             program = NOTHING
             if self.model.nv <= TRACED:

@@ -165,7 +165,9 @@ class Recipe:
                  generated, and all other entries are left out. `trace` and `pinocchio` compute the whole matrix
     regions      the function's body as loops and calls, from which C is printed; `trace` computes the same. It is made
                  from the joint frames and the named frames. None: C is printed from code without loops
-    straight     number of joint rates up to which C is printed from code without loops although there are `regions`
+    straight     number of joint rates up to which C is printed from code without loops although there are `regions`.
+                 Code without loops has SIMD lanes for batches. A KR6's second derivatives also execute 15 % fewer
+                 instructions, but a quadruped's would be 38,000 operations
     """
 
     signature: Signature
@@ -189,7 +191,7 @@ class Recipe:
     benched: bool = False
     packs: Packing | None = None
     regions: Callable[[Sequence[Frame], Sequence[NamedFrame]], Regions] | None = None
-    straight: int = 0
+    straight: int = 8
 
     def __post_init__(self) -> None:
         if self.needs is None and self.signature.factorises:

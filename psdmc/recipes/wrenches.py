@@ -45,17 +45,17 @@ GRADIENT_WRENCHES = Quantity(
 
 def wrenches_on_links(g: Ingredients) -> dict[int, Wrench]:
     """Convert the input `wrenches` to the joint frames that carry the named frames."""
-    return wrenches_of_links(g.named, g.inputs[WRENCHES.name])
+    return on_joint_frames(g.named, g.inputs[WRENCHES.name])
 
 
 def wrenches_on_arrays(robot: RobotOnArrays, given: Mapping[str, Array]) -> dict[int, Wrench]:
     """Convert given arrays likewise."""
     values = given[WRENCHES.name]
-    return wrenches_of_links(robot.chain.frames, list(values.reshape(len(values), -1).T))
+    return on_joint_frames(robot.chain.frames, list(values.reshape(len(values), -1).T))
 
 
-def wrenches_of_links(named: Sequence[NamedFrame], values: Sequence[Scalar]) -> dict[int, Wrench]:
-    """Convert 6 values per named frame likewise."""
+def on_joint_frames(named: Sequence[NamedFrame], values: Sequence[Scalar]) -> dict[int, Wrench]:
+    """Convert wrenches at the named frames, 6 values each in one list, to the joint frames that carry them."""
     return link_wrenches(named, [values[6 * k : 6 * k + 6] for k in range(len(named))])
 
 

@@ -63,6 +63,26 @@ def test_the_steps_jacobians_are_pinocchios(name: str) -> None:
     is_pinocchios("semi_implicit_euler_derivatives", name, exact=1e-9)
 
 
+CALLING = ("semi_implicit_euler_derivatives", "forward_dynamics_with_wrenches_derivatives")
+
+
+@pytest.mark.parametrize("function", CALLING)
+def test_what_calls_forward_dynamics_says_that_the_mass_matrix_is_not_positive(function: str) -> None:
+    """With the bodies' signs reversed no result is a number, in batches and for one state; with them it is Pinocchio's."""
+    own, recipe = wide_robot("hand"), RECIPES[function]
+    robot, theta_b = own.compiled(function), np.asarray(own.model.theta_b)
+    states = [own.given[quantity.name] for quantity in recipe.signature.inputs]
+    found = robot.call(recipe.signature, states, theta_b)
+    for name, expected in recipe.pinocchio(own.pinocchio, own.given).items():
+        error = np.abs(getattr(found, name) - expected).max() / np.abs(expected).max()
+        assert error < 1e-9
+    for spoilt in (
+        robot.call(recipe.signature, states, -theta_b),
+        robot.call(recipe.signature, [array[3] for array in states], -theta_b),
+    ):
+        assert all(np.isnan(array).all() for array in spoilt)
+
+
 JACOBIANS = [
     ("semi_implicit_euler", "small"),
     ("semi_implicit_euler", "hand"),
