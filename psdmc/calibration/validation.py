@@ -181,8 +181,8 @@ def validate(
     errors of the torques.
 
     The attribute `word` of the result is "still valid", "drifted", "changed load" or "log not usable". If the robot has
-    changed, the attributes `load` and `named` together explain the logs: a change of the load at the tip (or None), and a
-    tuple of changed parameters.
+    changed, two attributes say what has changed: `load` is the change of the load at the tip (None: unchanged), and
+    `named` lists the changed parameters.
 
     model             a calibrated model, or the path of its file
     logs              paths of logs, of a log description (TOML), or of a campaign folder. Of a campaign, psdmc uses the

@@ -61,7 +61,7 @@ def hessian_of(last: Quantity, axis: str) -> Quantity:
     """The symmetric matrix of second derivatives of a weighted sum by q, qd and a third quantity."""
     means = (
         "symmetric matrix of the second derivatives of the weighted sum. The first nv rows and columns are for q, the next "
-        f"nv for qd, the last nv for {last.name}. Row j and column j are for {OF_Q}"
+        f"nv for qd, the last nv for {last.name}. Of the first nv, row j and column j are for {OF_Q}"
     )
     return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
 
