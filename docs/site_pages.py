@@ -17,6 +17,9 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "generated/site_source"
 SITE = ROOT / "generated/site"
 
+EXAMPLES = ("*.ipynb", "*.py", "*.c", "*.cpp", "*.h", "Makefile")
+"""Files of examples/ that the site offers for download."""
+
 BESIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "examples/README.md")
 """Documents from outside docs/ that are pages of the same path."""
 
@@ -126,6 +129,9 @@ def gather(to: Path) -> None:
     shutil.copy(ROOT / "docs/conf.py", to)
     for name in TABLES:
         shutil.copy(ROOT / f"templates/report/{name}.jinja", to / "static" / name)
+    for path in (path for pattern in EXAMPLES for path in (ROOT / "examples").rglob(pattern)):
+        (to / path.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, to / path.relative_to(ROOT))
     for path in BESIDE:
         _write(to / path, (ROOT / path).read_text(encoding="utf-8"))
     pages = {"cli": command_line(), "python": python(), "c": c_header()}

@@ -56,8 +56,8 @@ class DynamicsModel(Answers):
                  states, divided by the largest torque; one number per entry of tau
     provenance   plain JSON values: text, hash and format of the robot file, options, tolerances, and the angles
                  that psdmc replaced by exact right angles (option `snap` of `derive`)
-    calibrated   what a calibration found: the covariance of theta_b, and whether the logs were usable (the verdict);
-                 None if not calibrated
+    calibrated   what a calibration found: base parameters with their covariance, friction, springs, torque constants,
+                 verdict and logs; None if not calibrated
     """
 
     expansion: Expansion | None
