@@ -9,10 +9,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.kinematics import AT_BASE
-from psdmc.dynamics.named_frames import Root, frame_drifts, frame_jacobians
-from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.kinematics import AT_BASE, path_to
+from psdmc.dynamics.named_frames import (
+    Root,
+    frame_acceleration_slopes,
+    frame_drifts,
+    frame_jacobians,
+    twists_along,
+)
+from psdmc.dynamics.scalar import Scalar, Vector, add, cross, dot
+from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.solve import (
     Factors,
     factorize,
@@ -92,16 +100,7 @@ def constrained(
     halves = [half_solved(factors, row) for row in jacobian]
     free = half_solved(factors, load)
     scaled = [value * inverse for value, inverse in zip(free, factors.inverses, strict=True)]
-    seen = half_products(factors, halves)
-    matrix = [
-        [
-            active[i] * (entry + shift[i]) + (1.0 - active[i]) * one[i]
-            if i == j
-            else (active[i] if active[i] is active[j] else active[i] * active[j]) * entry
-            for j, entry in enumerate(row)
-        ]
-        for i, row in enumerate(seen)
-    ]
+    matrix = of_active(half_products(factors, halves), active, shift, one)
     own = factorize(matrix)
     lacking = [
         on * (end - inner_product(half, scaled)) for on, end, half in zip(active, wanted, halves, strict=True)
@@ -111,3 +110,124 @@ def constrained(
     for force, half in zip(forces, halves, strict=True):
         pushed = [value + force * share for value, share in zip(pushed, half, strict=True)]
     return Constrained(rest_solved(factors, pushed), forces, matrix, own)
+
+
+def of_active(
+    seen: Rows, active: Sequence[Scalar], shift: Sequence[Scalar], one: Sequence[Scalar]
+) -> list[list[Scalar]]:
+    """Return J M^-1 J^T + shift in the active rows and columns, and the diagonal entries `one` in the others. `seen` is
+    J M^-1 J^T."""
+    return [
+        [
+            active[i] * (entry + shift[i]) + (1.0 - active[i]) * one[i]
+            if i == j
+            else (active[i] if active[i] is active[j] else active[i] * active[j]) * entry
+            for j, entry in enumerate(row)
+        ]
+        for i, row in enumerate(seen)
+    ]
+
+
+def contact_slopes(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> tuple[Rows, Rows]:
+    """Compute the derivatives of the accelerations of all contacts, J qdd + dJ/dt qd, by q, along its tangent, and by
+    qd. Each has the rows of `contact_jacobian`."""
+    found = frame_acceleration_slopes(frames, named, q, qd, qdd, root)
+    by_q, by_qd = (
+        [row for each, rows in zip(named, block, strict=True) for row in rows[: each.rows]]
+        for block in (found.by_q, found.by_qd)
+    )
+    return by_q, by_qd
+
+
+@on_coordinates(both_summed)
+def pushed_slopes(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    forces: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[list[Scalar]]:
+    """Compute the derivatives of J^T f by q, along its tangent: nv x nv. The contact forces f are constant along the axes
+    of the base.
+
+    Joint i moves the contact along the twist (v, z) of its column of J. A force F and a moment M then have the torque
+    v . F + z . M. A motion of joint j, which carries joint i or is the same, turns the twist by z_j. The derivative is
+    z_j . (v_i x F + z_i x M). A motion of joint j, which joint i carries, moves the contact by v_j. The derivative is
+    z_i . (v_j x F).
+    """
+    first, used = first_rates(frames), 0
+    found: list[list[Scalar]] = [[0.0] * first[-1] for _ in range(first[-1])]
+    for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
+        if not each.rows:
+            continue
+        own = list(forces[used : used + each.rows])
+        used += each.rows
+        force, moment = _vector(own[:3]), _vector(own[3:]) if each.rows > 3 else None
+        path = path_to(frames, each.joint)
+        numbers, twists = twists_along(path, frames, first, rows)
+        pushed = {k: cross(along, force) for k, (along, _) in twists.items()}
+        bent = {
+            k: pushed[k] if moment is None else add(pushed[k], cross(about, moment))
+            for k, (_, about) in twists.items()
+        }
+        for place, joint in enumerate(path):
+            inner = [k for other in path[: place + 1] for k in numbers[other]]
+            outer = [k for other in path[place + 1 :] for k in numbers[other]]
+            for i in numbers[joint]:
+                for j in inner:
+                    found[i][j] = found[i][j] + dot(twists[j][1], bent[i])
+                for j in outer:
+                    found[i][j] = found[i][j] + dot(twists[i][1], pushed[j])
+    return found
+
+
+def _vector(values: Sequence[Scalar]) -> Vector:
+    x, y, z = values
+    return x, y, z
+
+
+class Response(NamedTuple):
+    """How a robot on its active contacts responds to a small change of its load r and of the prescribed motion w of
+    the contacts.
+
+    With the changes dr and dw, the equations M x - J^T f = r and J x + shift f = w change by
+    dx = inverse dr + push^T dw, and df = compliance dw - push dr.
+
+    inverse     nv x nv, the inverse mass matrix on the contacts
+    push        a row per row of J, nv columns
+    compliance  the inverse of J M^-1 J^T + shift in the active rows and columns, zero in the others
+    """
+
+    inverse: list[list[Scalar]]
+    push: list[list[Scalar]]
+    compliance: list[list[Scalar]]
+
+
+def response(inverse: Rows, jacobian: Rows, compliance: Rows) -> Response:
+    """Return the response from M^-1, J, and the inverse of J M^-1 J^T + shift, with zeros where a row is not active."""
+    seen = [[inner_product(row, column) for column in inverse] for row in jacobian]
+    push = _product(compliance, seen)
+    back = _product(list(zip(*push, strict=True)), seen)
+    held = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(inverse, back, strict=True)]
+    return Response(held, push, [list(row) for row in compliance])
+
+
+def changed(own: Response, load: Rows, wanted: Rows) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
+    """Return dx (nv rows) and df from the changes dr (nv rows) and dw of a `Response`, with a column per change."""
+    kicked, asked = _product(own.inverse, load), _product(list(zip(*own.push, strict=True)), wanted)
+    held, lost = _product(own.compliance, wanted), _product(own.push, load)
+    motion = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(kicked, asked, strict=True)]
+    forces = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(held, lost, strict=True)]
+    return motion, forces
+
+
+def _product(left: Rows, right: Rows) -> list[list[Scalar]]:
+    columns = list(zip(*right, strict=True))
+    return [[inner_product(row, column) for column in columns] for row in left]

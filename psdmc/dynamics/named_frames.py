@@ -136,7 +136,7 @@ def frame_velocity_slopes(
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
         columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
         path = path_to(frames, each.joint)
-        own, twists = _twists_along(path, frames, first, rows)
+        own, twists = twists_along(path, frames, first, rows)
         turning = [_sum(scale(twists[k][1], qd[k]) for k in own[j]) for j in path]
         before = dict(zip(path, _running(turning), strict=True))
         linear, angular = ZERO, ZERO
@@ -188,7 +188,7 @@ def frame_acceleration_slopes(
     first, by_q, by_qd = first_rates(frames), [], []
     for each, rows in zip(named, by_qdd, strict=True):
         path = path_to(frames, each.joint)
-        own, twists = _twists_along(path, frames, first, rows)
+        own, twists = twists_along(path, frames, first, rows)
         links, w, dw = {}, ZERO, ZERO
         for j in path:
             links[j] = w, dw
@@ -220,7 +220,7 @@ def frame_acceleration_slopes(
     return FrameSlopes(by_q, by_qd, by_qdd)
 
 
-def _twists_along(
+def twists_along(
     path: Sequence[int], frames: Sequence[Frame], first: Sequence[int], rows: Sequence[Sequence[Scalar]]
 ) -> tuple[dict[int, range], dict[int, tuple[Vector, Vector]]]:
     """Return the numbers of the rates of each joint of a path, and the columns of these rates, linear and angular."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.solve import factorize, inner_product
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import Factors, factorize, inner_product
 from psdmc.functions import contact_drift, contact_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
@@ -66,6 +67,12 @@ FORCES = Quantity(
 
 
 def trace(g: Ingredients) -> Outputs:
+    found, signs, factors, _ = solved(g)
+    return {"qdd": found.motion, "forces": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def solved(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:
+    """Return the solution with a sign for each contact, the factors of the mass matrix, and the contact Jacobian."""
     q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
     (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
@@ -78,8 +85,7 @@ def trace(g: Ingredients) -> Outputs:
     ]
     load = [given - h for given, h in zip(tau, bias, strict=True)]
     mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
-    found, signs = mask.solved(factors, rows, load, wanted)
-    return {"qdd": found.motion, "forces": found.forces, PIVOTS: [*factors.pivots, *signs]}
+    return *mask.solved(factors, rows, load, wanted), factors, rows
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:

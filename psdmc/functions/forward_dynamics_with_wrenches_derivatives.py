@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.named_frames import local_jacobians
-from psdmc.dynamics.scalar import ZERO, Scalar
+from psdmc.dynamics.scalar import ZERO
 from psdmc.dynamics.slices import first_rates, leading
-from psdmc.dynamics.solve import inner_product, is_zero
+from psdmc.dynamics.solve import inner_product
 from psdmc.functions import (
     forward_dynamics_derivatives,
     forward_dynamics_with_wrenches,
     inverse_dynamics_with_wrenches_derivatives,
 )
-from psdmc.program.regions import Call, Column, For, Reader, Regions, Slice, straight
+from psdmc.program.regions import Call, Column, For, Reader, Regions, straight
 from psdmc.program.signature import QDD, Signature, derivative_of
+from psdmc.recipes.loops import Block, Product, nonzero
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.wrenches import (
@@ -69,7 +69,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     """
     nv = first_rates(frames)[-1]
     width = 6 * len(named)
-    rows: dict[str, list[tuple[int, ...]]] = {}
+    kept: dict[str, list[tuple[int, ...]]] = {}
 
     def loaded(read: Reader) -> dict[str, Column]:
         q, wrenches = read("q", sum(frame.joint.nq for frame in leading(frames))), read(WRENCHES.name, width)
@@ -88,10 +88,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         )
         turn = [[-x for x in row] for row in massless.by_q]
         for name, matrix in (("turn", turn), ("push", push)):
-            rows[name] = [
-                tuple(k for k, x in enumerate(column) if not is_zero(x))
-                for column in zip(*matrix, strict=True)
-            ]
+            kept[name] = nonzero(list(zip(*matrix, strict=True)))
         load = [tau + inner_product(row, wrenches) for tau, row in zip(read("tau", nv), push, strict=True)]
         stored = {"turn": [x for row in turn for x in row], "push": [x for row in push for x in row]}
         return {name: Column(values) for name, values in {"load": load, **stored}.items()}
@@ -104,39 +101,21 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         nv,
     )
     by_q, *_, by_wrenches = (block.name for block in BLOCKS)
+
+    def product(name: str, columns: int, output: str, added: bool) -> Iterator[For]:
+        """M^-1, which is symmetric, times a matrix, column by column."""
+        factors = Block(name, columns).turned(), Block("dqdd_dtau", nv), Block(output, columns).turned()
+        return Product(*factors, columns, nv, added).by_rows(kept[name])
+
     return Regions(
         {"load": nv, "turn": nv * nv, "push": nv * width},
         (
             first,
             call,
-            *_products(rows["turn"], "turn", by_q, nv, added=True),
-            *_products(rows["push"], "push", by_wrenches, nv, added=False),
+            *product("turn", nv, by_q, added=True),
+            *product("push", width, by_wrenches, added=False),
         ),
     )
-
-
-def _products(
-    kept: Sequence[tuple[int, ...]], matrix: str, output: str, nv: int, added: bool
-) -> Iterator[For]:
-    """M^-1 times a matrix, or its sum with the output. `kept` has each column's rows that are not zero. Neighbouring
-    columns with the same rows share a loop."""
-    width = len(kept)
-    for rows, numbers in groupby(range(width), key=kept.__getitem__):
-        own = tuple(numbers)
-        if added and not rows:
-            continue
-
-        def entry(read: Reader, rows: Sequence[int] = rows) -> dict[str, Column]:
-            inverse_row, column = read("inverse_i", nv, nv), read("column", nv, width)
-            total: Scalar = read("entry", 1)[0] if added else 0.0
-            for k in rows:
-                total = total + inverse_row[k] * column[k]
-            return {"entry": Column([total])}
-
-        inner = For(
-            nv, (Slice("inverse_i", "dqdd_dtau"), Slice("entry", "output", 0, width)), (straight(entry),)
-        )
-        yield For(len(own), (Slice("column", matrix, own[0]), Slice("output", output, own[0])), (inner,))
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:

@@ -10,7 +10,8 @@ import numpy as np
 
 from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.solve import factorize, inner_product
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import Factors, factorize, inner_product
 from psdmc.functions import contact_jacobian
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, Q, Quantity, Signature
@@ -59,16 +60,23 @@ TOUCHING = replace(
 
 
 def trace(g: Ingredients) -> Outputs:
+    (restitution,) = g.inputs[RESTITUTION.name]
+    found, signs, factors, _ = solved(g)
+    after = [rate + change for rate, change in zip(g.inputs[BEFORE.name], found.motion, strict=True)]
+    signs = [_within(restitution, sign) for sign in signs]
+    return {"qd_after": after, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def solved(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:
+    """Return the change of the rates and the impulses with a sign for each contact, the factors of the mass matrix, and
+    the contact Jacobian."""
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
     (mu,), (restitution,) = g.inputs[MU.name], g.inputs[RESTITUTION.name]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
     wanted = [-(1.0 + restitution) * inner_product(row, before) for row in rows]
     mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
-    found, signs = mask.solved(factors, rows, g.still, wanted)
-    after = [rate + change for rate, change in zip(before, found.motion, strict=True)]
-    signs = [_within(restitution, sign) for sign in signs]
-    return {"qd_after": after, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
+    return *mask.solved(factors, rows, g.still, wanted), factors, rows
 
 
 def _within(restitution: Any, sign: Any) -> Any:

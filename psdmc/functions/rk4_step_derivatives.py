@@ -28,7 +28,7 @@ from psdmc.program.regions import (
 )
 from psdmc.program.signature import Signature
 from psdmc.recipes.coordinate_maps import CoordinateMaps
-from psdmc.recipes.loops import added, copied, diagonal, filled
+from psdmc.recipes.loops import Block, added, copied, diagonal, filled
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import A, B, step_on_arrays, stepped
@@ -154,11 +154,11 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
         *_moved(frames, nq, nv, "total", "totals"),
         straight(lambda read: {"q_next": Column(read("here", nq)), "qd_next": Column(read("there", nv))}),
         *(
-            copied(nv, 2 * nv, (name, 0, width), ("A", k * 2 * nv * nv, 2 * nv))
+            copied(nv, 2 * nv, Block(name, width), Block("A", 2 * nv).moved(k * nv))
             for k, name in enumerate(("by_q", "by_v"))
         ),
         *(
-            copied(nv, nv, (name, 2 * nv, width), ("B", k * nv * nv, nv))
+            copied(nv, nv, Block(name, width).moved(0, 2 * nv), Block("B", nv).moved(k * nv))
             for k, name in enumerate(("by_q", "by_v"))
         ),
     )

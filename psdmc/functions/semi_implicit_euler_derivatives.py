@@ -13,7 +13,7 @@ from psdmc.dynamics.tangent_steps import step_slopes
 from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.regions import Call, Column, For, Reader, Region, Regions, Slice, straight
 from psdmc.program.signature import Signature
-from psdmc.recipes.loops import added, copied, one_more
+from psdmc.recipes.loops import Block, added, copied, one_more
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import (
@@ -86,7 +86,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
         ),
         straight(stepped_state),
         *(
-            copied(nv, nv, (name, 0, nv), (into, nv * width + column, width), "step")
+            copied(nv, nv, Block(name, nv), Block(into, width).moved(nv, column), "step")
             for name, into, column, width in blocks
         ),
         one_more(nv, Slice("entry", "A", nv * 2 * nv + nv, 2 * nv + 1)),
@@ -103,7 +103,7 @@ def _positions(first: Sequence[int], wide: Mapping[int, int], nv: int) -> Iterat
     for start, end in zip(starts, ends, strict=True):
         if end > start:
             for name, width in matrices:
-                rates, rows = (name, (nv + start) * width, width), (name, start * width, width)
+                rates, rows = (Block(name, width).moved(row) for row in (nv + start, start))
                 yield copied(end - start, width, rates, rows, "step")
             yield one_more(end - start, Slice("entry", "A", start * 2 * nv + start, 2 * nv + 1))
     for i, n in wide.items():

@@ -92,6 +92,7 @@ def _region_to_plain(region: Region) -> dict[str, Any]:
             "given": region.given,
             "found": region.found,
             "pivots": region.pivots,
+            "again": region.again,
         }
     slices = [[each.name, each.array, each.first, each.stride] for each in region.slices]
     return {"count": region.count, "slices": slices, "regions": list(map(_region_to_plain, region.regions))}
@@ -107,7 +108,7 @@ def _region_from_plain(plain: Any) -> Region:
         return Straight(_program_from_plain(plain["straight"]))
     if "call" in plain:
         given, found = (tuple((name, first) for name, first in plain[key]) for key in ("given", "found"))
-        return Call(plain["call"], given, found, plain["pivots"])
+        return Call(plain["call"], given, found, plain["pivots"], plain["again"])
     slices = tuple(Slice(*each) for each in plain["slices"])
     return For(plain["count"], slices, tuple(map(_region_from_plain, plain["regions"])))
 

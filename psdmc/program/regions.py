@@ -68,12 +68,14 @@ class Call:
     found   for each output of the called function, the array that receives it and the first entry written
     pivots  number of pivots (divisors of a matrix factorisation) in the called function; if one is not positive, the
             calling function fails, too
+    again   whether the pivots are the first ones of the calling function, which an earlier call has computed, too
     """
 
     function: str
     given: tuple[tuple[str, int], ...]
     found: tuple[tuple[str, int], ...]
     pivots: int = 0
+    again: bool = False
 
 
 Region = Straight | For | Call
@@ -277,4 +279,4 @@ def _run_call(call: Call, places: Mapping[str, _Place], caller: Caller, pivots: 
     for (name, first), values in zip(call.found, found, strict=True):
         start = places[name].first + first
         places[name].values[start : start + len(values)] = values
-    pivots += own
+    pivots += [] if call.again else own

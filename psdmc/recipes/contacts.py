@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import Factors, factorize, inverse_diagonal
+from psdmc.dynamics.solve import Factors, factorize, inverse, inverse_diagonal
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import Quantity
@@ -76,23 +76,40 @@ class Held(NamedTuple):
     mu: Scalar
     si: Callable[[float, str], Scalar] = lambda value, unit: value
 
+    @property
+    def counts(self) -> list[int]:
+        """The number of rows of each contact."""
+        return [each.rows for each in self.named if each.rows]
+
+    @property
+    def rows(self) -> tuple[list[Scalar], list[Scalar], list[Scalar]]:
+        """For each row: whether its contact is active, what is added to the diagonal, and a one in the diagonal's
+        unit."""
+        si, counts = self.si, self.counts
+        shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
+        unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
+        return (
+            [on for on, count in zip(self.active, counts, strict=True) for _ in range(count)],
+            [each for count in counts for each in shift[:count]],
+            [each for count in counts for each in unit[:count]],
+        )
+
+    def compliance(self, factors: Factors) -> list[list[Scalar]]:
+        """Return the inverse of J M^-1 J^T + mu I in the active rows and columns, and zeros in the others. `factors` are
+        those of the matrix that has ones there."""
+        on, _, _ = self.rows
+        found = inverse(factors)
+        for i, row in enumerate(found):
+            row[i] = on[i] * row[i]
+        return found
+
     def solved(
         self, factors: Factors, jacobian: Rows, load: Sequence[Scalar], wanted: Sequence[Scalar]
     ) -> tuple[Constrained, list[Scalar]]:
         """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact,
         too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
-        si, rows = self.si, [each.rows for each in self.named if each.rows]
-        shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
-        unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
-        found = constrained(
-            factors,
-            jacobian,
-            load,
-            wanted,
-            [on for on, count in zip(self.active, rows, strict=True) for _ in range(count)],
-            [each for count in rows for each in shift[:count]],
-            [each for count in rows for each in unit[:count]],
-        )
+        rows = self.counts
+        found = constrained(factors, jacobian, load, wanted, *self.rows)
         signs, first, inverse = [], 0, inverse_diagonal(found.factors)
         for on, count in zip(self.active, rows, strict=True):
             off = on - on * on

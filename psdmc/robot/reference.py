@@ -48,6 +48,11 @@ class Reference:
             (frame, rows) for frame, rows in zip(ids, self.rows or (POINT,) * len(ids), strict=True) if rows
         ]
 
+    def of_contacts(self, values: Array) -> Array:
+        """Return the rows (..., rows, n) of all contacts from values (..., frames, 6, n) of all named frames."""
+        counts = self.rows or (POINT,) * values.shape[-3]
+        return np.concatenate([values[..., k, :rows, :] for k, rows in enumerate(counts)], axis=-2)
+
     @property
     def frame_ids(self) -> list[int]:
         """Pinocchio's numbers of the named frames."""

@@ -68,6 +68,8 @@ LONG = frozenset(
         "forward_dynamics_with_wrenches_jvp",
         "mass_matrix_inverse",
         "gravity_derivatives",
+        "constrained_forward_dynamics_derivatives",
+        "impulse_derivatives",
         "rk4_step",
         "rk4_step_derivatives",
         "semi_implicit_euler",

@@ -22,7 +22,15 @@ from psdmc.toolchain.call import CompiledRobot
 
 Array = np.ndarray
 
-FUNCTIONS = ("constrained_forward_dynamics", "impulse", "contact_jacobian", "contact_drift", "delassus")
+FUNCTIONS = (
+    "constrained_forward_dynamics",
+    "constrained_forward_dynamics_derivatives",
+    "impulse",
+    "impulse_derivatives",
+    "contact_jacobian",
+    "contact_drift",
+    "delassus",
+)
 
 SHAPES = ("a trunk with two arms", "four legs on a body", "a wrist with two fingers")
 COUNT = 16

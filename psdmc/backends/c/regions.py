@@ -104,9 +104,10 @@ class _Writer:
         yield "{"
         yield f"    const int bad = {called};"
         yield "    if (bad && !failed) {"
-        yield "        failed = before + bad;"
+        yield f"        failed = {'' if call.again else 'before + '}bad;"
         yield "    }"
-        yield f"    before += {call.pivots};"
+        if not call.again:
+            yield f"    before += {call.pivots};"
         yield "}"
 
 

@@ -1,0 +1,204 @@
+"""Forward dynamics with contacts and its derivatives by joint positions, rates and torques."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.solve import inner_product, inverse
+from psdmc.functions import (
+    constrained_forward_dynamics,
+    contact_jacobian,
+    forward_dynamics_derivatives,
+    frame_acceleration_derivatives,
+)
+from psdmc.functions.constrained_forward_dynamics import ERROR, FORCES, KD, KP
+from psdmc.program.regions import Call, Column, Reader, Regions, straight
+from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, derivative_of
+from psdmc.recipes.contact_derivatives import (
+    Changes,
+    Sizes,
+    changed_by_pinocchio,
+    changed_on_arrays,
+    flat,
+    geometry,
+    held_inverse,
+    pushed_by_pinocchio,
+    pushed_motion,
+    responses,
+    slopes_on_arrays,
+)
+from psdmc.recipes.contacts import ACTIVE, MU, Held
+from psdmc.recipes.loops import Block, copied
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array, NamedFrame
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+WITHOUT = constrained_forward_dynamics.RECIPE
+FREE = forward_dynamics_derivatives.RECIPE.signature
+BLOCKS = tuple(derivative_of(output, by) for output in (QDD, FORCES) for by in (Q, QD, TAU, ERROR))
+NAMES = tuple(block.name for block in BLOCKS)
+
+
+def trace(g: Ingredients) -> Outputs:
+    """Solve for accelerations and forces. The derivatives solve the same equations: the load changes by those of J^T f less
+    those of inverse dynamics, the prescribed accelerations by minus those of the contacts' accelerations."""
+    found, signs, factors, jacobian = constrained_forward_dynamics.solved(g)
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    (kp,), (kd,), (mu,) = (g.inputs[each.name] for each in (KP, KD, MU))
+    slopes = inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, q, qd, found.motion, g.base_acceleration, g.choices
+    )
+    turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
+    damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
+    by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
+    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    own = response(inverse(factors), jacobian, mask.compliance(found.factors))
+    loads = (
+        [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)],
+        [[-x for x in row] for row in slopes.by_qd],
+    )
+    wanted = (
+        [[-x for x in row] for row in by_q],
+        [[-(x + kd * y) for x, y in zip(*rows, strict=True)] for rows in zip(by_qd, jacobian, strict=True)],
+    )
+    motions, forces = zip(*(changed(own, *each) for each in zip(loads, wanted, strict=True)), strict=True)
+    by_error = [[-kp * row[i] for row in own.push] for i in range(len(g.still))]
+    motions = (*motions, own.inverse, by_error)
+    forces = (
+        *forces,
+        [[-x for x in row] for row in own.push],
+        [[-kp * x for x in row] for row in own.compliance],
+    )
+    blocks = dict(zip(NAMES, (*motions, *forces), strict=True))
+    return {"qdd": found.motion, "forces": found.forces, **blocks, PIVOTS: [*factors.pivots, *signs]}
+
+
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+    """Return the function's body as loops and two calls: of forward dynamics with contacts, then of the derivatives of
+    forward dynamics, at torques that contain the contact forces. Besides those of `Sizes.arrays`, the arrays are:
+
+    load        tau + J^T f
+    same        accelerations, again
+    wanted_B    derivatives by B of the prescribed accelerations
+    minus_kp    minus kp
+    """
+    sizes = Sizes.of(frames, named)
+    nv, rows = sizes.nv, sizes.rows
+    kept: dict[str, list[tuple[int, ...]]] = {}
+
+    def placed(read: Reader) -> dict[str, Column]:
+        jacobian, stored = geometry(frames, named, read, "forces", kept)
+        q, qd, qdd = read("q", sizes.nq), read("qd", nv), read("qdd", nv)
+        (kp,), (kd,) = read(KP.name, 1), read(KD.name, 1)
+        damped = [x + kd * rate for x, rate in zip(qdd, qd, strict=True)]
+        by_q, by_qd = contact_slopes(frames, named, q, qd, damped)
+        held = [
+            [-(x + kd * y) for x, y in zip(*pair, strict=True)] for pair in zip(by_qd, jacobian, strict=True)
+        ]
+        push = zip(*jacobian, strict=True)
+        forces = read("forces", rows)
+        load = [tau + inner_product(own, forces) for tau, own in zip(read("tau", nv), push, strict=True)]
+        more = {
+            "load": load,
+            "wanted_q": [-x for x in flat(by_q)],
+            "wanted_qd": flat(held),
+            "minus_kp": [-kp],
+        }
+        return stored | {name: Column(values) for name, values in more.items()}
+
+    first = straight(placed)
+    by_q, by_qd, by_tau, by_error, forces_q, forces_qd, forces_tau, forces_error = NAMES
+    signature = WITHOUT.signature
+    given, found = (tuple((each.name, 0) for each in part) for part in (signature.inputs, signature.outputs))
+    push, compliance = Block("push", nv), Block("compliance", rows)
+    body = (
+        Call(signature.name, given, found, nv + sizes.contacts),
+        first,
+        Call(
+            FREE.name,
+            (("q", 0), ("qd", 0), ("load", 0)),
+            (("same", 0), (by_q, 0), (by_qd, 0), (by_tau, 0)),
+            nv,
+            again=True,
+        ),
+        *pushed_motion(nv, by_tau, by_q, kept["turn"]),
+        *responses(
+            frames,
+            named,
+            by_tau,
+            kept,
+            (Changes("wanted_q", by_q, forces_q), Changes("wanted_qd", by_qd, forces_qd)),
+        ),
+        *held_inverse(frames, named, by_tau, forces_tau),
+        copied(nv, rows, push.turned(), Block(by_error, rows), "minus_kp"),
+        copied(rows, rows, compliance, Block(forces_error, rows), "minus_kp"),
+    )
+    arrays = {"load": nv, "same": nv, "wanted_q": rows * nv, "wanted_qd": rows * nv, "minus_kp": 1}
+    return Regions(sizes.arrays | arrays, body)
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    found = WITHOUT.reference(robot, given)
+    kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
+    q, qd = given["q"], given["qd"]
+    slopes = robot.torque_derivatives(q, qd, found["qdd"])
+    turn, by_q, by_qd = slopes_on_arrays(robot, q, qd, found["qdd"] + kd[..., 0] * qd, found["forces"])
+    jacobian = contact_jacobian.RECIPE.reference(robot, given)["J"]
+    loads, wanted = (turn - slopes[0], -slopes[1]), (-by_q, -(by_qd + kd * jacobian))
+    motions, forces, (fixed, push, compliance) = changed_on_arrays(robot, given, loads, wanted)
+    motions += [fixed, kp * np.swapaxes(push, -1, -2)]
+    forces += [push, -kp * compliance]
+    return found | dict(zip(NAMES, (*motions, *forces), strict=True))
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    found = WITHOUT.pinocchio(robot, given)
+    kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
+    q, qd, qdd = given["q"], given["qd"], found["qdd"]
+    slopes = robot.inverse_dynamics_derivatives(q, qd, qdd)
+    turn = pushed_by_pinocchio(robot, q, found["forces"])
+    moved = {"q": q, "qd": qd, "qdd": qdd + kd[..., 0] * qd}
+    by_q, by_qd, _ = (
+        robot.of_contacts(block)
+        for block in frame_acceleration_derivatives.RECIPE.pinocchio(robot, moved).values()
+    )
+    jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    unit = np.broadcast_to(np.eye(qd.shape[1]), slopes[0].shape)
+    one = np.broadcast_to(np.eye(jacobian.shape[1]), (len(q), jacobian.shape[1], jacobian.shape[1]))
+    loads = (turn - slopes[0], -slopes[1], unit, np.zeros_like(np.swapaxes(jacobian, -1, -2)))
+    wanted = (-by_q, -(by_qd + kd * jacobian), np.zeros_like(jacobian), -kp * one)
+    motions, forces = changed_by_pinocchio(robot, given, loads, wanted, jacobian)
+    return found | dict(zip(NAMES, (*motions, *forces), strict=True))
+
+
+RECIPE = Recipe(
+    Signature(
+        "constrained_forward_dynamics_derivatives",
+        342,
+        "qdd and forces of constrained_forward_dynamics, and their derivatives by q, qd, tau and error; row i: derivatives "
+        "of qdd[i] or forces[i]; those by q hold error constant",
+        WITHOUT.signature.inputs,
+        (*WITHOUT.signature.outputs, *BLOCKS),
+        theta=True,
+        summary="Compute the joint accelerations and the contact forces that torques cause, and their derivatives by q, "
+        "qd, tau and error. The derivatives by q hold error constant.",
+        factorises=WITHOUT.signature.factorises,
+        calls=(WITHOUT.name, FREE.name),
+    ),
+    "derivatives of constrained forward dynamics",
+    trace,
+    reference,
+    "computeRNEADerivatives, getFrameAccelerationDerivatives, crba",
+    pinocchio,
+    shares="inverse_dynamics",
+    regions=regions,
+)

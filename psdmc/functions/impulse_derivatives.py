@@ -1,0 +1,197 @@
+"""Impacts and their derivatives by joint positions and by the joint rates before the impact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import ZERO
+from psdmc.dynamics.solve import inverse
+from psdmc.functions import (
+    contact_jacobian,
+    frame_velocity_derivatives,
+    gravity_derivatives,
+    impulse,
+    mass_matrix_inverse,
+)
+from psdmc.functions import inverse_dynamics_derivatives as torque_derivatives
+from psdmc.functions.impulse import AFTER, BEFORE, IMPULSES, RESTITUTION
+from psdmc.program.regions import Call, Column, Reader, Regions, Slice, straight
+from psdmc.program.signature import Q, Signature, derivative_of
+from psdmc.recipes.contact_derivatives import (
+    Changes,
+    Sizes,
+    changed_by_pinocchio,
+    changed_on_arrays,
+    flat,
+    geometry,
+    pushed_by_pinocchio,
+    responses,
+    slopes_on_arrays,
+)
+from psdmc.recipes.contacts import ACTIVE, MU, Held
+from psdmc.recipes.loops import Block, Product, added, filled, one_more
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array, NamedFrame
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+WITHOUT = impulse.RECIPE
+TORQUES, GRAVITY, INVERSE = (
+    each.RECIPE.signature for each in (torque_derivatives, gravity_derivatives, mass_matrix_inverse)
+)
+BLOCKS = tuple(derivative_of(output, by) for output in (AFTER, IMPULSES) for by in (Q, BEFORE))
+NAMES = tuple(block.name for block in BLOCKS)
+
+
+def trace(g: Ingredients) -> Outputs:
+    """Solve for the change of the rates and the impulses. The derivatives solve the same equations, as those of
+    constrained forward dynamics do, without gravity and at rest."""
+    found, _, factors, jacobian = impulse.solved(g)
+    q, before = g.inputs["q"], g.inputs[BEFORE.name]
+    (restitution,), (mu,) = (g.inputs[each.name] for each in (RESTITUTION, MU))
+    slopes = inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, q, g.still, found.motion, ZERO, g.choices
+    )
+    turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
+    seen = [x + (1.0 + restitution) * rate for x, rate in zip(found.motion, before, strict=True)]
+    by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
+    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    own = response(inverse(factors), jacobian, mask.compliance(found.factors))
+    load = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)]
+    rates_q, impulses_q = changed(own, load, [[-x for x in row] for row in by_q])
+    nothing = [[0.0] * len(before) for _ in before]
+    rates_v, impulses_v = changed(own, nothing, [[-(1.0 + restitution) * x for x in row] for row in jacobian])
+    for i, row in enumerate(rates_v):
+        row[i] = row[i] + 1.0
+    blocks = dict(zip(NAMES, (rates_q, rates_v, impulses_q, impulses_v), strict=True))
+    return impulse.trace(g) | blocks
+
+
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+    """Return the function's body as loops and four calls. Besides those of `Sizes.arrays`, the arrays are:
+
+    change    change of the rates
+    still     zero rates
+    by_q      derivatives by q of the torques at these accelerations and at rest, less those of gravity
+    Minv      inverse of the mass matrix
+    wanted_B  derivatives by B of the prescribed change of the contacts' velocities
+    """
+    sizes = Sizes.of(frames, named)
+    nv, rows = sizes.nv, sizes.rows
+    kept: dict[str, list[tuple[int, ...]]] = {}
+
+    def placed(read: Reader) -> dict[str, Column]:
+        jacobian, stored = geometry(frames, named, read, "impulses", kept)
+        q, before, after = read("q", sizes.nq), read(BEFORE.name, nv), read(AFTER.name, nv)
+        (restitution,), still = read(RESTITUTION.name, 1), [0.0] * nv
+        seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
+        by_q, _ = contact_slopes(frames, named, q, still, seen)
+        more = {
+            "still": still,
+            "change": [x - rate for x, rate in zip(after, before, strict=True)],
+            "wanted_q": [-x for x in flat(by_q)],
+            "wanted_v": [-(1.0 + restitution) * x for x in flat(jacobian)],
+        }
+        return stored | {name: Column(values) for name, values in more.items()}
+
+    first = straight(placed)
+    rates_q, rates_v, impulses_q, impulses_v = NAMES
+    signature = WITHOUT.signature
+    given, found = (tuple((each.name, 0) for each in part) for part in (signature.inputs, signature.outputs))
+    entries = Slice("entry", "turn")
+    body = (
+        Call(signature.name, given, found, nv + sizes.contacts),
+        first,
+        Call(
+            TORQUES.name, (("q", 0), ("still", 0), ("change", 0)), (("by_q", 0), ("unused", 0), ("mass", 0))
+        ),
+        added(nv * nv, entries, Slice("other", "by_q"), "minus"),
+        Call(GRAVITY.name, (("q", 0),), (("unused", 0), ("by_q", 0))),
+        added(nv * nv, entries, Slice("other", "by_q")),
+        Call(INVERSE.name, (("q", 0),), (("Minv", 0),), nv, again=True),
+        Product(Block("Minv", nv), Block("turn", nv), Block(rates_q, nv), nv, nv).loop(range(nv)),
+        filled(rates_v, nv * nv),
+        *responses(
+            frames,
+            named,
+            "Minv",
+            kept,
+            (Changes("wanted_q", rates_q, impulses_q), Changes("wanted_v", rates_v, impulses_v)),
+        ),
+        one_more(nv, Slice("entry", rates_v, 0, nv + 1)),
+    )
+    arrays = {"change": nv, "still": nv, "wanted_q": rows * nv, "wanted_v": rows * nv}
+    arrays |= dict.fromkeys(("by_q", "unused", "mass", "Minv"), nv * nv)
+    return Regions(sizes.arrays | arrays, body)
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    found = WITHOUT.reference(robot, given)
+    q, before, after = given["q"], given[BEFORE.name], found["qd_after"]
+    restitution, still = np.reshape(given[RESTITUTION.name], (-1, 1)), np.zeros_like(before)
+    slopes = (
+        robot.torque_derivatives(q, still, after - before)[0] - robot.torque_derivatives(q, still, still)[0]
+    )
+    turn, by_q, _ = slopes_on_arrays(robot, q, still, after + restitution * before, found["impulses"])
+    jacobian = contact_jacobian.RECIPE.reference(robot, given)["J"]
+    wanted = (-by_q, -(1.0 + restitution[..., None]) * jacobian)
+    motions, forces, _ = changed_on_arrays(robot, given, (turn - slopes, np.zeros_like(slopes)), wanted)
+    return found | _named(motions, forces)
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    found = WITHOUT.pinocchio(robot, given)
+    q, before, after = given["q"], given[BEFORE.name], found["qd_after"]
+    restitution, still = np.reshape(given[RESTITUTION.name], (-1, 1)), np.zeros_like(before)
+    slopes, without = (
+        robot.inverse_dynamics_derivatives(q, still, qdd)[0] for qdd in (after - before, still)
+    )
+    turn = pushed_by_pinocchio(robot, q, found["impulses"])
+    seen = {"q": q, "qd": after + restitution * before}
+    (by_q, *_) = (
+        robot.of_contacts(block)
+        for block in frame_velocity_derivatives.RECIPE.pinocchio(robot, seen).values()
+    )
+    jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    loads = (turn - (slopes - without), np.zeros_like(slopes))
+    wanted = (-by_q, -(1.0 + restitution[..., None]) * jacobian)
+    return found | _named(*changed_by_pinocchio(robot, given, loads, wanted, jacobian))
+
+
+def _named(motions: Sequence[Array], forces: Sequence[Array]) -> Arrays:
+    by_q, by_rates = motions
+    unit = np.eye(by_rates.shape[-1])
+    return dict(zip(NAMES, (by_q, unit + by_rates, *forces), strict=True))
+
+
+RECIPE = Recipe(
+    Signature(
+        "impulse_derivatives",
+        352,
+        "qd_after and impulses of an impact, and their derivatives by q and qd_before; row i: derivatives of qd_after[i] or "
+        "impulses[i]",
+        WITHOUT.signature.inputs,
+        (*WITHOUT.signature.outputs, *BLOCKS),
+        theta=True,
+        summary="Compute the joint rates after an impact and its impulses, and their derivatives by q and by the rates "
+        "before the impact.",
+        factorises=WITHOUT.signature.factorises,
+        calls=(WITHOUT.name, TORQUES.name, GRAVITY.name, INVERSE.name),
+    ),
+    "derivatives of impulses of an impact",
+    trace,
+    reference,
+    "computeRNEADerivatives, getFrameVelocityDerivatives, crba",
+    pinocchio,
+    shares="inverse_dynamics",
+    matters=("fold_double_angle",),
+    regions=regions,
+)

@@ -1,0 +1,257 @@
+"""Derivatives of motions and contact forces of robots with contacts: as code, as loops, in NumPy, and with Pinocchio.
+
+The motion x and the contact forces f solve M x - J^T f = r and J x + mu f = w, with the load r and the prescribed motion
+w of the active contacts. Derivatives of x and f solve the same equations with the derivatives of the residuals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from psdmc.dynamics.contacts import (
+    contact_jacobian,
+    contact_slopes,
+    of_active,
+    pushed_slopes,
+)
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import first_rates, leading
+from psdmc.dynamics.solve import factorize
+from psdmc.program.regions import Column, Reader, Region, Straight, straight
+from psdmc.recipes.contacts import ACTIVE, MU, Held, dense_solution
+from psdmc.recipes.loops import Block, Product, copied, nonzero
+from psdmc.recipes.on_arrays import RobotOnArrays, matrix
+from psdmc.reproducible import inverse, times
+from psdmc.robot.mechanism import Array, NamedFrame
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+Rows = Sequence[Sequence[Scalar]]
+
+
+class Sizes(NamedTuple):
+    """Numbers of coordinates, of rates, of contacts and of their rows."""
+
+    nq: int
+    nv: int
+    contacts: int
+    rows: int
+
+    @staticmethod
+    def of(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Sizes:
+        counts = [each.rows for each in named if each.rows]
+        nq = sum(frame.joint.nq for frame in leading(frames))
+        return Sizes(nq, first_rates(frames)[-1], len(counts), sum(counts))
+
+    @property
+    def arrays(self) -> dict[str, int]:
+        """The lengths of the internal arrays that the loops of this file use.
+
+        J           contact Jacobian
+        seen        J M^-1
+        push        the compliance times this
+        compliance  the inverse of J M^-1 J^T + mu I in the active rows and columns, zeros in the others
+        turn        derivatives of J^T f by q, at constant contact forces f
+        wanted_B    derivatives by B of the prescribed motion of the contacts; then less J times those of the motion
+                    without contacts
+        """
+        nv, rows = self.nv, self.rows
+        names = ("J", "seen", "push")
+        return dict.fromkeys(names, rows * nv) | {"compliance": rows * rows, "turn": nv * nv, "minus": 1}
+
+
+def geometry(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    read: Reader,
+    forces: str,
+    kept: dict[str, list[tuple[int, ...]]],
+) -> tuple[Rows, dict[str, Column]]:
+    """Return the contact Jacobian, and what `Sizes.arrays` calls J, turn and minus. `kept` gets the entries of each row of
+    J, and of each column of turn, that are not zero."""
+    sizes = Sizes.of(frames, named)
+    q = read("q", sizes.nq)
+    jacobian = contact_jacobian(frames, named, q)
+    turn = pushed_slopes(frames, named, q, read(forces, sizes.rows))
+    kept |= {"J": nonzero(jacobian), "turn": nonzero(list(zip(*turn, strict=True)))}
+    stored = {"J": flat(jacobian), "turn": flat(turn), "minus": [-1.0]}
+    return jacobian, {name: Column(values) for name, values in stored.items()}
+
+
+def flat(rows: Rows) -> list[Scalar]:
+    """The entries of a matrix, row by row."""
+    return [x for row in rows for x in row]
+
+
+def compliant(
+    frames: Sequence[Frame], named: Sequence[NamedFrame], kept: Sequence[Sequence[int]]
+) -> Straight:
+    """Compute the compliance from J and J M^-1."""
+    sizes = Sizes.of(frames, named)
+    nv, rows = sizes.nv, sizes.rows
+
+    def inverted(read: Reader) -> dict[str, Column]:
+        jacobian, seen = read("J", rows * nv), read("seen", rows * nv)
+        mask = Held(named, read(ACTIVE.name, sizes.contacts), read(MU.name, 1)[0])
+        products = [[0.0] * rows for _ in range(rows)]
+        for i, own in enumerate(kept):
+            for j in range(i + 1):
+                total: Scalar = 0.0
+                for k in own:
+                    total = total + jacobian[i * nv + k] * seen[j * nv + k]
+                products[i][j] = products[j][i] = total
+        factors = factorize(of_active(products, *mask.rows))
+        return {"compliance": Column(flat(mask.compliance(factors)))}
+
+    return straight(inverted)
+
+
+class Changes(NamedTuple):
+    """The derivatives by one quantity, as arrays of a function.
+
+    wanted  rows x columns: those of the prescribed motion of the contacts
+    motion  nv x columns: those of the motion without contacts, then with contacts
+    forces  rows x columns: those of the contact forces
+    """
+
+    wanted: str
+    motion: str
+    forces: str
+
+
+def responses(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    inverse_matrix: str,
+    kept: Mapping[str, list[tuple[int, ...]]],
+    changes: Sequence[Changes],
+) -> Iterator[Region]:
+    """Loops that change derivatives of a motion without contacts to those with contacts, and compute those of the contact
+    forces. The array `inverse_matrix` has M^-1."""
+    sizes = Sizes.of(frames, named)
+    nv, rows = sizes.nv, sizes.rows
+    jacobian, seen, push = (Block(name, nv) for name in ("J", "seen", "push"))
+    compliance, every = Block("compliance", rows), range(rows)
+    yield from Product(jacobian, Block(inverse_matrix, nv), seen, rows, nv).by_rows(kept["J"])
+    yield compliant(frames, named, kept["J"])
+    yield Product(compliance, seen, push, rows, nv).loop(every)
+    for own in changes:
+        wanted, motion, forces = (Block(name, nv) for name in own)
+        yield from Product(jacobian, motion, wanted, rows, nv, True, True).by_rows(kept["J"])
+        yield Product(push.turned(), wanted, motion, nv, nv, True).loop(every)
+        yield Product(compliance, wanted, forces, rows, nv).loop(every)
+
+
+def pushed_motion(
+    nv: int, inverse_matrix: str, motion: str, kept: Sequence[tuple[int, ...]]
+) -> Iterator[Region]:
+    """Loops that add M^-1, which is symmetric, times the array turn to the array `motion`, column by column. `kept` has the
+    entries of each column of turn that are not zero."""
+    turned = Block("turn", nv).turned(), Block(inverse_matrix, nv), Block(motion, nv).turned()
+    return Product(*turned, nv, nv, True).by_rows(kept)
+
+
+def held_inverse(
+    frames: Sequence[Frame], named: Sequence[NamedFrame], motion: str, forces: str
+) -> Iterator[Region]:
+    """Loops that change the array `motion` from M^-1 to the derivatives of the motion with contacts by the load, and store
+    those of the contact forces."""
+    sizes = Sizes.of(frames, named)
+    nv, rows = sizes.nv, sizes.rows
+    seen, push = Block("seen", nv), Block("push", nv)
+    yield Product(push.turned(), seen, Block(motion, nv), nv, nv, True, True).loop(range(rows))
+    yield copied(rows, nv, push, Block(forces, nv), "minus")
+
+
+def changed_on_arrays(
+    robot: RobotOnArrays, given: Mapping[str, Array], loads: Sequence[Array], wanted: Sequence[Array]
+) -> tuple[list[Array], list[Array], tuple[Array, Array, Array]]:
+    """Return the derivatives of the motion and of the contact forces, in NumPy, for k states, from those of the load,
+    (k, nv, columns) each, and of the prescribed motion, (k, rows, columns) each.
+
+    The last result is the inverse mass matrix on the contacts, the derivatives of the forces by the load, and the
+    compliance.
+    """
+    count = len(given["q"])
+    rows = matrix(contact_jacobian(robot.frames, robot.chain.frames, list(given["q"].T)), count)
+    held = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    on, shift, unit = (matrix([values], count)[:, 0] for values in held.rows)
+    turned = np.swapaxes(rows, -1, -2)
+    free = inverse(robot.mass_matrix(given["q"]))
+    seen = times(rows, free)
+    both = on[:, :, None] * on[:, None]
+    diagonal = np.eye(rows.shape[1]) * (on * shift + (1.0 - on) * unit)[:, None]
+    compliance = both * inverse(both * times(seen, turned) + diagonal)
+    push = times(compliance, seen)
+    fixed = free - times(np.swapaxes(push, -1, -2), seen)
+    motions = [
+        times(fixed, r) + times(np.swapaxes(push, -1, -2), w) for r, w in zip(loads, wanted, strict=True)
+    ]
+    forces = [times(compliance, w) - times(push, r) for r, w in zip(loads, wanted, strict=True)]
+    return motions, forces, (fixed, -push, compliance)
+
+
+def slopes_on_arrays(
+    robot: RobotOnArrays, q: Array, qd: Array, motion: Array, forces: Array
+) -> tuple[Array, Array, Array]:
+    """Return, for k states, the derivatives by q of J^T f, (k, nv, nv), and those by q and by qd of the contacts'
+    accelerations J motion + dJ/dt qd, (k, rows, nv)."""
+    frames, named, count = robot.frames, robot.chain.frames, len(q)
+    turn = pushed_slopes(frames, named, list(q.T), list(forces.T))
+    by_q, by_qd = contact_slopes(frames, named, list(q.T), list(qd.T), list(motion.T))
+    return matrix(turn, count), matrix(by_q, count), matrix(by_qd, count)
+
+
+def pushed_by_pinocchio(robot: Reference, q: Array, forces: Array) -> Array:
+    """Return the derivatives (k, nv, nv) of J^T f by q, from Pinocchio, at constant contact forces f (k, rows) along the
+    base's axes.
+
+    Pinocchio's derivatives hold wrenches constant along the axes of their frames. A force F that is constant along the
+    base's axes changes by F x w along the frame's axes if the frame turns by w. This is added.
+    """
+    import pinocchio as pin
+
+    def pushed(model: Any, data: Any, q: Array, forces: Array) -> Array:
+        still, bent, first = np.zeros(model.nv), np.zeros((model.nv, model.nv)), 0
+        external = [pin.Force.Zero() for _ in range(model.njoints)]
+        pin.framesForwardKinematics(model, data, q)
+        for number, rows in robot.contacts:
+            own = np.append(forces[first : first + rows], np.zeros(6 - rows)).reshape(2, 3)
+            first += rows
+            frame, rotation = model.frames[number], data.oMf[number].rotation
+            external[frame.parentJoint] += frame.placement.act(pin.Force((own @ rotation).reshape(6)))
+            found = pin.computeFrameJacobian(model, data, q, number, pin.LOCAL_WORLD_ALIGNED)
+            lines = np.reshape(found, (2, 3, -1))
+            bent += np.einsum("pai,pja->ij", lines, np.cross(own[:, None], lines[1].T))
+        with_them, without = (
+            np.array(pin.computeRNEADerivatives(model, data, q, still, still, *each)[0])
+            for each in ((external,), ())
+        )
+        return np.asarray(without - with_them + bent)
+
+    return robot.each(pushed, q, forces)
+
+
+def changed_by_pinocchio(
+    robot: Reference,
+    given: Mapping[str, Array],
+    loads: Sequence[Array],
+    wanted: Sequence[Array],
+    jacobian: Array,
+) -> tuple[list[Array], list[Array]]:
+    """Return what `changed_on_arrays` returns first, from the full linear systems of Pinocchio's mass matrices."""
+    sizes = [load.shape[-1] for load in loads]
+    load, ends = np.concatenate(loads, axis=-1), np.concatenate(wanted, axis=-1)
+    solutions = [
+        dense_solution(robot, given, jacobian, load[..., k], ends[..., k]) for k in range(load.shape[-1])
+    ]
+    cuts = np.cumsum(sizes)[:-1]
+    motions, forces = (
+        np.split(np.stack(each, axis=-1), cuts, axis=-1) for each in zip(*solutions, strict=True)
+    )
+    return motions, forces
