@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from psdmc.functions import RECIPES
@@ -35,6 +36,7 @@ UNRELEASED = frozenset(
         "com_velocity",
         "com_velocity_derivatives",
         "constrained_forward_dynamics",
+        "constrained_forward_dynamics_derivatives",
         "contact_drift",
         "contact_jacobian",
         "delassus",
@@ -48,6 +50,7 @@ UNRELEASED = frozenset(
         "frame_acceleration_derivatives",
         "frame_jacobian_local",
         "impulse",
+        "impulse_derivatives",
         "inverse_dynamics_second_derivatives",
         "inverse_dynamics_second_derivatives_packed",
         "inverse_dynamics_with_wrenches_derivatives",
@@ -75,13 +78,24 @@ def _row(recipe: Recipe) -> str:
         f"`{recipe.name}`",
         function.summary.partition(". ")[0].removesuffix(".") + ".",
         ", ".join(map(_shape, function.inputs)),
-        ", ".join(map(_shape, function.outputs)),
+        _outputs(function.outputs),
         "yes" if function.theta else "",
         default,
         "next" if recipe.name in UNRELEASED else "0.1" if recipe.name in IN_0_1 else "0.2",
         f"`{recipe.against}`",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def _outputs(outputs: Sequence[Quantity]) -> str:
+    """Outputs with their shapes. Derivatives of several outputs by several inputs are named in few words."""
+    values = [each for each in outputs if "_d" not in each.name]
+    pairs = [each.name[1:].split("_d", 1) for each in outputs if "_d" in each.name and each.name[0] == "d"]
+    above, below = (list(dict.fromkeys(names)) for names in zip(*pairs, strict=True)) if pairs else ([], [])
+    if len(above) < 2 or len(pairs) < len(above) * len(below):
+        return ", ".join(map(_shape, outputs))
+    shown = ", ".join(map(_shape, values))
+    return f"{shown}, d`X`_d`Y` with `X` = {', '.join(above)} and `Y` = {', '.join(below)}"
 
 
 def _shape(quantity: Quantity) -> str:

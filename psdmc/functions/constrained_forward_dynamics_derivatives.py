@@ -28,7 +28,6 @@ from psdmc.recipes.contact_derivatives import (
     flat,
     geometry,
     held_inverse,
-    pushed_by_pinocchio,
     pushed_motion,
     responses,
     slopes_on_arrays,
@@ -165,7 +164,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
     q, qd, qdd = given["q"], given["qd"], found["qdd"]
     slopes = robot.inverse_dynamics_derivatives(q, qd, qdd)
-    turn = pushed_by_pinocchio(robot, q, found["forces"])
+    turn = robot.pushed_slopes(q, found["forces"])
     moved = {"q": q, "qd": qd, "qdd": qdd + kd[..., 0] * qd}
     by_q, by_qd, _ = (
         robot.of_contacts(block)

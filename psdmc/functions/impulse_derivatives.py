@@ -30,7 +30,6 @@ from psdmc.recipes.contact_derivatives import (
     changed_on_arrays,
     flat,
     geometry,
-    pushed_by_pinocchio,
     responses,
     slopes_on_arrays,
 )
@@ -154,7 +153,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     slopes, without = (
         robot.inverse_dynamics_derivatives(q, still, qdd)[0] for qdd in (after - before, still)
     )
-    turn = pushed_by_pinocchio(robot, q, found["impulses"])
+    turn = robot.pushed_slopes(q, found["impulses"])
     seen = {"q": q, "qd": after + restitution * before}
     (by_q, *_) = (
         robot.of_contacts(block)

@@ -7,7 +7,7 @@ w of the active contacts. Derivatives of x and f solve the same equations with t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -205,36 +205,6 @@ def slopes_on_arrays(
     turn = pushed_slopes(frames, named, list(q.T), list(forces.T))
     by_q, by_qd = contact_slopes(frames, named, list(q.T), list(qd.T), list(motion.T))
     return matrix(turn, count), matrix(by_q, count), matrix(by_qd, count)
-
-
-def pushed_by_pinocchio(robot: Reference, q: Array, forces: Array) -> Array:
-    """Return the derivatives (k, nv, nv) of J^T f by q, from Pinocchio, at constant contact forces f (k, rows) along the
-    base's axes.
-
-    Pinocchio's derivatives hold wrenches constant along the axes of their frames. A force F that is constant along the
-    base's axes changes by F x w along the frame's axes if the frame turns by w. This is added.
-    """
-    import pinocchio as pin
-
-    def pushed(model: Any, data: Any, q: Array, forces: Array) -> Array:
-        still, bent, first = np.zeros(model.nv), np.zeros((model.nv, model.nv)), 0
-        external = [pin.Force.Zero() for _ in range(model.njoints)]
-        pin.framesForwardKinematics(model, data, q)
-        for number, rows in robot.contacts:
-            own = np.append(forces[first : first + rows], np.zeros(6 - rows)).reshape(2, 3)
-            first += rows
-            frame, rotation = model.frames[number], data.oMf[number].rotation
-            external[frame.parentJoint] += frame.placement.act(pin.Force((own @ rotation).reshape(6)))
-            found = pin.computeFrameJacobian(model, data, q, number, pin.LOCAL_WORLD_ALIGNED)
-            lines = np.reshape(found, (2, 3, -1))
-            bent += np.einsum("pai,pja->ij", lines, np.cross(own[:, None], lines[1].T))
-        with_them, without = (
-            np.array(pin.computeRNEADerivatives(model, data, q, still, still, *each)[0])
-            for each in ((external,), ())
-        )
-        return np.asarray(without - with_them + bent)
-
-    return robot.each(pushed, q, forces)
 
 
 def changed_by_pinocchio(

@@ -53,6 +53,37 @@ class Reference:
         counts = self.rows or (POINT,) * values.shape[-3]
         return np.concatenate([values[..., k, :rows, :] for k, rows in enumerate(counts)], axis=-2)
 
+    def pushed_slopes(self, q: Array, forces: Array) -> Array:
+        """Return the derivatives (..., nv, nv) of J^T f by q, with constant contact forces f (..., rows) along the base's
+        axes.
+
+        Pinocchio's derivatives hold wrenches constant along the axes of their frames. A force F that is constant along
+        the base's axes changes by F x w along the frame's axes if the frame turns by w. This is added.
+        """
+
+        def pushed(model: pinocchio.Model, data: pinocchio.Data, q: Array, forces: Array) -> Array:
+            still, bent, first = np.zeros(model.nv), np.zeros((model.nv, model.nv)), 0
+            external = [pinocchio.Force.Zero() for _ in range(model.njoints)]
+            pinocchio.framesForwardKinematics(model, data, q)
+            for number, rows in self.contacts:
+                own = np.append(forces[first : first + rows], np.zeros(6 - rows)).reshape(2, 3)
+                first += rows
+                frame, rotation = model.frames[number], data.oMf[number].rotation
+                force = pinocchio.Force((own @ rotation).reshape(6))
+                external[frame.parentJoint] += frame.placement.act(force)
+                aligned = pinocchio.LOCAL_WORLD_ALIGNED
+                lines = np.reshape(
+                    pinocchio.computeFrameJacobian(model, data, q, number, aligned), (2, 3, -1)
+                )
+                bent += np.einsum("pai,pja->ij", lines, np.cross(own[:, None], lines[1].T))
+            with_them, without = (
+                np.array(pinocchio.computeRNEADerivatives(model, data, q, still, still, *each)[0])
+                for each in ((external,), ())
+            )
+            return np.asarray(without - with_them + bent)
+
+        return self.each(pushed, q, forces)
+
     @property
     def frame_ids(self) -> list[int]:
         """Pinocchio's numbers of the named frames."""

@@ -87,9 +87,29 @@ class ConstrainedForwardDynamics(NamedTuple, Generic[RealT]):
     qdd: NDArray[RealT]
     forces: NDArray[RealT]
 
+class ConstrainedForwardDynamicsDerivatives(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    forces: NDArray[RealT]
+    dqdd_dq: NDArray[RealT]
+    dqdd_dqd: NDArray[RealT]
+    dqdd_dtau: NDArray[RealT]
+    dqdd_derror: NDArray[RealT]
+    dforces_dq: NDArray[RealT]
+    dforces_dqd: NDArray[RealT]
+    dforces_dtau: NDArray[RealT]
+    dforces_derror: NDArray[RealT]
+
 class Impulse(NamedTuple, Generic[RealT]):
     qd_after: NDArray[RealT]
     impulses: NDArray[RealT]
+
+class ImpulseDerivatives(NamedTuple, Generic[RealT]):
+    qd_after: NDArray[RealT]
+    impulses: NDArray[RealT]
+    dqd_after_dq: NDArray[RealT]
+    dqd_after_dqd_before: NDArray[RealT]
+    dimpulses_dq: NDArray[RealT]
+    dimpulses_dqd_before: NDArray[RealT]
 
 class FrameAccelerationDerivatives(NamedTuple, Generic[RealT]):
     da_dq: NDArray[RealT]
@@ -199,7 +219,9 @@ class CompiledRobot(CompiledFunctions, Generic[RealT]):
     def contact_drift(self, q: ArrayLike, qd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def delassus(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def constrained_forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamics[RealT]: ...
+    def constrained_forward_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamicsDerivatives[RealT]: ...
     def impulse(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> Impulse[RealT]: ...
+    def impulse_derivatives(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ImpulseDerivatives[RealT]: ...
     def frame_jacobian_local(self, q: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def frame_acceleration(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def frame_acceleration_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> FrameAccelerationDerivatives[RealT]: ...
