@@ -15,7 +15,7 @@ from psdmc.dynamics.kinematics import AT_BASE, path_to
 from psdmc.dynamics.named_frames import (
     Root,
     frame_acceleration_slopes,
-    frame_drifts,
+    frame_accelerations,
     frame_jacobians,
     twists_along,
 )
@@ -55,8 +55,20 @@ def contact_drift(
     root: Root = AT_BASE,
 ) -> list[Scalar]:
     """Compute the accelerations of all contacts at constant joint rates, dJ/dt qd, row by row."""
-    found = zip(named, frame_drifts(frames, named, q, qd, root), strict=True)
-    return [value for each, drift in found for value in drift[: each.rows]]
+    return contact_accelerations(frames, named, q, qd, [0.0] * len(qd), root)
+
+
+def contact_accelerations(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[Scalar]:
+    """Compute the accelerations of all contacts, J qdd + dJ/dt qd, row by row."""
+    found = zip(named, frame_accelerations(frames, named, q, qd, qdd, root), strict=True)
+    return [value for each, own in found for value in own[: each.rows]]
 
 
 class Constrained(NamedTuple):
@@ -66,12 +78,14 @@ class Constrained(NamedTuple):
     forces   f, one entry per row of the contact Jacobian J
     matrix   matrix A of the linear equations for f, both triangles
     factors  factors of A
+    halves   for each row of J, y with L^T y = row, where M = L^T D L
     """
 
     motion: list[Scalar]
     forces: list[Scalar]
     matrix: Rows
     factors: Factors
+    halves: Rows
 
 
 def constrained(
@@ -99,9 +113,33 @@ def constrained(
     """
     halves = [half_solved(factors, row) for row in jacobian]
     free = half_solved(factors, load)
-    scaled = [value * inverse for value, inverse in zip(free, factors.inverses, strict=True)]
     matrix = of_active(half_products(factors, halves), active, shift, one)
     own = factorize(matrix)
+    motion, forces = _answer(factors, own, halves, free, wanted, active)
+    return Constrained(motion, forces, matrix, own, halves)
+
+
+def solved_again(
+    factors: Factors,
+    found: Constrained,
+    load: Sequence[Scalar],
+    wanted: Sequence[Scalar],
+    active: Sequence[Scalar],
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Return the motion and the forces for another load and another prescribed motion."""
+    free = half_solved(factors, load)
+    return _answer(factors, found.factors, found.halves, free, wanted, active)
+
+
+def _answer(
+    factors: Factors,
+    own: Factors,
+    halves: Rows,
+    free: Sequence[Scalar],
+    wanted: Sequence[Scalar],
+    active: Sequence[Scalar],
+) -> tuple[list[Scalar], list[Scalar]]:
+    scaled = [value * inverse for value, inverse in zip(free, factors.inverses, strict=True)]
     lacking = [
         on * (end - inner_product(half, scaled)) for on, end, half in zip(active, wanted, halves, strict=True)
     ]
@@ -109,7 +147,7 @@ def constrained(
     pushed = list(free)
     for force, half in zip(forces, halves, strict=True):
         pushed = [value + force * share for value, share in zip(pushed, half, strict=True)]
-    return Constrained(rest_solved(factors, pushed), forces, matrix, own)
+    return rest_solved(factors, pushed), forces
 
 
 def of_active(

@@ -60,11 +60,17 @@ TOUCHING = replace(
 
 
 def trace(g: Ingredients) -> Outputs:
+    found, signs, factors, _ = solved_after(g)
+    return {"qd_after": found.motion, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def solved_after(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:
+    """Return what `solved` returns, with the rates after the impact in the place of their change, and with a sign -1 for
+    each contact if restitution is not from 0 to 1."""
     (restitution,) = g.inputs[RESTITUTION.name]
-    found, signs, factors, _ = solved(g)
+    found, signs, factors, rows = solved(g)
     after = [rate + change for rate, change in zip(g.inputs[BEFORE.name], found.motion, strict=True)]
-    signs = [_within(restitution, sign) for sign in signs]
-    return {"qd_after": after, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
+    return found._replace(motion=after), [_within(restitution, sign) for sign in signs], factors, rows
 
 
 def solved(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:

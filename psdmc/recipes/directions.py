@@ -32,25 +32,34 @@ COTANGENT = Quantity(
 
 COTANGENT_OF_QDD = replace(COTANGENT, means=COTANGENT.means.replace("tau", "qdd"), unit="J s^2", powers=(-1,))
 
-_ENTRY = {each: OF_Q if each is Q else f"{each.name}[j]" for each in (Q, QD, QDD, TAU)}
-"""What an entry per joint rate belongs to."""
 
-DQ, DQD, DQDD, DTAU = (
-    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"entry j is the change of {entry}")
-    for each, entry in _ENTRY.items()
-)
+def direction_of(quantity: Quantity) -> Quantity:
+    """A change of this input: a vector that is its direction."""
+    axes = ("nv",) if quantity is Q else quantity.axes
+    means = f"entry j is the change of {_entry(quantity)}"
+    return replace(quantity, name=f"d{quantity.name}", axes=axes, largest=1.0, means=means, default=None)
+
+
+def gradient_by(quantity: Quantity) -> Quantity:
+    """The gradient of a weighted sum, which has the unit of energy, by this input."""
+    return Quantity(
+        f"grad_{quantity.name}",
+        ("nv",) if quantity is Q else quantity.axes,
+        means=f"gradient of the weighted sum by {quantity.name}: entry j is the derivative by {_entry(quantity)}",
+        unit=str(dimensions.times(dimensions.dimension_of("J"), quantity.dimension, -1)),
+        powers=(-quantity.powers[0],),
+    )
+
+
+def _entry(quantity: Quantity) -> str:
+    """What an entry of a derivative by this input belongs to."""
+    return OF_Q if quantity is Q else f"{quantity.name}[j]"
+
+
+DQ, DQD, DQDD, DTAU = map(direction_of, (Q, QD, QDD, TAU))
 """Directions of inputs, and derivatives of outputs along them."""
 
-GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
-    Quantity(
-        f"grad_{each.name}",
-        ("nv",),
-        means=f"gradient of the weighted sum by {each.name}: entry j is the derivative by {entry}",
-        unit=str(dimensions.times(dimensions.dimension_of("J"), each.dimension, -1)),
-        powers=(-each.powers[0],),
-    )
-    for each, entry in _ENTRY.items()
-)
+GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = map(gradient_by, (Q, QD, QDD, TAU))
 GRADIENT_THETA = Quantity(
     "grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b", unit="J", powers=(-1,)
 )

@@ -12,9 +12,10 @@ from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.derivation.derive import derive_model
-from psdmc.functions import RECIPES
+from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
+from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.reference import reference
@@ -25,8 +26,12 @@ Array = np.ndarray
 FUNCTIONS = (
     "constrained_forward_dynamics",
     "constrained_forward_dynamics_derivatives",
+    "constrained_forward_dynamics_vjp",
+    "constrained_forward_dynamics_jvp",
     "impulse",
     "impulse_derivatives",
+    "impulse_vjp",
+    "impulse_jvp",
     "contact_jacobian",
     "contact_drift",
     "delassus",
@@ -72,7 +77,7 @@ class ContactTree:
         q, qd, tau = states_of(robot, rng, COUNT)
         contacts, rows = len(robot.contacts), sum(robot.rows_of_contacts)
         masks = (np.arange(COUNT)[:, None] >> np.arange(contacts)) & 1
-        return {
+        found = {
             "q": q,
             "qd": qd,
             "qd_before": qd,
@@ -83,6 +88,15 @@ class ContactTree:
             "kd": rng.uniform(0.0, 10.0, COUNT),
             "error": 0.01 * rng.normal(size=(COUNT, rows)),
             "restitution": rng.uniform(0.0, 1.0, COUNT),
+        }
+        sizes = Sizes(
+            len(robot), robot.nq, robot.nv, 0, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
+        )
+        others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
+        return found | {
+            name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))
+            for name, each in others.items()
+            if name not in found
         }
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:

@@ -1,0 +1,47 @@
+"""Forward dynamics with contacts, and the gradient of weighted accelerations and contact forces (reverse mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.contacts import contact_accelerations, contact_jacobian
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import inner_product
+from psdmc.functions import constrained_forward_dynamics, constrained_forward_dynamics_derivatives
+from psdmc.functions.constrained_forward_dynamics import ERROR, KD, KP
+from psdmc.program.signature import QD, TAU, Q
+from psdmc.recipes.contact_directions import ContactFunction
+from psdmc.recipes.recipe import Ingredients
+from psdmc.recipes.torques import torques
+
+
+def residuals(g: Ingredients, qdd: Sequence[Scalar], forces: Sequence[Scalar]) -> list[Scalar]:
+    """Return the torques of inverse dynamics less tau and J^T forces, and what the contacts' accelerations are too large
+    by, without the part of the forces."""
+    q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
+    (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
+    pushed = zip(*contact_jacobian(g.frames, g.named, q, g.root), strict=True)
+    own = torques(g, qd, qdd, g.base_acceleration)
+    damped = [x + kd * rate for x, rate in zip(qdd, qd, strict=True)]
+    moved = contact_accelerations(g.frames, g.named, q, qd, damped, g.root)
+    return [
+        *(x - given - inner_product(row, forces) for x, given, row in zip(own, tau, pushed, strict=True)),
+        *(x + kp * error for x, error in zip(moved, g.inputs[ERROR.name], strict=True)),
+    ]
+
+
+FUNCTION = ContactFunction(
+    constrained_forward_dynamics.RECIPE,
+    constrained_forward_dynamics_derivatives.RECIPE,
+    (Q, QD, TAU, ERROR),
+    constrained_forward_dynamics.solved,
+    residuals,
+)
+
+RECIPE = FUNCTION.gradient(
+    344,
+    "qdd and forces of constrained_forward_dynamics, and the gradient of cotangent_qdd . qdd + cotangent_forces . forces "
+    "by q, qd, tau and error",
+    "Compute the joint accelerations and the contact forces that torques cause, and the gradients by q, qd, tau and error "
+    "of a weighted sum of both.",
+)

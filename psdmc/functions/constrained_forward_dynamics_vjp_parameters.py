@@ -1,0 +1,53 @@
+"""Forward dynamics with contacts, and the gradient of weighted accelerations and contact forces, also by theta_b."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.functions import constrained_forward_dynamics_vjp
+from psdmc.program.signature import PIVOTS
+from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted, with_parameter_gradient
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
+from psdmc.recipes.regressor_rows import rows_on_arrays
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+STATE = constrained_forward_dynamics_vjp.RECIPE
+"""The function without the gradient by theta_b."""
+
+
+def trace(g: Ingredients) -> Outputs:
+    found = dict(STATE.trace(g))
+    pivots = found.pop(PIVOTS)
+    by_theta = parameter_gradient(g, found["qdd"], found["grad_tau"])
+    return {**found, GRADIENT_THETA.name: [-value for value in by_theta], PIVOTS: pivots}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    found = STATE.reference(robot, given)
+    rows = rows_on_arrays(robot, given["q"], given["qd"], found["qdd"])
+    return found | {GRADIENT_THETA.name: -weighted(found["grad_tau"], rows)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """Return the gradient's product with theta_b in its place, from Pinocchio's torques of the computed motion."""
+    found = STATE.pinocchio(robot, given)
+    tau = robot.inverse_dynamics(given["q"], given["qd"], found["qdd"])
+    return found | {GRADIENT_THETA.name: -(found["grad_tau"] * tau).sum(axis=-1)}
+
+
+RECIPE = with_parameter_gradient(
+    STATE,
+    345,
+    "qdd and forces of constrained_forward_dynamics, and the gradient of cotangent_qdd . qdd + cotangent_forces . forces "
+    "by q, qd, tau, error and theta_b",
+    "Compute the joint accelerations and the contact forces that torques cause, and the gradients by q, qd, tau, error and "
+    "theta_b of a weighted sum of both.",
+    trace,
+    reference,
+    pinocchio,
+)

@@ -1,0 +1,41 @@
+"""Impacts, and the gradient of weighted rates after the impact and impulses (reverse mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.dynamics.scalar import ZERO, Scalar
+from psdmc.dynamics.solve import inner_product
+from psdmc.functions import impulse, impulse_derivatives
+from psdmc.functions.impulse import BEFORE, RESTITUTION
+from psdmc.program.signature import Q
+from psdmc.recipes.contact_directions import ContactFunction
+from psdmc.recipes.recipe import Ingredients
+from psdmc.recipes.torques import torques
+
+
+def residuals(g: Ingredients, after: Sequence[Scalar], impulses: Sequence[Scalar]) -> list[Scalar]:
+    """Return M times the change of the rates less J^T impulses, and J (after + restitution before)."""
+    q, before = g.inputs["q"], g.inputs[BEFORE.name]
+    (restitution,) = g.inputs[RESTITUTION.name]
+    rows = contact_jacobian(g.frames, g.named, q, g.root)
+    kicked = torques(g, g.still, [x - rate for x, rate in zip(after, before, strict=True)], ZERO)
+    seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
+    return [
+        *(x - inner_product(own, impulses) for x, own in zip(kicked, zip(*rows, strict=True), strict=True)),
+        *(inner_product(row, seen) for row in rows),
+    ]
+
+
+FUNCTION = ContactFunction(
+    impulse.RECIPE, impulse_derivatives.RECIPE, (Q, BEFORE), impulse.solved_after, residuals
+)
+
+RECIPE = FUNCTION.gradient(
+    354,
+    "qd_after and impulses of an impact, and the gradient of cotangent_qd_after . qd_after + cotangent_impulses . impulses "
+    "by q and qd_before",
+    "Compute the joint rates after an impact and its impulses, and the gradients by q and qd_before of a weighted sum of "
+    "both.",
+)
