@@ -66,7 +66,8 @@ def rule_of(function: str) -> Rule | None:
     """Return the rule by which JAX and PyTorch differentiate a generated function; None if psdmc has no rule for this
     function."""
     if f"{function}_vjp" in SIGNATURES and f"{function}_jvp" in SIGNATURES:
-        return _gradient(function)
+        is_held = "active" in (each.name for each in SIGNATURES[function].inputs)
+        return _contacts(function) if is_held else _gradient(function)
     if "A" in (output.name for output in _outputs(f"{function}_derivatives")):
         return _step(function)
     blocks = {f"d{out.name}_d{by.name}" for out in _outputs(function) for by in SIGNATURES[function].inputs}
@@ -144,6 +145,35 @@ def _gradient(name: str) -> Rule:
         return gradients, _weighted(f, weights, f.call("regressor", *inputs[:2], qdd)[0])
 
     return Rule(along, back, parameters=True)
+
+
+def _contacts(name: str) -> Rule:
+    """Of a function with contacts. Its derivatives take the function's inputs by name, in another order. At fixed torques,
+    a change of theta_b acts as the opposite change of the torques."""
+    signature, backward, forward = (SIGNATURES[f"{name}{ending}"] for ending in ("", "_vjp", "_jvp"))
+    names = [each.name for each in signature.inputs]
+    gradients = [each.name for each in backward.outputs]
+
+    def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
+        given = dict(zip(names, inputs, strict=True))
+        given |= {f"d{each}": tangent for each, tangent in zip(names, tangents, strict=True)}
+        if dtheta is not None:
+            qdd, _ = f.call(name, *inputs)
+            (regressor,) = f.call("regressor", *inputs[:2], qdd)
+            given["dtau"] = given["dtau"] - _times(f, regressor, dtheta)
+        return f.call(forward.name, *(given[each.name] for each in forward.inputs))[2:]
+
+    def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
+        given = dict(zip(names, inputs, strict=True))
+        weights = zip(signature.outputs, cotangents, strict=True)
+        given |= {f"cotangent_{output.name}": weight for output, weight in weights}
+        called = f"{backward.name}_parameters" if by_theta else backward.name
+        found = f.call(called, *(given[each.name] for each in backward.inputs))
+        values = dict(zip(gradients, found, strict=False))
+        return tuple(values.get(f"grad_{each}") for each in names), found[-1] if by_theta else None
+
+    constant = tuple(each for each in names if f"grad_{each}" not in gradients)
+    return Rule(along, back, f"{backward.name}_parameters" in SIGNATURES, constant)
 
 
 def _blocks(name: str) -> Rule:

@@ -10,7 +10,7 @@ import numpy as np
 from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.scalar import ZERO
+from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.dynamics.solve import inverse
 from psdmc.functions import (
     contact_jacobian,
@@ -71,7 +71,7 @@ def trace(g: Ingredients) -> Outputs:
     for i, row in enumerate(rates_v):
         row[i] = row[i] + 1.0
     blocks = dict(zip(NAMES, (rates_q, rates_v, impulses_q, impulses_v), strict=True))
-    return impulse.trace(g) | blocks
+    return {**impulse.trace(g), **blocks}
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
@@ -93,7 +93,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         (restitution,), still = read(RESTITUTION.name, 1), [0.0] * nv
         seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
         by_q, _ = contact_slopes(frames, named, q, still, seen)
-        more = {
+        more: dict[str, list[Scalar]] = {
             "still": still,
             "change": [x - rate for x, rate in zip(after, before, strict=True)],
             "wanted_q": [-x for x in flat(by_q)],

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from psdmc.dynamics.contacts import Constrained, solved_again
 from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.scalar import Scalar
@@ -180,7 +182,7 @@ class ContactFunction:
                 weighted(given[weight.name], found[f"d{output.name}_d{by.name}"])
                 for output, weight in zip(self.outputs, self.weights, strict=True)
             )
-            values[gradient_by(by).name] = sum(parts)
+            values[gradient_by(by).name] = np.add(*parts)
         return values
 
     def _moved(self, found: Arrays, given: Mapping[str, Array]) -> Arrays:
@@ -190,7 +192,7 @@ class ContactFunction:
                 along(found[f"d{output.name}_d{by.name}"], given[direction.name])
                 for by, direction in zip(self.by, self.directions, strict=True)
             )
-            values[f"d{output.name}"] = sum(parts)
+            values[f"d{output.name}"] = np.sum(list(parts), axis=0)
         return values
 
     def _plain(self, found: Arrays) -> Arrays:

@@ -99,6 +99,29 @@ class ConstrainedForwardDynamicsDerivatives(NamedTuple, Generic[RealT]):
     dforces_dtau: NDArray[RealT]
     dforces_derror: NDArray[RealT]
 
+class ConstrainedForwardDynamicsVjp(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    forces: NDArray[RealT]
+    grad_q: NDArray[RealT]
+    grad_qd: NDArray[RealT]
+    grad_tau: NDArray[RealT]
+    grad_error: NDArray[RealT]
+
+class ConstrainedForwardDynamicsVjpParameters(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    forces: NDArray[RealT]
+    grad_q: NDArray[RealT]
+    grad_qd: NDArray[RealT]
+    grad_tau: NDArray[RealT]
+    grad_error: NDArray[RealT]
+    grad_theta_b: NDArray[RealT]
+
+class ConstrainedForwardDynamicsJvp(NamedTuple, Generic[RealT]):
+    qdd: NDArray[RealT]
+    forces: NDArray[RealT]
+    dqdd: NDArray[RealT]
+    dforces: NDArray[RealT]
+
 class Impulse(NamedTuple, Generic[RealT]):
     qd_after: NDArray[RealT]
     impulses: NDArray[RealT]
@@ -110,6 +133,18 @@ class ImpulseDerivatives(NamedTuple, Generic[RealT]):
     dqd_after_dqd_before: NDArray[RealT]
     dimpulses_dq: NDArray[RealT]
     dimpulses_dqd_before: NDArray[RealT]
+
+class ImpulseVjp(NamedTuple, Generic[RealT]):
+    qd_after: NDArray[RealT]
+    impulses: NDArray[RealT]
+    grad_q: NDArray[RealT]
+    grad_qd_before: NDArray[RealT]
+
+class ImpulseJvp(NamedTuple, Generic[RealT]):
+    qd_after: NDArray[RealT]
+    impulses: NDArray[RealT]
+    dqd_after: NDArray[RealT]
+    dimpulses: NDArray[RealT]
 
 class FrameAccelerationDerivatives(NamedTuple, Generic[RealT]):
     da_dq: NDArray[RealT]
@@ -220,8 +255,13 @@ class CompiledRobot(CompiledFunctions, Generic[RealT]):
     def delassus(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def constrained_forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamics[RealT]: ...
     def constrained_forward_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamicsDerivatives[RealT]: ...
+    def constrained_forward_dynamics_vjp(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, cotangent_qdd: ArrayLike, cotangent_forces: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamicsVjp[RealT]: ...
+    def constrained_forward_dynamics_vjp_parameters(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, cotangent_qdd: ArrayLike, cotangent_forces: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamicsVjpParameters[RealT]: ...
+    def constrained_forward_dynamics_jvp(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, active: ArrayLike, dq: ArrayLike, dqd: ArrayLike, dtau: ArrayLike, derror: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedForwardDynamicsJvp[RealT]: ...
     def impulse(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> Impulse[RealT]: ...
     def impulse_derivatives(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ImpulseDerivatives[RealT]: ...
+    def impulse_vjp(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, cotangent_qd_after: ArrayLike, cotangent_impulses: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ImpulseVjp[RealT]: ...
+    def impulse_jvp(self, q: ArrayLike, qd_before: ArrayLike, active: ArrayLike, dq: ArrayLike, dqd_before: ArrayLike, restitution: ArrayLike = 0.0, mu: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ImpulseJvp[RealT]: ...
     def frame_jacobian_local(self, q: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def frame_acceleration(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def frame_acceleration_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: tuple[NDArray[RealT], ...] | None = None) -> FrameAccelerationDerivatives[RealT]: ...

@@ -21,6 +21,8 @@ EXACT, SOLVED = 1e-10, 1e-8
 INVERTING = {
     "forward_dynamics",
     "forward_dynamics_with_wrenches",
+    "constrained_forward_dynamics",
+    "impulse",
     "mass_matrix_inverse",
     "semi_implicit_euler",
     "rk4_step",
@@ -28,6 +30,7 @@ INVERTING = {
 COUNT = 4
 BY_THETA = ("inverse_dynamics", "forward_dynamics", "mass_matrix", "kinetic_energy")
 BY_THETA += ("inverse_dynamics_with_wrenches", "forward_dynamics_with_wrenches")
+BY_THETA += ("constrained_forward_dynamics",)
 QUICK = [("hopper", name) for name in RULED if name != "rk4_step"]
 
 
@@ -83,15 +86,16 @@ def test_slopes_by_theta_b(name: str) -> None:
     way = theta * np.random.default_rng(2).uniform(-1.0, 1.0, theta.shape)
     with without_optimisation():
         on = compiled("hopper")
-        (along,) = rule.along(on, tuple(inputs), still, way)
-        weights = np.random.default_rng(1).normal(size=along.shape)
-        _, gradient = rule.back(on, tuple(inputs), (weights,), True)
+        along = rule.along(on, tuple(inputs), still, way)
+        weights = tuple(np.random.default_rng(1).normal(size=each.shape) for each in along)
+        _, gradient = rule.back(on, tuple(inputs), weights, True)
         ahead, behind = (
-            OnNumpy(on.robot, theta + sign * 1e-5 * way).call(name, *inputs)[0] for sign in (1.0, -1.0)
+            OnNumpy(on.robot, theta + sign * 1e-5 * way).call(name, *inputs) for sign in (1.0, -1.0)
         )
 
-    assert near(along, (ahead - behind) / 2e-5, 1e-7)
-    assert near(gradient @ way, by_state([(along, weights)]), 1e-12)
+    for found, values in zip(along, zip(ahead, behind, strict=True), strict=True):
+        assert near(found, (values[0] - values[1]) / 2e-5, 1e-7)
+    assert near(gradient @ way, by_state(zip(along, weights, strict=True)), 1e-12)
 
 
 def test_maps_between_entries_of_q_and_the_tangent() -> None:
