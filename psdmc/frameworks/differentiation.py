@@ -95,10 +95,8 @@ def refuse_constant(function: str, given: str) -> ArgumentError:
     if given == "theta_b":
         known = ", ".join(name for name in SIGNATURES if (rule := rule_of(name)) and rule.parameters)
         return ArgumentError(f"{function} has no derivative by theta_b", f"these functions have one: {known}")
-    return ArgumentError(
-        f"{function} has no derivative by {given}",
-        f"keep {given} constant, or write the step with forward_dynamics and integrate",
-    )
+    other = ", or write the step with forward_dynamics and integrate" if given == "dt" else ""
+    return ArgumentError(f"{function} has no derivative by {given}", f"keep {given} constant{other}")
 
 
 def _outputs(function: str) -> tuple[Any, ...]:

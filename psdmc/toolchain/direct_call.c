@@ -13,7 +13,7 @@
 #include "called_arrays.h"
 
 enum {
-    MOST_ARRAYS = 16,    /* inputs and outputs of one function */
+    MOST_ARRAYS = 20,    /* inputs and outputs of one function */
     MOST_AXES = 3,       /* trailing axes of one of them */
     MOST_UNITS = 64,     /* quaternions, and cosines with their sines, in the inputs of one function */
     RELEASE_FROM = 64,   /* states from which the GIL is released: below, giving it up takes longer than the call */
