@@ -215,13 +215,7 @@ def changed_by_pinocchio(
     jacobian: Array,
 ) -> tuple[list[Array], list[Array]]:
     """Return what `changed_on_arrays` returns first, from the full linear systems of Pinocchio's mass matrices."""
-    sizes = [load.shape[-1] for load in loads]
-    load, ends = np.concatenate(loads, axis=-1), np.concatenate(wanted, axis=-1)
-    solutions = [
-        dense_solution(robot, given, jacobian, load[..., k], ends[..., k]) for k in range(load.shape[-1])
-    ]
-    cuts = np.cumsum(sizes)[:-1]
-    motions, forces = (
-        np.split(np.stack(each, axis=-1), cuts, axis=-1) for each in zip(*solutions, strict=True)
-    )
+    cuts = np.cumsum([load.shape[-1] for load in loads])[:-1]
+    solution = dense_solution(robot, given, jacobian, *(np.concatenate(x, axis=-1) for x in (loads, wanted)))
+    motions, forces = (np.split(each, cuts, axis=-1) for each in solution)
     return motions, forces

@@ -152,18 +152,17 @@ def dense_solution(
     """Return the motion x (k, nv) and the contact forces f (k, rows) for k states. They are the reference for tests.
 
     They solve the full linear system M x - J^T f = load, J x + mu f = wanted. M is Pinocchio's mass matrix, J the
-    Jacobian of the active contacts and mu the regularisation.
+    Jacobian of the active contacts and mu the regularisation. Load and wanted may have columns, (k, nv, columns) and
+    (k, rows, columns); the results then have them, too.
     """
     counts = [rows for _, rows in robot.contacts]
     masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
-    found = np.concatenate([load, np.zeros_like(wanted)], axis=1)
-    nv = load.shape[1]
+    motion, forces = np.zeros(load.shape), np.zeros(wanted.shape)
     for k, (mass, on, mu) in enumerate(
         zip(robot.mass_matrix(given["q"]), masks, np.reshape(given[MU.name], -1), strict=True)
     ):
         own = jacobian[k, on]
         whole = np.block([[mass, -own.T], [own, mu * np.eye(len(own))]])
-        found[k, np.append(np.full(nv, True), on)] = np.linalg.solve(
-            whole, np.concatenate([load[k], wanted[k, on]])
-        )
-    return found[:, :nv], found[:, nv:]
+        found = np.linalg.solve(whole, np.concatenate([load[k], wanted[k, on]]))
+        motion[k], forces[k, on] = np.split(found, [len(mass)])
+    return motion, forces
