@@ -129,9 +129,9 @@ def gather(to: Path) -> None:
     shutil.copy(ROOT / "docs/conf.py", to)
     for name in TABLES:
         shutil.copy(ROOT / f"templates/report/{name}.jinja", to / "static" / name)
-    for path in (path for pattern in EXAMPLES for path in (ROOT / "examples").rglob(pattern)):
-        (to / path.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(path, to / path.relative_to(ROOT))
+    for example in (path for pattern in EXAMPLES for path in (ROOT / "examples").rglob(pattern)):
+        (to / example.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(example, to / example.relative_to(ROOT))
     for path in BESIDE:
         _write(to / path, (ROOT / path).read_text(encoding="utf-8"))
     pages = {"cli": command_line(), "python": python(), "c": c_header()}
