@@ -44,6 +44,8 @@ def test_a_call_takes_arrays_from_an_entry_on_and_numbers_its_pivots_on() -> Non
     found, pivots = run(Regions({}, (fill, call, call)), {"a": [1.0, 2.0, 3.0]}, {"c": 3}, doubled)
     assert found["c"] == [1.0, 4.0, 6.0]
     assert pivots == [2.0, 2.0]
+    again = Call("double", (("a", 1),), (("c", 1),), pivots=1, again=True)
+    assert run(Regions({}, (fill, call, again)), {"a": [1.0, 2.0, 3.0]}, {"c": 3}, doubled)[1] == [2.0]
 
 
 def test_a_straight_line_reads_before_it_writes() -> None:

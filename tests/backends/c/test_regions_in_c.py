@@ -94,6 +94,25 @@ def test_the_first_call_that_fails_says_where_and_spoils_the_outputs(tmp_path: P
     assert np.all(np.isnan(c))
 
 
+def test_a_call_whose_pivots_are_the_first_ones_again(tmp_path: Path) -> None:
+    """It fails with their numbers, wherever it stands, and a call after it goes on where the others were."""
+    places = ("qd", 0), ("tau", 0)
+    calls = (
+        Call("forward_dynamics", (("q", 0), *places), (("c", 0),), pivots=1),
+        Call("forward_dynamics", (("q", 1), *places), (("c", 1),), pivots=1, again=True),
+        Call("forward_dynamics", (("q", 2), *places), (("c", 2),), pivots=1),
+    )
+    made = package({"q": 3, "qd": 1, "tau": 1}, {"c": 3}, Regions({}, calls), pivots=2)
+    call = Direct(made, shared_library(made, tmp_path, ["-O1", *WARNINGS]))
+    qd, tau, c = np.array([0.5]), np.array([6.0]), np.zeros(3)
+    for bad, status in ((None, 0), (0, 1), (1, 1), (2, 2)):
+        q = np.ones(3)
+        if bad is not None:
+            q[bad] = -1.0
+        assert call("trial", q, qd, tau, c) == status
+        assert np.isnan(c).all() == (bad is not None)
+
+
 def test_roots_in_a_region_bring_their_header(tmp_path: Path) -> None:
     regions: tuple[Region, ...] = (straight(lambda read: {"c": Column([read("a", 1)[0].root()])}),)
     made = package({"a": 1}, {"c": 1}, Regions({}, regions))
