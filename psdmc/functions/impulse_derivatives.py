@@ -150,9 +150,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     found = WITHOUT.pinocchio(robot, given)
     q, before, after = given["q"], given[BEFORE.name], found["qd_after"]
     restitution, still = np.reshape(given[RESTITUTION.name], (-1, 1)), np.zeros_like(before)
-    slopes, without = (
-        robot.inverse_dynamics_derivatives(q, still, qdd)[0] for qdd in (after - before, still)
-    )
+    slopes, _, _ = robot.weightless.inverse_dynamics_derivatives(q, still, after - before)
     turn = robot.pushed_slopes(q, found["impulses"])
     seen = {"q": q, "qd": after + restitution * before}
     (by_q, *_) = (
@@ -160,7 +158,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
         for block in frame_velocity_derivatives.RECIPE.pinocchio(robot, seen).values()
     )
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
-    loads = (turn - (slopes - without), np.zeros_like(slopes))
+    loads = (turn - slopes, np.zeros_like(slopes))
     wanted = (-by_q, -(1.0 + restitution[..., None]) * jacobian)
     return found | _named(*changed_by_pinocchio(robot, given, loads, wanted, jacobian))
 

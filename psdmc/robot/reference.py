@@ -4,7 +4,7 @@ results with this reference."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,13 +76,17 @@ class Reference:
                     pinocchio.computeFrameJacobian(model, data, q, number, aligned), (2, 3, -1)
                 )
                 bent += np.einsum("pai,pja->ij", lines, np.cross(own[:, None], lines[1].T))
-            with_them, without = (
-                np.array(pinocchio.computeRNEADerivatives(model, data, q, still, still, *each)[0])
-                for each in ((external,), ())
-            )
-            return np.asarray(without - with_them + bent)
+            slopes = pinocchio.computeRNEADerivatives(model, data, q, still, still, external)[0]
+            return np.asarray(bent - slopes)
 
-        return self.each(pushed, q, forces)
+        return self.weightless.each(pushed, q, forces)
+
+    @property
+    def weightless(self) -> Reference:
+        """The same robot without gravity."""
+        model = self.model.copy()
+        model.gravity = pinocchio.Motion.Zero()
+        return replace(self, model=model)
 
     @property
     def frame_ids(self) -> list[int]:
