@@ -9,8 +9,7 @@ import numpy as np
 
 from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import Factors, factorize, inner_product
+from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_drift, contact_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
@@ -19,6 +18,7 @@ from psdmc.recipes.contacts import (
     CONTACTS,
     MU,
     Held,
+    Solved,
     dense_solution,
     held_on_arrays,
 )
@@ -71,7 +71,7 @@ def trace(g: Ingredients) -> Outputs:
     return {"qdd": found.motion, "forces": found.forces, PIVOTS: [*factors.pivots, *signs]}
 
 
-def solved(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:
+def solved(g: Ingredients) -> Solved:
     """Return the solution with a sign for each contact, the factors of the mass matrix, and the contact Jacobian."""
     q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
     (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))

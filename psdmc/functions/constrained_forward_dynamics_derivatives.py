@@ -21,8 +21,9 @@ from psdmc.functions.constrained_forward_dynamics import ERROR, FORCES, KD, KP
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, derivative_of
 from psdmc.recipes.contact_derivatives import (
+    MINUS,
     Changes,
-    Sizes,
+    Counts,
     changed_by_pinocchio,
     changed_on_arrays,
     flat,
@@ -83,20 +84,20 @@ def trace(g: Ingredients) -> Outputs:
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     """Return the function's body as loops and two calls: of forward dynamics with contacts, then of the derivatives of
-    forward dynamics, at torques that contain the contact forces. Besides those of `Sizes.arrays`, the arrays are:
+    forward dynamics, at torques that contain the contact forces. Besides those of `Counts.arrays`, the arrays are:
 
     load        tau + J^T f
     same        accelerations, again
     wanted_B    derivatives by B of the prescribed accelerations
     minus_kp    minus kp
     """
-    sizes = Sizes.of(frames, named)
-    nv, rows = sizes.nv, sizes.rows
+    counts = Counts.of(frames, named)
+    nv, rows = counts.nv, counts.rows
     kept: dict[str, list[tuple[int, ...]]] = {}
 
     def placed(read: Reader) -> dict[str, Column]:
         jacobian, stored = geometry(frames, named, read, "forces", kept)
-        q, qd, qdd = read("q", sizes.nq), read("qd", nv), read("qdd", nv)
+        q, qd, qdd = read("q", counts.nq), read("qd", nv), read("qdd", nv)
         (kp,), (kd,) = read(KP.name, 1), read(KD.name, 1)
         damped = [x + kd * rate for x, rate in zip(qdd, qd, strict=True)]
         by_q, by_qd = contact_slopes(frames, named, q, qd, damped)
@@ -120,7 +121,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     given, found = (tuple((each.name, 0) for each in part) for part in (signature.inputs, signature.outputs))
     push, compliance = Block("push", nv), Block("compliance", rows)
     body = (
-        Call(signature.name, given, found, nv + sizes.contacts),
+        Call(signature.name, given, found, nv + counts.contacts),
         first,
         Call(
             FREE.name,
@@ -142,7 +143,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         copied(rows, rows, compliance, Block(forces_error, rows), "minus_kp"),
     )
     arrays = {"load": nv, "same": nv, "wanted_q": rows * nv, "wanted_qd": rows * nv, "minus_kp": 1}
-    return Regions(sizes.arrays | arrays, body)
+    return Regions(counts.arrays | arrays, body, MINUS)
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:

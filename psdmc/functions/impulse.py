@@ -10,8 +10,7 @@ import numpy as np
 
 from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import Factors, factorize, inner_product
+from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_jacobian
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, Q, Quantity, Signature
@@ -21,6 +20,7 @@ from psdmc.recipes.contacts import (
     CONTACTS,
     MU,
     Held,
+    Solved,
     dense_solution,
     held_on_arrays,
 )
@@ -64,7 +64,7 @@ def trace(g: Ingredients) -> Outputs:
     return {"qd_after": found.motion, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
 
 
-def solved_after(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:
+def solved_after(g: Ingredients) -> Solved:
     """Return what `solved` returns, with the rates after the impact in the place of their change, and with a sign -1 for
     each contact if restitution is not from 0 to 1."""
     (restitution,) = g.inputs[RESTITUTION.name]
@@ -73,7 +73,7 @@ def solved_after(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Fa
     return found._replace(motion=after), [_within(restitution, sign) for sign in signs], factors, rows
 
 
-def solved(g: Ingredients) -> tuple[contacts.Constrained, list[Scalar], Factors, list[list[Scalar]]]:
+def solved(g: Ingredients) -> Solved:
     """Return the change of the rates and the impulses with a sign for each contact, the factors of the mass matrix, and
     the contact Jacobian."""
     q, before = g.inputs["q"], g.inputs[BEFORE.name]

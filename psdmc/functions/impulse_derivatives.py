@@ -24,8 +24,9 @@ from psdmc.functions.impulse import AFTER, BEFORE, IMPULSES, RESTITUTION
 from psdmc.program.regions import Call, Column, Reader, Regions, Slice, straight
 from psdmc.program.signature import Q, Signature, derivative_of
 from psdmc.recipes.contact_derivatives import (
+    MINUS,
     Changes,
-    Sizes,
+    Counts,
     changed_by_pinocchio,
     changed_on_arrays,
     flat,
@@ -75,26 +76,24 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
-    """Return the function's body as loops and four calls. Besides those of `Sizes.arrays`, the arrays are:
+    """Return the function's body as loops and four calls. Besides those of `Counts.arrays`, the arrays are:
 
     change    change of the rates
-    still     zero rates
     by_q      derivatives by q of the torques at these accelerations and at rest, less those of gravity
     Minv      inverse of the mass matrix
     wanted_B  derivatives by B of the prescribed change of the contacts' velocities
     """
-    sizes = Sizes.of(frames, named)
-    nv, rows = sizes.nv, sizes.rows
+    counts = Counts.of(frames, named)
+    nv, rows = counts.nv, counts.rows
     kept: dict[str, list[tuple[int, ...]]] = {}
 
     def placed(read: Reader) -> dict[str, Column]:
         jacobian, stored = geometry(frames, named, read, "impulses", kept)
-        q, before, after = read("q", sizes.nq), read(BEFORE.name, nv), read(AFTER.name, nv)
-        (restitution,), still = read(RESTITUTION.name, 1), [0.0] * nv
+        q, before, after = read("q", counts.nq), read(BEFORE.name, nv), read(AFTER.name, nv)
+        (restitution,) = read(RESTITUTION.name, 1)
         seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
-        by_q, _ = contact_slopes(frames, named, q, still, seen)
+        by_q, _ = contact_slopes(frames, named, q, [0.0] * nv, seen)
         more: dict[str, list[Scalar]] = {
-            "still": still,
             "change": [x - rate for x, rate in zip(after, before, strict=True)],
             "wanted_q": [-x for x in flat(by_q)],
             "wanted_v": [-(1.0 + restitution) * x for x in flat(jacobian)],
@@ -107,7 +106,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     given, found = (tuple((each.name, 0) for each in part) for part in (signature.inputs, signature.outputs))
     entries = Slice("entry", "turn")
     body = (
-        Call(signature.name, given, found, nv + sizes.contacts),
+        Call(signature.name, given, found, nv + counts.contacts),
         first,
         Call(
             TORQUES.name, (("q", 0), ("still", 0), ("change", 0)), (("by_q", 0), ("unused", 0), ("mass", 0))
@@ -127,9 +126,9 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         ),
         one_more(nv, Slice("entry", rates_v, 0, nv + 1)),
     )
-    arrays = {"change": nv, "still": nv, "wanted_q": rows * nv, "wanted_v": rows * nv}
+    arrays = {"change": nv, "wanted_q": rows * nv, "wanted_v": rows * nv}
     arrays |= dict.fromkeys(("by_q", "unused", "mass", "Minv"), nv * nv)
-    return Regions(sizes.arrays | arrays, body)
+    return Regions(counts.arrays | arrays, body, MINUS | {"still": (0.0,) * nv})
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:

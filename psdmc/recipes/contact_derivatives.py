@@ -33,8 +33,11 @@ if TYPE_CHECKING:
 
 Rows = Sequence[Sequence[Scalar]]
 
+MINUS = {"minus": (-1.0,)}
+"""Constant array of the function bodies."""
 
-class Sizes(NamedTuple):
+
+class Counts(NamedTuple):
     """Numbers of coordinates, of rates, of contacts and of their rows."""
 
     nq: int
@@ -43,10 +46,10 @@ class Sizes(NamedTuple):
     rows: int
 
     @staticmethod
-    def of(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Sizes:
+    def of(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Counts:
         counts = [each.rows for each in named if each.rows]
         nq = sum(frame.joint.nq for frame in leading(frames))
-        return Sizes(nq, first_rates(frames)[-1], len(counts), sum(counts))
+        return Counts(nq, first_rates(frames)[-1], len(counts), sum(counts))
 
     @property
     def arrays(self) -> dict[str, int]:
@@ -57,12 +60,9 @@ class Sizes(NamedTuple):
         push        the compliance times this
         compliance  the inverse of J M^-1 J^T + mu I in the active rows and columns, zeros in the others
         turn        derivatives of J^T f by q, at constant contact forces f
-        wanted_B    derivatives by B of the prescribed motion of the contacts; then less J times those of the motion
-                    without contacts
         """
         nv, rows = self.nv, self.rows
-        names = ("J", "seen", "push")
-        return dict.fromkeys(names, rows * nv) | {"compliance": rows * rows, "turn": nv * nv, "minus": 1}
+        return dict.fromkeys(("J", "seen", "push"), rows * nv) | {"compliance": rows * rows, "turn": nv * nv}
 
 
 def geometry(
@@ -72,15 +72,14 @@ def geometry(
     forces: str,
     kept: dict[str, list[tuple[int, ...]]],
 ) -> tuple[Rows, dict[str, Column]]:
-    """Return the contact Jacobian, and what `Sizes.arrays` calls J, turn and minus. `kept` gets the entries of each row of
+    """Return the contact Jacobian, and what `Counts.arrays` calls J and turn. `kept` gets the entries of each row of
     J, and of each column of turn, that are not zero."""
-    sizes = Sizes.of(frames, named)
-    q = read("q", sizes.nq)
+    counts = Counts.of(frames, named)
+    q = read("q", counts.nq)
     jacobian = contact_jacobian(frames, named, q)
-    turn = pushed_slopes(frames, named, q, read(forces, sizes.rows))
+    turn = pushed_slopes(frames, named, q, read(forces, counts.rows))
     kept |= {"J": nonzero(jacobian), "turn": nonzero(list(zip(*turn, strict=True)))}
-    stored = {"J": flat(jacobian), "turn": flat(turn), "minus": [-1.0]}
-    return jacobian, {name: Column(values) for name, values in stored.items()}
+    return jacobian, {"J": Column(flat(jacobian)), "turn": Column(flat(turn))}
 
 
 def flat(rows: Rows) -> list[Scalar]:
@@ -92,12 +91,12 @@ def compliant(
     frames: Sequence[Frame], named: Sequence[NamedFrame], kept: Sequence[Sequence[int]]
 ) -> Straight:
     """Compute the compliance from J and J M^-1."""
-    sizes = Sizes.of(frames, named)
-    nv, rows = sizes.nv, sizes.rows
+    counts = Counts.of(frames, named)
+    nv, rows = counts.nv, counts.rows
 
     def inverted(read: Reader) -> dict[str, Column]:
         jacobian, seen = read("J", rows * nv), read("seen", rows * nv)
-        mask = Held(named, read(ACTIVE.name, sizes.contacts), read(MU.name, 1)[0])
+        mask = Held(named, read(ACTIVE.name, counts.contacts), read(MU.name, 1)[0])
         products = [[0.0] * rows for _ in range(rows)]
         for i, own in enumerate(kept):
             for j in range(i + 1):
@@ -133,8 +132,8 @@ def responses(
 ) -> Iterator[Region]:
     """Loops that change derivatives of a motion without contacts to those with contacts, and compute those of the contact
     forces. The array `inverse_matrix` has M^-1."""
-    sizes = Sizes.of(frames, named)
-    nv, rows = sizes.nv, sizes.rows
+    counts = Counts.of(frames, named)
+    nv, rows = counts.nv, counts.rows
     jacobian, seen, push = (Block(name, nv) for name in ("J", "seen", "push"))
     compliance, every = Block("compliance", rows), range(rows)
     yield from Product(jacobian, Block(inverse_matrix, nv), seen, rows, nv).by_rows(kept["J"])
@@ -161,8 +160,8 @@ def held_inverse(
 ) -> Iterator[Region]:
     """Loops that change the array `motion` from M^-1 to the derivatives of the motion with contacts by the load, and store
     those of the contact forces."""
-    sizes = Sizes.of(frames, named)
-    nv, rows = sizes.nv, sizes.rows
+    counts = Counts.of(frames, named)
+    nv, rows = counts.nv, counts.rows
     seen, push = Block("seen", nv), Block("push", nv)
     yield Product(push.turned(), seen, Block(motion, nv), nv, nv, True, True).loop(range(rows))
     yield copied(rows, nv, push, Block(forces, nv), "minus")

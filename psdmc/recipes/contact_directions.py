@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,16 +23,13 @@ from psdmc.program.dimensions import dimension_of, times
 from psdmc.program.replay import substituted
 from psdmc.program.signature import PIVOTS, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.contacts import ACTIVE, MU, Held
+from psdmc.recipes.contacts import ACTIVE, MU, Held, Solved
 from psdmc.recipes.directions import along, direction_of, gradient_by, weighted
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     pass
-
-Solved = tuple[Constrained, list[Scalar], Factors, list[list[Scalar]]]
-"""The solution, a sign for each contact, the factors of the mass matrix, and the contact Jacobian."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +113,7 @@ class ContactFunction:
                 factorises=signature.factorises,
             ),
             f"{self.values.title}, {title}",
-            self.gradient_trace if ending == "vjp" else self._along_trace,
+            self._gradient_trace if ending == "vjp" else self._along_trace,
             lambda robot, given: blocks(self.derivatives.reference(robot, dict(given)), given),
             self.derivatives.against,
             lambda robot, given: blocks(self.derivatives.pinocchio(robot, given), given),
@@ -122,18 +121,15 @@ class ContactFunction:
             matters=self.values.matters,
         )
 
-    def gradient_trace(self, g: Ingredients) -> Outputs:
+    def _gradient_trace(self, g: Ingredients) -> Outputs:
         found, signs, factors, _ = self.solved(g)
         motion, forces = (g.inputs[each.name] for each in self.weights)
         load, push = solved_again(factors, found, motion, [-each for each in forces], self._active(g))
         inputs = [g.inputs[each.name] for each in self.by]
         free, values = self._free(g, found)
         parts = gradients(values, [*(-each for each in load), *push], inputs)
-        flat = substituted([x for part in parts for x in part], free, [*found.motion, *found.forces])
-        blocks: list[list[Scalar]] = []
-        for part in inputs:
-            first = sum(map(len, inputs[: len(blocks)]))
-            blocks.append(flat[first : first + len(part)])
+        rest = iter(substituted([x for part in parts for x in part], free, [*found.motion, *found.forces]))
+        blocks = [list(islice(rest, len(part))) for part in inputs]
         blocks[0] = pulled_back(g.frames, inputs[0], blocks[0])
         return self._named(g, found, signs, factors, map(gradient_by, self.by), blocks)
 
@@ -182,7 +178,7 @@ class ContactFunction:
                 weighted(given[weight.name], found[f"d{output.name}_d{by.name}"])
                 for output, weight in zip(self.outputs, self.weights, strict=True)
             )
-            values[gradient_by(by).name] = np.add(*parts)
+            values[gradient_by(by).name] = reduce(np.add, parts)
         return values
 
     def _moved(self, found: Arrays, given: Mapping[str, Array]) -> Arrays:
@@ -192,7 +188,7 @@ class ContactFunction:
                 along(found[f"d{output.name}_d{by.name}"], given[direction.name])
                 for by, direction in zip(self.by, self.directions, strict=True)
             )
-            values[f"d{output.name}"] = np.sum(list(parts), axis=0)
+            values[f"d{output.name}"] = reduce(np.add, parts)
         return values
 
     def _plain(self, found: Arrays) -> Arrays:

@@ -60,6 +60,9 @@ NOTHING = 1e-30
 
 Rows = Sequence[Sequence[Scalar]]
 
+Solved = tuple[Constrained, list[Scalar], Factors, list[list[Scalar]]]
+"""The solution, a sign for each contact, the factors of the mass matrix, and the contact Jacobian."""
+
 
 class Held(NamedTuple):
     """The contacts that act on a robot. The world prescribes the accelerations of the active contacts, along 3 or 6

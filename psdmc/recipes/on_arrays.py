@@ -4,9 +4,9 @@ results."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -25,29 +25,23 @@ if TYPE_CHECKING:
     from psdmc.model.dynamics_model import DynamicsModel
 
 
-LATEST = 8
-"""Results of `torque_derivatives` that are kept."""
-
-
 @dataclass(frozen=True, eq=False)
 class RobotOnArrays:
     """A robot whose links have standard parameters x that give the torques of the base parameters theta_b. Dynamics are
     computed in NumPy for many states at once.
 
-    x       (11 n,) standard parameters about the link frames, 11 for each of n links
-    lift    (11 n, l) matrix that gives x from the l base parameters
-    latest  the last results of `torque_derivatives`, by the states' bytes: many functions need those of the same states
+    x      (11 n,) standard parameters about the link frames, 11 for each of n links
+    lift   (11 n, l) matrix that gives x from the l base parameters
     """
 
     chain: Mechanism
     x: Array
     lift: Array
-    latest: dict[tuple[bytes, ...], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
 
-    @staticmethod
-    def of(model: DynamicsModel, theta_b: Array) -> RobotOnArrays:
+    @classmethod
+    def of(cls, model: DynamicsModel, theta_b: Array) -> Self:
         """Return the robot of a model, with the base parameters `theta_b`."""
-        return RobotOnArrays(model.mechanism, times(model.representative, theta_b), model.representative)
+        return cls(model.mechanism, times(model.representative, theta_b), model.representative)
 
     @property
     def n(self) -> int:
@@ -105,20 +99,11 @@ class RobotOnArrays:
     ) -> tuple[Array, Array, Array]:
         """Return the derivatives of the joint torques by q, by qd and by qdd, an array (k, n, n) each, for k states.
         Row i has the derivatives of tau[i]."""
-        key = tuple(array.tobytes() for array in (q, qd, qdd)) if external is NO_WRENCHES else None
-        if key in self.latest:
-            return self.latest[key]
         given = (list(q.T), list(qd.T), list(qdd.T))
         found = inverse_dynamics_derivatives(
             self.frames, self.bodies, self.drives, *given, self.base_acceleration, external=external
         )
         by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
-        if key is not None:
-            for block in (by_q, by_qd, by_qdd):
-                block.setflags(write=False)
-            self.latest[key] = by_q, by_qd, by_qdd
-            for old in list(self.latest)[:-LATEST]:
-                del self.latest[old]
         return by_q, by_qd, by_qdd
 
     def torque_hessian(self, q: Array, qd: Array, qdd: Array, weights: Array) -> Array:

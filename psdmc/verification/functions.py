@@ -4,9 +4,11 @@ check.py compares the others. The functions are computed by their NumPy referenc
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
@@ -40,6 +42,25 @@ ROUNDED = 1e-4
 """Share of that largest output, on whose scale such an output is compared: 1e-10 of it is 1e-14 of the largest."""
 
 
+class _Remembering(RobotOnArrays):
+    """A robot that computes derivatives of torques once for the same states. Most functions that have derivatives need
+    them."""
+
+    @cached_property
+    def _known(self) -> dict[tuple[bytes, ...], tuple[Array, Array, Array]]:
+        return {}
+
+    def torque_derivatives(
+        self, q: Array, qd: Array, qdd: Array, external: Mapping[int, Wrench] = NO_WRENCHES
+    ) -> tuple[Array, Array, Array]:
+        if external is not NO_WRENCHES:
+            return super().torque_derivatives(q, qd, qdd, external)
+        key = tuple(array.tobytes() for array in (q, qd, qdd))
+        if key not in self._known:
+            self._known[key] = super().torque_derivatives(q, qd, qdd)
+        return self._known[key]
+
+
 def function_errors(
     model: DynamicsModel, theta: Array, robot: OnCoordinates, solvable: bool
 ) -> Iterator[tuple[Recipe, float, str]]:
@@ -50,7 +71,7 @@ def function_errors(
 
     solvable  whether the mass matrix can be inverted
     """
-    arrays = RobotOnArrays.of(model, theta)
+    arrays = _Remembering.of(model, theta)
     # States and all else that functions read, (STATES, ...) each.
     rng = np.random.default_rng(SEED)
     chain = model.mechanism

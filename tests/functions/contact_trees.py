@@ -7,6 +7,7 @@ from functools import cache, cached_property
 
 import numpy as np
 from mimic_trees import as_urdf
+from pinocchio_robots import path_of
 from random_trees import TREES, RandomTree
 from unoptimised import without_optimisation
 
@@ -17,7 +18,8 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import Coordinate
-from psdmc.robot.load import LoadedRobot, load_robot_text
+from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
+from psdmc.robot.mechanism import Mechanism
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
 
@@ -72,32 +74,7 @@ class ContactTree:
 
     @cached_property
     def given(self) -> dict[str, Array]:
-        """What the functions read, every mask in turn, mu = 0."""
-        robot, rng = self.loaded.mechanism, np.random.default_rng(7)
-        q, qd, tau = states_of(robot, rng, COUNT)
-        contacts, rows = len(robot.contacts), sum(robot.rows_of_contacts)
-        masks = (np.arange(COUNT)[:, None] >> np.arange(contacts)) & 1
-        found = {
-            "q": q,
-            "qd": qd,
-            "qd_before": qd,
-            "tau": tau,
-            "active": masks.astype(float),
-            "mu": np.zeros(COUNT),
-            "kp": rng.uniform(0.0, 50.0, COUNT),
-            "kd": rng.uniform(0.0, 10.0, COUNT),
-            "error": 0.01 * rng.normal(size=(COUNT, rows)),
-            "restitution": rng.uniform(0.0, 1.0, COUNT),
-        }
-        sizes = Sizes(
-            len(robot), robot.nq, robot.nv, 0, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
-        )
-        others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
-        return found | {
-            name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))
-            for name, each in others.items()
-            if name not in found
-        }
+        return given_to(self.loaded.mechanism)
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
         """Pinocchio's values."""
@@ -117,6 +94,49 @@ class ContactTree:
                 np.linalg.cond(np.block([[matrix * np.outer(scale, scale), -active.T], [active, zero]]))
             )
         return max(conditions)
+
+
+def given_to(robot: Mechanism) -> dict[str, Array]:
+    """What the functions read, every mask in turn, mu = 0."""
+    rng = np.random.default_rng(7)
+    q, qd, tau = states_of(robot, rng, COUNT)
+    contacts, rows = len(robot.contacts), sum(robot.rows_of_contacts)
+    masks = (np.arange(COUNT)[:, None] >> np.arange(contacts)) & 1
+    found = {
+        "q": q,
+        "qd": qd,
+        "qd_before": qd,
+        "tau": tau,
+        "active": masks.astype(float),
+        "mu": np.zeros(COUNT),
+        "kp": rng.uniform(0.0, 50.0, COUNT),
+        "kd": rng.uniform(0.0, 10.0, COUNT),
+        "error": 0.01 * rng.normal(size=(COUNT, rows)),
+        "restitution": rng.uniform(0.0, 1.0, COUNT),
+    }
+    sizes = Sizes(
+        len(robot), robot.nq, robot.nv, 0, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
+    )
+    others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
+    return found | {
+        name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))
+        for name, each in others.items()
+        if name not in found
+    }
+
+
+@cache
+def floating_gripper() -> tuple[DynamicsModel, CompiledRobot, dict[str, Array]]:
+    """The Panda, whose fingers are coupled, on a floating base: its model, its C, and what the functions read."""
+    path, contacts = path_of("panda"), ["panda_link5", "panda_leftfinger:6"]
+    robot = load_robot(path, floating=True, frames=["panda_link3"], contacts=contacts).mechanism
+    model = derive_model(robot, expand=False)
+    with without_optimisation():
+        return (
+            model,
+            psdmc.compile(model, functions=FUNCTIONS),
+            given_to(robot) | {"mu": np.linspace(0.1, 1.0, COUNT)},
+        )
 
 
 @cache

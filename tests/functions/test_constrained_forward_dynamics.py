@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from against_pinocchio import EVERY, matches_pinocchio
-from contact_trees import BRICK, FUNCTIONS, ContactTree, brick, contact_tree
+from contact_trees import BRICK, FUNCTIONS, ContactTree, brick, contact_tree, floating_gripper
 from direct import Direct
 from robots_at_hand import in_wheel
 from slow_cases import slow_but_for
@@ -80,6 +80,18 @@ def test_single_precision() -> None:
     assert bound < 0.1
     for value, array in zip(found, expected.values(), strict=True):
         assert np.abs(value - array).max() < bound * np.abs(array).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("function", [name for name in FUNCTIONS if name.startswith(("constr", "impulse"))])
+def test_mimic_joints_and_a_frame_that_is_no_contact(function: str) -> None:
+    """A gripper on a floating arm: C, with loops and calls, against the model in NumPy."""
+    model, robot, given = floating_gripper()
+    states = [given[q.name] for q in SIGNATURES[function].inputs]
+    for found, expected in zip(
+        getattr(robot, function)(*states), getattr(model, function)(*states), strict=True
+    ):
+        assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
 
 
 def test_what_may_be_left_out_is_zero() -> None:

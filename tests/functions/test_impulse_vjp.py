@@ -1,23 +1,5 @@
-"""Gradients of impacts: products with dense systems of Pinocchio's numbers."""
+"""Gradients of impacts."""
 
-from __future__ import annotations
+from products_with_slopes import made_for
 
-import pytest
-from against_pinocchio import INTERPRETED, matches_pinocchio, program_matches_pinocchio
-from wide_robots import is_pinocchios
-
-NAME = "impulse_vjp"
-
-
-def test_it_is_the_product() -> None:
-    """test_constrained_forward_dynamics.py does the same on trees, with every mask."""
-    matches_pinocchio(NAME, "sliding")
-
-
-@pytest.mark.parametrize("robot", INTERPRETED)
-def test_its_programs_are_the_product(robot: str) -> None:
-    program_matches_pinocchio(NAME, robot)
-
-
-def test_joints_of_several_coordinates() -> None:
-    is_pinocchios(NAME, "small", 1e-8, in_c=False)
+test_layouts, test_programs, test_joints_of_several_coordinates = made_for("impulse_vjp")

@@ -44,6 +44,17 @@ def test_the_derivative_by_accelerations_is_the_mass_matrix() -> None:
     np.testing.assert_allclose(found, own.model.mass_matrix(q), atol=1e-13 * np.abs(found).max())
 
 
+def test_results_belong_to_the_caller() -> None:
+    """A second call does not see what the caller writes into the results of the first."""
+    own = bench(ARM)
+    states = [own.given[name] for name in ("q", "qd", "qdd")]
+    for robot in (own.model, own.robot):
+        found = robot.inverse_dynamics_derivatives(*states)
+        before = found.dtau_dq.copy()
+        found.dtau_dq[...] = 0.0
+        np.testing.assert_array_equal(robot.inverse_dynamics_derivatives(*states).dtau_dq, before)
+
+
 @pytest.mark.parametrize("name", ["inverse_dynamics_derivatives", "forward_dynamics_derivatives"])
 def test_an_upright_arm_takes_no_sine_of_its_first_angle(name: str) -> None:
     """It turns about gravity: its second moment about its own axis is added and subtracted again, turned."""
