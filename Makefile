@@ -102,7 +102,7 @@ test-adapters: $(ADAPTERS)/ready ## test robots inside JAX, PyTorch, FMPy and pi
 	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks tests/backends/adapters
 
 test-pages: $(READY) ## open bench, calibration and site pages in Chromium at three widths, light and dark; screenshots in generated/pages
-	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[pages]'
+	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet --editable '.[pages]'
 	@mkdir -p $(GENERATED)/pages
 	PSDMC_SCREENSHOTS=$(abspath $(GENERATED)/pages) $(RUN)/python -m pytest -q -rs tests/pages
 
@@ -195,14 +195,14 @@ FUZZ := $(if $(FORMAT),--format $(FORMAT)) $(if $(COUNT),--count $(COUNT)) $(if 
 FUZZ += --seconds $(or $(SECONDS),$(if $(COUNT),1000000,240)) $(FUZZ_OPTIONS)
 
 fuzz: $(READY) ## try damaged files and command lines, minutes; SECONDS=, COUNT=, FORMAT=, ENGINE=; figures in generated/fuzz/
-	@$(RUN)/python -c 'import atheris' 2>/dev/null || $(RUN)/python -m pip install --quiet --only-binary :all: '.[fuzz]' \
+	@$(RUN)/python -c 'import atheris' 2>/dev/null || $(RUN)/python -m pip install --quiet --only-binary :all: --editable '.[fuzz]' \
 	  || echo "atheris does not install here: mutation without guidance by coverage"
 	$(RUN)/python tests/fuzz/fuzz.py $(FUZZ)
 
 MUTANTS ?= 80
 FIRST_MUTANT := psdmc.program.cost.x_cost__mutmut_1
 mutate: $(READY) ## put faults into program/ and lower/ and list those that no fast test notices; MUTANTS=80, minutes; `mutmut show NAME` for one
-	@$(RUN)/python -c 'import mutmut' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[mutate]'
+	@$(RUN)/python -c 'import mutmut' 2>/dev/null || $(RUN)/python -m pip install --quiet --editable '.[mutate]'
 	rm -rf mutants
 	$(RUN)/mutmut run --max-children 1 $(FIRST_MUTANT)
 	$(RUN)/mutmut run $$($(RUN)/python tests/mutation/sampled.py $(MUTANTS))
