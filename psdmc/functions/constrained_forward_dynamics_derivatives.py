@@ -23,13 +23,11 @@ from psdmc.functions import (
 )
 from psdmc.functions.constrained_forward_dynamics import ERROR, FORCES, KD, KP
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
-from psdmc.program.signature import PIVOTS, QD, QDD, TAU, THIN, Q, Signature, derivative_of
-from psdmc.program.thin_products import Thin
+from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, derivative_of
 from psdmc.recipes.contact_derivatives import (
     MINUS,
     Changes,
     Counts,
-    Rows,
     changed_by_pinocchio,
     changed_on_arrays,
     flat,
@@ -37,7 +35,10 @@ from psdmc.recipes.contact_derivatives import (
     held_inverse,
     pushed_motion,
     responses,
+    scaled,
     slopes_on_arrays,
+    thin_blocks,
+    thin_outputs,
 )
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, copied
@@ -109,36 +110,27 @@ def _in_limbs(g: Ingredients) -> Outputs:
     loads = [[x - y for x, y in zip(*pair, strict=True)] for pair in zip(moving.by_q, turn, strict=True)]
     unit = [[float(i == j) for j in range(nv + count)] for i in range(nv + count)]
     found_by = {
-        "q": arrow.thin([*loads, *_times(on, slopes[0])], range(nv)),
-        "qd": arrow.thin([*at_rest.by_qd, *_times(on, by_rate)], range(nv)),
+        "q": arrow.thin([*loads, *scaled(on, slopes[0])], range(nv)),
+        "qd": arrow.thin([*at_rest.by_qd, *scaled(on, by_rate)], range(nv)),
         "tau": arrow.thin([[-x for x in row[:nv]] for row in unit], range(nv)),
         "error": arrow.thin(
-            [row[nv:] for row in _times([*[1.0] * nv, *(kp * each for each in on)], unit)],
+            [row[nv:] for row in scaled([*[1.0] * nv, *(kp * each for each in on)], unit)],
             range(nv, nv + count),
         ),
     }
-    thin = [row[:nv] for row in arrow.thin_factors]
     return {
         "qdd": motion,
         "forces": forces,
-        **{f"dqdd_d{by}": matrix[:nv] for by, matrix in found_by.items()},
-        **{f"dforces_d{by}": _minus(matrix[nv:]) for by, matrix in found_by.items()},
+        **thin_outputs(arrow, nv, found_by, "qdd", "forces"),
         PIVOTS: [*arrow.pivots[:nv], *mask.signs(margins)],
-        THIN: [*thin[:nv], *_minus(thin[nv:])],
     }
 
 
 def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
     q, qd = g.inputs["q"], g.inputs["qd"]
-    return inverse_dynamics_derivatives(g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices)
-
-
-def _times(factors: Sequence[Scalar], rows: Rows) -> list[list[Scalar]]:
-    return [[factor * x for x in row] for factor, row in zip(factors, rows, strict=True)]
-
-
-def _minus(rows: Rows) -> list[list[Scalar]]:
-    return [[-x for x in row] for row in rows]
+    return inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
+    )
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
@@ -252,9 +244,7 @@ RECIPE = Recipe(
         "qd, tau and error. The derivatives by q hold error constant.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, FREE.name),
-        thin=tuple(
-            Thin(f"dqdd_d{by}", 3 if by == "q" else 0, f"dforces_d{by}") for by in ("q", "qd", "tau", "error")
-        ),
+        thin=thin_blocks("qdd", "forces", ("q", "qd", "tau", "error")),
     ),
     "derivatives of constrained forward dynamics",
     trace,
