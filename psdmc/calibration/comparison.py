@@ -198,8 +198,8 @@ def compare(
     b                 another model of the robot, the path of its file, or the path of a robot file (URDF, MJCF, DH table)
     logs              logs on which psdmc tests both models; at least one of them must then be calibrated
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: the models'
-    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints): topic of the joint states in ROS bags, and
-                      dictionary of the model's joint names by the names in the logs, if the names differ
+    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
+                      in ROS bags. `joints` is a dictionary: names of joints in the logs -> different names in the model
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if a file is missing, a model has no values, or the models are of different robots.

@@ -190,8 +190,8 @@ def validate(
                       the exciting motions (runs of the step "inertial") without a load. There is one verdict on all logs
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the log
                       description or of the model
-    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints): topic of the joint states in ROS bags, and
-                      dictionary of the model's joint names by the names in the logs, if the names differ
+    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
+                      in ROS bags. `joints` is a dictionary: names of joints in the logs -> different names in the model
     regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
 
