@@ -20,7 +20,7 @@ from psdmc.robot.mechanism import Array, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "three linear ones for a point; three linear, then three angular ones for a surface; along the base frame's axes"
+ROW_WORDS = "three linear for each point; three linear, then three angular for each surface; along the axes of the base frame"
 
 ACTIVE = Quantity(
     "active",
