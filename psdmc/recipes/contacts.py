@@ -20,7 +20,7 @@ from psdmc.robot.mechanism import Array, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "three linear for each point; three linear, then three angular for each surface; along the axes of the base frame"
+ROW_WORDS = "three linear for each point; three linear, then three angular for each surface; along the base frame's axes"
 
 ACTIVE = Quantity(
     "active",

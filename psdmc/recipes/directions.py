@@ -76,8 +76,8 @@ def hessian_of(last: Quantity, axis: str) -> Quantity:
     """The symmetric matrix of second derivatives of a weighted sum by q, qd and a third quantity."""
     means = (
         "symmetric matrix of the second derivatives of the weighted sum. The first nv rows and columns are for q, the next "
-        f"nv for qd, the last nv for {last.name}. If the robot has a ball joint or a floating base, those for q are for "
-        "the entries of x at x = 0, with integrate(q, x) in place of q"
+        f"nv for qd, the last nv for {last.name}. If the robot has a ball joint or a floating base, q is replaced by "
+        "integrate(q, x), and the first nv are for x at x = 0"
     )
     return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
 
