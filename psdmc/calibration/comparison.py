@@ -200,7 +200,8 @@ def compare(
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the
                       models
     naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
-                      in ROS bags. `joints` is a dictionary: names of joints in the logs -> different names in the model
+                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
+                      differ
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if a file is missing, a model has no values, or the models are of different robots.

@@ -191,7 +191,8 @@ def validate(
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the log
                       description or of the model
     naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
-                      in ROS bags. `joints` is a dictionary: names of joints in the logs -> different names in the model
+                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
+                      differ
     regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
 
