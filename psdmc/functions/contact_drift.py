@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,23 +10,20 @@ from psdmc.dynamics.contacts import contact_drift
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"drift": contact_drift(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     return {"drift": columns(contact_drift(robot.frames, robot.chain.frames, list(q.T), list(qd.T)), len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,23 +10,20 @@ from psdmc.dynamics.contacts import contact_jacobian
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"J": contact_jacobian(g.frames, g.named, g.inputs["q"], g.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q = given["q"]
     return {"J": matrix(contact_jacobian(robot.frames, robot.chain.frames, list(q.T)), len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def jacobian(model: Any, data: Any, q: Array) -> Array:

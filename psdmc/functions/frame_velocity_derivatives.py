@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.named_frames import frame_velocity_slopes
 from psdmc.program.signature import OF_Q, QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"dv_dq": frame_velocity_slopes(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     slopes = frame_velocity_slopes(robot.frames, robot.chain.frames, list(q.T), list(qd.T))
     return {"dv_dq": entries(slopes, len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return Pinocchio's derivatives of the frames' velocities, along the base's axes. Pinocchio's derivatives along
     the frame's axes are rotated. The derivative of this rotation, times the velocity, is added."""
     import pinocchio as pin
