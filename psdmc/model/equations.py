@@ -12,14 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.model.terms import Power, Symbol, Term, equation
 from psdmc.reproducible import times
 from psdmc.robot.inertia import LENGTH_ORDER
-from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array, Joint, Mechanism
 
 RECOGNITION = 1e-9
 """Relative difference up to which a coefficient is written by a name. For display only: the numbers stay."""
