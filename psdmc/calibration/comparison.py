@@ -11,8 +11,8 @@ import numpy as np
 from scipy import stats
 
 from psdmc.calibration.columns.columns import Columns
-from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.quality import qualities
+from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
+from psdmc.calibration.identify.residuals import qualities
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.sources import LogNaming

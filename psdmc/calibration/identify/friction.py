@@ -12,8 +12,7 @@ from psdmc.calibration.identify.friction_fit import JointFriction, fit_joint, un
 from psdmc.calibration.identify.friction_run import JointRun, prepared
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.quality import quality
-from psdmc.calibration.identify.residuals import CORRELATED
+from psdmc.calibration.identify.residuals import CORRELATED, quality
 from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, StepOptions
 from psdmc.calibration.logs.log import Array
 from psdmc.model.calibrated import JointQuality, Remark, Sample, StepQuality

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import FitOptions
-from psdmc.calibration.identify.quality import quality
+from psdmc.calibration.identify.residuals import quality
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.low_pass import FilterOptions
