@@ -16,7 +16,7 @@ from psdmc.cli.output import check_report
 from psdmc.cli.progress import steps
 
 if TYPE_CHECKING:
-    from psdmc.calibration.comparison import Comparison
+    from psdmc.calibration.compared import Comparison
     from psdmc.calibration.validation import Validation
 
 Report = Annotated[
