@@ -26,6 +26,7 @@ from psdmc.calibration.identify.steps import (
     GravityRun,
     InertialRun,
     MotorRun,
+    Robot,
 )
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
@@ -98,22 +99,18 @@ def calibrate_four_steps(
     say("motors")
     motor = calibrate_motors(chain, runs.motor, options.motor) if runs.motor else None
     motors = _motors(chain, motor, runs, torque_constants or {})
-    split = gravity_split(chain, model, l)
+    robot, split = Robot(chain, model, motors), gravity_split(chain, model, l)
     theta_b: Array | None = None
     friction: FrictionResult | None = None
     for _ in range(options.passes):
         say("gravity")
-        gravity = calibrate_gravity(
-            chain, model, split, motors, runs.gravity, options.gravity, theta_b, file_theta
-        )
+        gravity = calibrate_gravity(robot, split, runs.gravity, options.gravity, theta_b, file_theta)
         say("friction")
         known = split.from_phi() @ gravity.estimate.values
-        alone = prepared_runs(chain, model, motors, known, runs.friction, options.friction)
+        alone = prepared_runs(robot, known, runs.friction, options.friction)
         friction = calibrate_friction(alone, options.lugre, friction)
         say("inertia")
-        inertial = calibrate_inertial(
-            chain, model, motors, gravity, friction, runs.inertial, options.inertial, file_theta
-        )
+        inertial = calibrate_inertial(robot, gravity, friction, runs.inertial, options.inertial, file_theta)
         theta_b = inertial.theta_b
     assert friction is not None
     return FourSteps(motor, motors, gravity, friction, inertial)
