@@ -18,7 +18,7 @@ from psdmc.calibration.motions.excite_options import (
     chosen_objective,
 )
 from psdmc.cli.lists import assignments, names
-from psdmc.cli.next_step import quoted, say_next_line
+from psdmc.cli.output import quoted, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 

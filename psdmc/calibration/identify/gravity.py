@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior, base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
-from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.steps import GravityRun, Robot, StepOptions, judged
 from psdmc.calibration.logs.filter import States, away_from, filtered, held_out

@@ -12,14 +12,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior, base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import GravityResult, gravity_split
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
-from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.identify.steps import InertialRun, Robot, StepOptions, judged

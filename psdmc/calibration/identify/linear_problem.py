@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from psdmc.calibration.columns.columns import Columns
 from psdmc.calibration.columns.effect import Motion
 from psdmc.calibration.columns.ways import poses
+from psdmc.calibration.identify.estimate import NO_EFFECT, ORDINARY_SPEED, SEED
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_rows import KeptRows
 from psdmc.calibration.identify.motor_model import Coupling, Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.prior import NO_EFFECT, ORDINARY_SPEED, SEED
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Estimate, Prior
+from psdmc.calibration.identify.estimate import Estimate, Prior, base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.least_squares import estimate_rows
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
@@ -18,7 +18,6 @@ from psdmc.calibration.identify.linear_rows import Block
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.logs.filter import States, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
