@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.lower.expanded.constants import Constants
-from psdmc.lower.expanded.diagram import Diagram, nested_horner, operations, with_constants
+from psdmc.lower.expanded.diagram import Constants, Diagram, nested_horner, operations, with_constants
 from psdmc.lower.expanded.lowering import base_first, candidates, polynomial_values, tip_first
 from psdmc.lower.expanded.terms import Terms
 from psdmc.program.cost import cost
