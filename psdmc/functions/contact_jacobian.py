@@ -7,20 +7,18 @@ from typing import Any
 import numpy as np
 
 from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
-from psdmc.recipes.on_arrays import RobotOnArrays, matrix
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-
-def trace(g: Ingredients) -> Outputs:
-    return {"J": contact_jacobian(g.frames, g.named, g.inputs["q"], g.root)}
+INPUTS = (Q,)
 
 
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    q = given["q"]
-    return {"J": matrix(contact_jacobian(robot.frames, robot.chain.frames, list(q.T)), len(q))}
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    return {"J": contact_jacobian(robot.frames, robot.named, q, robot.root)}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
@@ -40,7 +38,7 @@ RECIPE = Recipe(
         "contact_jacobian",
         310,
         "velocities of all contacts per unit joint rate, base frame",
-        (Q,),
+        INPUTS,
         (
             Quantity(
                 "J",
@@ -55,8 +53,7 @@ RECIPE = Recipe(
         "frame.",
     ),
     "contact Jacobian",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "computeFrameJacobian",
     pinocchio,
 )

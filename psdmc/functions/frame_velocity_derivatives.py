@@ -7,20 +7,17 @@ from typing import Any
 import numpy as np
 
 from psdmc.dynamics.named_frames import frame_velocity_slopes
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import OF_Q, QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-
-def trace(g: Ingredients) -> Outputs:
-    return {"dv_dq": frame_velocity_slopes(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+INPUTS = (Q, QD)
 
 
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    slopes = frame_velocity_slopes(robot.frames, robot.chain.frames, list(q.T), list(qd.T))
-    return {"dv_dq": entries(slopes, len(q))}
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    return {"dv_dq": frame_velocity_slopes(robot.frames, robot.named, q, qd, robot.root)}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
@@ -47,7 +44,7 @@ RECIPE = Recipe(
         "frame_velocity_derivatives",
         196,
         "d (J qd) / d q: derivatives of every named frame's linear then angular velocity, base frame; those by qd are J",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "dv_dq",
@@ -62,8 +59,7 @@ RECIPE = Recipe(
         "then three angular ones, along the axes of the base frame.",
     ),
     "derivatives of frame velocities",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameVelocityDerivatives",
     pinocchio,
     beside="frame_jacobian",
