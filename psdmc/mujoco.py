@@ -29,9 +29,7 @@ from psdmc.robot.coordinates import Following
 from psdmc.robot.joints.quaternion import inverse, rotation_of
 from psdmc.robot.joints.scalars import unit
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import BASE, Array, Mechanism
 
 KINDS = ("free", "ball", "slide", "hinge")
 """MuJoCo's types of joints, by their numbers (mjtJoint)."""

@@ -18,10 +18,9 @@ from scipy import stats
 from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
-from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_quantity
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
-from psdmc.calibration.identify.quality import qualities
+from psdmc.calibration.identify.residuals import qualities
 from psdmc.calibration.identify.steps import judged
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.contacts import contact_drift
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q, QD)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"drift": contact_drift(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    return {"drift": contact_drift(robot.frames, robot.named, q, qd, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    return {"drift": columns(contact_drift(robot.frames, robot.chain.frames, list(q.T), list(qd.T)), len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
@@ -46,7 +40,7 @@ RECIPE = Recipe(
         "contact_drift",
         320,
         "accelerations of all contacts at constant qd (dJ/dt qd), base frame",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "drift",
@@ -61,8 +55,7 @@ RECIPE = Recipe(
         "They are (dJ/dt) qd, with the Jacobian J of the contacts.",
     ),
     "contact drift",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameClassicalAcceleration",
     pinocchio,
     beside="contact_jacobian",

@@ -20,14 +20,13 @@ from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array, made_again
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array, made_again
 from psdmc.robot.zeros import leading_rows
 
 if TYPE_CHECKING:
     import sympy
     from scipy import sparse
 
-Array = NDArray[np.float64]
 
 RENAMED = (
     "standard_parameters() has been renamed equivalent_parameters(); the old name still works for now. "

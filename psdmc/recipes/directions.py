@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +16,10 @@ from psdmc.program import dimensions
 from psdmc.program.replay import substituted
 from psdmc.program.signature import OF_Q, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 COTANGENT = Quantity(
     "cotangent", ("nv",), means="weights of the sum: cotangent[i] multiplies tau[i]", unit="1", powers=(1,)
@@ -159,8 +155,8 @@ def with_parameter_gradient(
     meaning: str,
     summary: str,
     trace: Callable[[Ingredients], Outputs],
-    reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
-    pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
+    reference: Callable[[RobotOnArrays, Given], Arrays],
+    pinocchio: Callable[[Reference, Given], Arrays],
 ) -> Recipe:
     """Return the recipe of a function NAME_parameters. It has the outputs of the function NAME (recipe `state`), and
     the gradient by theta_b as an additional output."""

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from psdmc.backends.c.bodies_view import BodiesView
+from psdmc.backends.c.bodies_view import BodiesView, PayloadView
 from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
 from psdmc.backends.c.describe import description
@@ -17,7 +17,6 @@ from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.operations import CallView, call_views
 from psdmc.backends.c.patterns import Pattern, patterns
-from psdmc.backends.c.payload_view import PayloadView
 from psdmc.backends.c.products import Shape
 from psdmc.backends.c.reals import CReal, c_real, check_range
 from psdmc.backends.c.references import ReferenceView, reference_view
