@@ -111,18 +111,26 @@ class Held(NamedTuple):
     ) -> tuple[Constrained, list[Scalar]]:
         """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact,
         too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
-        rows = self.counts
         found = constrained(factors, jacobian, load, wanted, *self.rows)
-        signs, first, inverse = [], 0, inverse_diagonal(found.factors)
-        for on, count in zip(self.active, rows, strict=True):
-            off = on - on * on
-            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
-            sign = Op.SELECT(-NOTHING, off, sign, -1.0)
+        return found, self.signs(found.matrix, found.factors, inverse_diagonal(found.factors))
+
+    def signs(self, matrix: Rows, factors: Factors, inverse: Sequence[Scalar]) -> list[Scalar]:
+        """Return a sign for each contact: -1 if a matrix is not positive definite there, or if `allowed` returns -1;
+        else 1. `inverse` is the diagonal of the inverse matrix."""
+        found, first = [], 0
+        for on, count in zip(self.active, self.counts, strict=True):
+            sign = self.allowed(on)
             for k in range(first, first + count):
-                sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
-            signs.append(sign)
+                sign = regular(sign, factors.pivots[k], matrix[k][k], inverse[k])
+            found.append(sign)
             first += count
-        return found, signs
+        return found
+
+    def allowed(self, on: Scalar) -> Scalar:
+        """Return -1 if a contact's active, `on`, is neither 0 nor 1, or if mu is negative; else 1."""
+        off = on - on * on
+        sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+        return Op.SELECT(-NOTHING, off, sign, -1.0)
 
 
 def held_on_arrays(

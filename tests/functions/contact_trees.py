@@ -37,6 +37,8 @@ FUNCTIONS = (
     "contact_jacobian",
     "contact_drift",
     "delassus",
+    "contact_space_inertia",
+    "contact_inverse_dynamics",
 )
 
 SHAPES = ("a trunk with two arms", "four legs on a body", "a wrist with two fingers")
