@@ -161,13 +161,18 @@ class Arrow:
         return found
 
 
-def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
+def eliminated(frames: Sequence[Frame], matrix: Matrix, further: Sequence[Sequence[int]] = ()) -> Arrow:
     """Factorize a symmetric matrix M with one row per joint rate, such as the mass matrix, limb by limb.
 
     A limb is a branch of the robot that equals other branches, such as a leg. Raises SingularMatrix if a pivot is a
     constant that is not positive.
+
+    further  for each group of limbs, indices of rows that M has besides those of joint rates, such as those of contact
+             forces on a limb. They are eliminated after the limb's rates
     """
     core, groups = limbs_of(frames)
+    if further:
+        groups = [((*own, *rates), total) for own, (rates, total) in zip(further, groups, strict=True)]
     rest = {(i, j): matrix[i][j] for i in core for j in core if j <= i}
     pivots: list[Scalar] = [0.0] * len(matrix)
     limbs = [_eliminated(rates, total, core, matrix) for rates, total in groups]

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.dynamics import contacts
+from psdmc.dynamics.arrow import any_limbs
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
 from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_drift, contact_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
@@ -67,8 +69,35 @@ FORCES = Quantity(
 
 
 def trace(g: Ingredients) -> Outputs:
+    if any_limbs(g.frames):
+        return _in_limbs(g)
     found, signs, factors, _ = solved(g)
     return {"qdd": found.motion, "forces": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def _in_limbs(g: Ingredients) -> Outputs:
+    """Eliminate limb by limb. Signs are negative also where this loses digits."""
+    q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
+    (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
+    mask, trunk = Held(g.named, g.inputs[ACTIVE.name], mu, g.si), Trunk(g.frames, q, g.base_axes)
+    rows = contacts.contact_jacobian(g.frames, g.named, trunk.q, g.root)
+    drifts = contacts.contact_drift(g.frames, g.named, trunk.q, qd, g.root)
+    errors = trunk.rows_along(g.inputs[ERROR.name])
+    on, shift, one = mask.rows
+    mass = mass_matrix(g.frames, g.bodies, g.drives, q, g.choices)
+    arrow, margins = eliminated_with_forces(g.frames, mass, rows, on, shift, one)
+    bias = torques(g, qd, g.still, g.base_acceleration)
+    load = [given - h for given, h in zip(tau, bias, strict=True)]
+    wanted = [
+        -each * (own + kd * inner_product(row, qd) + kp * error)
+        for each, own, row, error in zip(on, drifts, rows, errors, strict=True)
+    ]
+    found = arrow.solved([*load, *wanted])
+    return {
+        "qdd": found[: len(load)],
+        "forces": trunk.rows_back([-value for value in found[len(load) :]]),
+        PIVOTS: [*arrow.pivots[: len(load)], *mask.signs(margins)],
+    }
 
 
 def solved(g: Ingredients) -> Solved:
@@ -140,4 +169,5 @@ RECIPE = Recipe(
     "crba, nonLinearEffects, computeFrameJacobian",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
 )

@@ -41,7 +41,7 @@ MU = replace(
 )
 
 MASK = SymmetricMatrix(
-    "the base's rows of J J^T on the active contacts",
+    "the set of active contacts",
     Structure.BLOCKS,
     ("contacts",),
     number="the number, from 0, of the first contact whose active is neither 0 nor 1; 0 if mu is negative",
@@ -64,7 +64,7 @@ def _values(frames: Sequence[Frame], without: Sequence[Scalar], jacobian: Rows, 
     forces = _forces(without, jacobian, mask) if has_free_root(frames) else [0.0] * len(jacobian)
     turned = zip(*jacobian, strict=True)
     tau = [own - inner_product(column, forces) for own, column in zip(without, turned, strict=True)]
-    signs = [Op.SELECT(-1.0, mask.mu, mask.allowed(on), -1.0) for on in mask.active]
+    signs = [Op.SELECT(-1.0, mask.mu, sign, -1.0) for sign in mask.allowed()]
     return {TAU.name: tau, FORCES.name: forces, PIVOTS: signs}
 
 

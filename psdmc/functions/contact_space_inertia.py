@@ -34,7 +34,7 @@ def _values(factors: Factors, jacobian: Sequence[Sequence[Scalar]], mask: Held) 
     matrix = contacts.of_active(projected(factors, jacobian), *mask.rows)
     own = factorize(matrix)
     found = mask.compliance(own)
-    signs = mask.signs(matrix, own, [row[k] for k, row in enumerate(found)])
+    signs = mask.independent(matrix, own, [row[k] for k, row in enumerate(found)])
     return {"Lambda": found, PIVOTS: [*factors.pivots, *signs]}
 
 

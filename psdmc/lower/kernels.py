@@ -19,6 +19,7 @@ from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbArrangement, LimbSearch
+from psdmc.lower.limbs import have_contacts_alike
 from psdmc.lower.loops import in_loops
 from psdmc.lower.packed import packed
 from psdmc.lower.reframe import Reframed
@@ -238,7 +239,7 @@ class _Lowered:
             return kernel
         shared = RECIPES[recipe.shares] if recipe.shares else recipe
         found = self._limb_arrangement(shared)
-        if found is None:
+        if found is None or not have_contacts_alike(recipe, found.arrangement.reframed, found.groups):
             return kernel
         search = self._limb_search(recipe)
         limbs = search.lowered(found if shared is recipe else search.within(found), kernel.single)

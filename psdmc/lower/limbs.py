@@ -15,13 +15,14 @@ from psdmc.dynamics.free_root import has_free_root
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
-from psdmc.lower.limb_frames import Place, one_limb, places
+from psdmc.lower.limb_frames import Place, merged_contacts, one_limb, places
 from psdmc.lower.link_parameters import bodies_from_carriers
+from psdmc.lower.reframe import Reframed
 from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
 from psdmc.program.limb_sums import LimbSums
 from psdmc.program.program import Program, Slot
-from psdmc.program.signature import THIN, Quantity
+from psdmc.program.signature import THIN, Quantity, Signature
 from psdmc.program.thin_products import Shares, ThinProducts
 from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
@@ -80,6 +81,18 @@ class _Group:
         return LimbGroup(self.number, self.count, tuple(self.inputs), (), tuple(self.outputs))
 
 
+def has_contacts(signature: Signature) -> bool:
+    """Return whether an input of the function has an entry for each contact."""
+    return any("contacts" in quantity.axes for quantity in signature.inputs)
+
+
+def have_contacts_alike(recipe: Recipe, frames: Reframed, groups: Sequence[Limbs]) -> bool:
+    """Return whether the function has no contacts, or all contacts are at corresponding places of equal limbs."""
+    if not has_contacts(recipe.signature):
+        return True
+    return merged_contacts(frames.named, places(len(frames.frames), groups)) is not None
+
+
 def has_columns(recipe: Recipe) -> bool:
     """Return whether an output of the recipe's function has one column for each base parameter."""
     return any("l" in quantity.axes for quantity in recipe.signature.outputs)
@@ -131,7 +144,13 @@ class _Trace:
         whole = in_unit(arrangement.reframed, arrangement.unit)
         self.places = places(len(whole.frames), groups)
         frames = zip(one_limb(whole.frames, self.places), self.places, strict=True)
-        self.reframed = replace(whole, frames=tuple(self._with_sums(*each) for each in frames))
+        alike = merged_contacts(whole.named, self.places) if has_contacts(self.signature) else ()
+        self.contacts = alike or ()
+        self.reframed = replace(
+            whole,
+            frames=tuple(self._with_sums(*each) for each in frames),
+            named=tuple(each.frame for each in self.contacts) or whole.named,
+        )
         self.first = {
             axis: [
                 0,
@@ -140,6 +159,8 @@ class _Trace:
             for axis in ("nq", "nv")
         }
         self.first["nxa"] = [3 * self.first["nv"][-1]]
+        self.first["contacts"] = [0, *range(1, 1 + len([each for each in whole.named if each.rows]))]
+        self.first["contact_rows"] = [0, *accumulate(each.rows for each in whole.named if each.rows)]
         if has_columns(recipe):
             self._select_columns(whole.link_frames)
 
@@ -181,20 +202,18 @@ class _Trace:
         )
 
     def _inputs(self, quantity: Quantity) -> Iterator[Symbol]:
-        (axis,) = quantity.axes
         used: dict[int, int] = {}
-        for place in self.places:
-            for own in self._entries(place, axis):
-                slots = tuple(Slot(quantity.name, index) for index in own)
-                if place.group is None:
-                    yield self.tracer.symbol(slots[0])
-                    continue
-                group = self.groups[place.group]
-                slot = Slot(group.vectors.input_of(quantity.name), used.setdefault(place.group, 0))
-                used[place.group] += 1
-                self.sums.add_input(slot.vector, place.group)
-                group.inputs.append((slot, slots))
-                yield self.tracer.symbol(slot)
+        for number, own in self._along(*quantity.axes) if quantity.axes else [(None, (0,))]:
+            slots = tuple(Slot(quantity.name, index) for index in own)
+            if number is None:
+                yield self.tracer.symbol(slots[0])
+                continue
+            group = self.groups[number]
+            slot = Slot(group.vectors.input_of(quantity.name), used.setdefault(number, 0))
+            used[number] += 1
+            self.sums.add_input(slot.vector, number)
+            group.inputs.append((slot, slots))
+            yield self.tracer.symbol(slot)
 
     def _entries(self, place: Place, axis: str) -> list[tuple[int, ...]]:
         """For each coordinate, rate or base parameter of a place the robot's, limb by limb."""
@@ -214,7 +233,23 @@ class _Trace:
             return [
                 (group, tuple(first + k for k in own)) for first in (0, nv, 2 * nv) for group, own in each
             ]
+        if "+" in axis:
+            return self._along_several(axis.split("+"))
+        if axis in ("contacts", "contact_rows"):
+            return [
+                (each.group, tuple(self.first[axis][k] + row for k in each.numbers))
+                for each in self.contacts
+                for row in range(each.frame.rows if axis == "contact_rows" else 1)
+            ]
         return [(place.group, own) for place in self.places for own in self._entries(place, axis)]
+
+    def _along_several(self, parts: Sequence[str]) -> list[tuple[int | None, tuple[int, ...]]]:
+        found: list[tuple[int | None, tuple[int, ...]]] = []
+        before = 0
+        for axis in parts:
+            found += [(group, tuple(before + k for k in own)) for group, own in self._along(axis)]
+            before += self.first[axis][-1]
+        return found
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
         """Yield the output values to store, with slots (name and index) of a group of limbs or of the core (everything
@@ -280,7 +315,7 @@ class _Trace:
     def _flat(self, quantity: Quantity, indices: Sequence[int]) -> int:
         flat = 0
         for axis, index in zip(quantity.axes, indices, strict=True):
-            flat = flat * self.first[axis][-1] + index
+            flat = flat * sum(self.first[part][-1] for part in axis.split("+")) + index
         return flat
 
     def counted(self, outputs: list[tuple[Slot, Scalar]]) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:

@@ -91,12 +91,15 @@ class LimbProgram:
 
     least     the smallest number of lanes with which this is cheaper than the function's straight-line code
     products  matrix products after the stages; None if there are none
+    checked   whether a pivot that is not positive says only that the limbs cannot be eliminated one by one. C then
+              computes the state with the function's straight-line code
     """
 
     groups: tuple[LimbGroup, ...]
     stages: tuple[Stage, ...]
     least: int = 2
     products: ThinProducts | None = None
+    checked: bool = False
 
     def with_least(self, least: int) -> LimbProgram:
         return replace(self, least=least)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -112,25 +113,35 @@ class Held(NamedTuple):
         """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact,
         too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
         found = constrained(factors, jacobian, load, wanted, *self.rows)
-        return found, self.signs(found.matrix, found.factors, inverse_diagonal(found.factors))
+        return found, self.independent(found.matrix, found.factors, inverse_diagonal(found.factors))
 
-    def signs(self, matrix: Rows, factors: Factors, inverse: Sequence[Scalar]) -> list[Scalar]:
-        """Return a sign for each contact: -1 if a matrix is not positive definite there, or if `allowed` returns -1;
-        else 1. `inverse` is the diagonal of the inverse matrix."""
-        found, first = [], 0
-        for on, count in zip(self.active, self.counts, strict=True):
-            sign = self.allowed(on)
+    def independent(self, matrix: Rows, factors: Factors, inverse: Sequence[Scalar]) -> list[Scalar]:
+        """Return a sign for each contact: -1 if `matrix` is not positive definite there, or if active or mu is not
+        allowed, else 1. `inverse` is the diagonal of the inverse matrix."""
+        signs, first = [], 0
+        for sign, count in zip(self.allowed(), self.counts, strict=True):
             for k in range(first, first + count):
                 sign = regular(sign, factors.pivots[k], matrix[k][k], inverse[k])
-            found.append(sign)
+            signs.append(sign)
             first += count
-        return found
+        return signs
 
-    def allowed(self, on: Scalar) -> Scalar:
-        """Return -1 if a contact's active, `on`, is neither 0 nor 1, or if mu is negative; else 1."""
-        off = on - on * on
-        sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
-        return Op.SELECT(-NOTHING, off, sign, -1.0)
+    def signs(self, positive: Sequence[Scalar]) -> list[Scalar]:
+        """Return a sign for each contact: -1 if a number of one of its rows is not positive, or if active or mu is not
+        allowed, else 1."""
+        signs, left = [], iter(positive)
+        for sign, count in zip(self.allowed(), self.counts, strict=True):
+            for value in islice(left, count):
+                sign = Op.SELECT(0.0, value, sign, -1.0)
+            signs.append(sign)
+        return signs
+
+    def allowed(self) -> Iterator[Scalar]:
+        """Yield a sign for each contact: -1 if active or mu is not allowed, else 1."""
+        for on in self.active:
+            off = on - on * on
+            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+            yield Op.SELECT(-NOTHING, off, sign, -1.0)
 
 
 def held_on_arrays(

@@ -168,6 +168,19 @@ class KernelView:
         return ", ".join(names)
 
     @property
+    def whole(self) -> str:
+        """Return the name of the static C function for states that the code with limbs (such as legs) in lanes cannot
+        compute."""
+        return f"{self.name}_whole"
+
+    @property
+    def whole_arguments(self) -> str:
+        """Return C text of the arguments of `whole`. The inputs are copies, because outputs may overlap the inputs."""
+        names = [f"{vector.name}_given" for vector in self.inputs]
+        names += [output.name for output in self.outputs]
+        return ", ".join([*names, *([self.positive.name] if self.positive else [])])
+
+    @property
     def lanes_arguments(self) -> str:
         return self._arguments(f"{output.name}_block + lane" for output in self.outputs)
 

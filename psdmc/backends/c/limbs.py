@@ -293,6 +293,7 @@ class LimbsView:
     stores    C statements that store the outputs of limbs, and zeros
     products  matrix products after all other code; None if there are none
     cost      number of operations
+    checked   whether the function's straight-line code computes states with a pivot that is not positive
     """
 
     file: str
@@ -304,6 +305,7 @@ class LimbsView:
     stores: tuple[StoreView, ...]
     products: ThinView | None
     cost: Cost
+    checked: bool
 
     @property
     def core_name(self) -> str:
@@ -337,6 +339,7 @@ def limbs_view(
         stores=store_views(limbs, sizes | (limbs.products.sizes if limbs.products else {})),
         products=_thin_view(limbs.products) if limbs.products else None,
         cost=whole_cost(limbs),
+        checked=limbs.checked,
     )
 
 
