@@ -44,7 +44,7 @@ MASK = SymmetricMatrix(
     "the set of active contacts",
     Structure.BLOCKS,
     ("contacts",),
-    number="the number, from 0, of the first contact whose active is neither 0 nor 1; 0 if mu is negative",
+    number="the number, from 0, of the first contact whose active is neither 0 nor 1, or of the first contact if mu is negative",
     failure="an entry of active is neither 0 nor 1\nmu is negative",
     error="contact {contacts!r}: active is not 0 or 1, or mu = {mu:g} is negative",
     hint="give active 0 or 1 for each contact, and mu = 0 or more",

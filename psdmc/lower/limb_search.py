@@ -24,7 +24,14 @@ from psdmc.lower.branches import limbs_in
 from psdmc.lower.descent import ROUNDING
 from psdmc.lower.factored import Arrangement, RobotConstants
 from psdmc.lower.limb_frames import possible_groups
-from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, has_columns, has_contacts, have_columns_alike, trace_limbs
+from psdmc.lower.limbs import (
+    TracedLimbs,
+    cost_of_limbs,
+    has_columns,
+    has_contacts,
+    have_columns_alike,
+    trace_limbs,
+)
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import for_lanes, for_one_state
 from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, Search, distinct

@@ -119,7 +119,13 @@ def _limbs_to_plain(limbs: LimbProgram) -> dict[str, Any]:
     ]
     stages = [[stage.group, _program_to_plain(stage.program)] for stage in limbs.stages]
     products = None if limbs.products is None else asdict(limbs.products)
-    return {"groups": groups, "stages": stages, "least": limbs.least, "products": products, "checked": limbs.checked}
+    return {
+        "groups": groups,
+        "stages": stages,
+        "least": limbs.least,
+        "products": products,
+        "checked": limbs.checked,
+    }
 
 
 def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
@@ -134,7 +140,9 @@ def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
         for number, count, inputs, constants, outputs in plain["groups"]
     )
     stages = tuple(Stage(group, _program_from_plain(program)) for group, program in plain["stages"])
-    return LimbProgram(groups, stages, plain["least"], _products_from_plain(plain["products"]), plain["checked"])
+    return LimbProgram(
+        groups, stages, plain["least"], _products_from_plain(plain["products"]), plain["checked"]
+    )
 
 
 def _products_from_plain(plain: Any) -> ThinProducts | None:

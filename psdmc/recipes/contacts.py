@@ -21,7 +21,9 @@ from psdmc.robot.mechanism import Array, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "three linear ones for a point; three linear, then three angular ones for a surface; along the base frame's axes"
+_ROWS = "three linear ones for a point; three linear, then three angular ones for a surface; along"
+ROW_WORDS = f"{_ROWS} the base frame's axes"
+LOCAL_ROW_WORDS = f"{_ROWS} the contact's own axes"
 
 ACTIVE = Quantity(
     "active",

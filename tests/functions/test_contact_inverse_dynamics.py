@@ -56,7 +56,10 @@ def test_trees_with_every_mask_have_the_least_squares_solution(seed: int, real: 
             given = {name: array.astype(np.float32).astype(np.float64) for name, array in given.items()}
         states = [given[quantity.name] for quantity in SIGNATURES[NAME].inputs]
         expected = own.expected(NAME, **given)
-        for found in (own.robot.contact_inverse_dynamics(*states), own.model.contact_inverse_dynamics(*states)):
+        for found in (
+            own.robot.contact_inverse_dynamics(*states),
+            own.model.contact_inverse_dynamics(*states),
+        ):
             assert np.abs(found.forces - expected["forces"]).max() < bound * np.abs(expected["forces"]).max()
             assert np.abs(found.tau - expected["tau"]).max() < bound * np.abs(expected["tau"]).max()
             inactive = np.repeat(given["active"], own.loaded.mechanism.rows_of_contacts, axis=1) == 0.0
