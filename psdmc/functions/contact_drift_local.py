@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from psdmc.dynamics.named_frames import local_accelerations
 from psdmc.dynamics.scalar import Scalar
@@ -42,8 +40,8 @@ RECIPE = Recipe(
         INPUTS,
         (replace(ALIGNED, means=f"accelerations of the contacts (m/s^2, rad/s^2): {LOCAL_ROW_WORDS}"),),
         theta=False,
-        summary="Compute the accelerations that all contacts have if qdd = 0, along the axes of each contact. For any qdd, the "
-        "accelerations are J qdd + drift, with J of `contact_jacobian_local`.",
+        summary="Compute the accelerations that all contacts have if qdd = 0, along each contact's own axes. For any qdd, "
+        "the accelerations are J qdd + drift, with J as in `contact_jacobian_local`.",
     ),
     "contact drift along the contacts' axes",
     *on_both(values, INPUTS),

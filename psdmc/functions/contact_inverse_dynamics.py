@@ -44,7 +44,8 @@ MASK = SymmetricMatrix(
     "the set of active contacts",
     Structure.BLOCKS,
     ("contacts",),
-    number="the number, from 0, of the first contact whose active is neither 0 nor 1, or of the first contact if mu is negative",
+    number="the number, from 0, of the first contact whose active is neither 0 nor 1, or of the first contact if mu is "
+    "negative",
     failure="an entry of active is neither 0 nor 1\nmu is negative",
     error="contact {contacts!r}: active is not 0 or 1, or mu = {mu:g} is negative",
     hint="give active 0 or 1 for each contact, and mu = 0 or more",
@@ -116,21 +117,22 @@ RECIPE = Recipe(
         "contact_inverse_dynamics",
         348,
         "joint torques and contact forces of a motion: tau = M qdd + h - J^T forces. No motor acts on a floating base: "
-        "the forces minimise |b|^2 + mu |forces|^2, where b are the first six entries of tau; if several forces do, they are "
-        "those of the smallest norm. They are zero for contacts that are not active, and without a floating base. active "
+        "the forces minimise |b|^2 + mu |forces|^2, where b are the first six entries of tau; if several forces do, they "
+        "have the smallest norm. They are zero for contacts that are not active, and without a floating base. active "
         "is 0 or 1 for each contact, mu is not negative",
         (Q, QD, QDD, ACTIVE, MU),
         (
             replace(
                 TAU,
-                means=f"{TAU.means}; the first six entries of a floating base are what no active contact can exert, zero within "
-                "rounding if the contacts allow the motion and mu = 0",
+                means=f"{TAU.means}; of a floating base, the first six entries are what the active contacts cannot exert, zero "
+                "within rounding if they can exert all and mu = 0",
             ),
             FORCES,
         ),
         theta=True,
-        summary="Compute the joint torques tau = M qdd + h - J^T forces of a motion, and the smallest forces on the active "
-        "contacts that replace motors on a floating base.",
+        summary="Compute the contact forces of a motion, and its joint torques tau = M qdd + h - J^T forces. No motor acts "
+        "on a floating base: the forces minimise |tau[:6]|^2 + mu |forces|^2. If several forces do, they have the smallest "
+        "norm. Without a floating base, they are zero.",
         factorises=(MASK,),
     ),
     "inverse dynamics with contacts",

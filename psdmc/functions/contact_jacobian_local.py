@@ -45,7 +45,7 @@ RECIPE = Recipe(
         ),
         theta=False,
         summary="Compute the Jacobian J of all contacts along their own axes: J qd are the velocities of the contacts along "
-        "these axes, and J^T times the contact forces along these axes are joint torques.",
+        "these axes. J^T times contact forces along these axes are joint torques.",
     ),
     "contact Jacobian along the contacts' axes",
     *on_both(values, INPUTS),

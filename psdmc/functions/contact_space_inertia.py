@@ -76,8 +76,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=True,
-        summary="Compute the contact-space inertia (J M^-1 J^T + mu I)^-1 of the active contacts, with the Jacobian J of these "
-        "contacts, the mass matrix M and the identity matrix I. Rows and columns of the other contacts are zero.",
+        summary="Compute the contact-space inertia (J M^-1 J^T + mu I)^-1 of the active contacts. J is their Jacobian as in "
+        "`contact_jacobian`, M the mass matrix, and I the identity matrix. Rows and columns of other contacts are zero.",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "contact-space inertia",

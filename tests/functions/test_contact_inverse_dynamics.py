@@ -88,7 +88,7 @@ def test_forward_dynamics_gives_the_motion_back() -> None:
 
 
 def test_a_brick_on_its_feet() -> None:
-    """A surface carries the weight. A point at x = 0.1 carries F with the least (F - W)^2 + (0.1 F)^2, or with mu F^2 more."""
+    """A surface carries the weight W. A point at x = 0.1 carries the F of the least (F - W)^2 + (0.1 F)^2 + mu F^2."""
     still, weight = np.zeros(6), 39.24
     tau, wrench = brick("brick:6").contact_inverse_dynamics(BRICK, still, still, [1.0])
     np.testing.assert_allclose(wrench, [0.0, 0.0, weight, 0.0, 0.0, 0.0], atol=1e-12)
@@ -119,7 +119,7 @@ def test_other_masks_and_negative_mu_are_refused(active: float, mu: float) -> No
     state = [own.given[name][0] for name in ("q", "qd", "qdd")]
     mask = np.array([1.0, active, 0.0])[: own.given["active"].shape[1]]
     for robot in (own.robot, own.model):
-        with pytest.raises(InputError, match="active is not 0 or 1, or mu = .* is negative"):
+        with pytest.raises(InputError, match=r"active is not 0 or 1, or mu = .* is negative"):
             robot.contact_inverse_dynamics(*state, mask, mu)
 
 
