@@ -38,7 +38,7 @@ def least_squares(rows: Sequence[Row], right: Sequence[Scalar], shift: Scalar) -
     shift  0 or more, without unit
 
     A row counts as dependent on those before it if the square of its part orthogonal to them is lost in rounding when
-    it is added to the square of the row. The part is then shorter than 1.5e-8 of the row in float64, or 3.5e-4 in
+    it is added to the square of the row. The part is then shorter than about 1e-8 of the row in float64, or 2e-4 in
     float32. Every rank executes the same operations.
 
     A = L Q, with orthogonal rows of Q. Then y = Q x minimises |L y - b|. L is lower triangular with ones on its diagonal,
