@@ -45,6 +45,8 @@ DECISIONS = {
     "model/payload.py": "the sign of a determinant",
     "recipes/contacts.py": "Pinocchio's side of a comparison",
     "functions/delassus.py": "Pinocchio's side of a comparison",
+    "functions/contact_inverse_dynamics.py": "Pinocchio's side of a comparison",
+    "functions/contact_space_inertia.py": "Pinocchio's side of a comparison",
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",
     "functions/tangent_map.py": "Pinocchio's side of a comparison",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",

@@ -22,17 +22,25 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
+    return {"drift": accelerations(robot, given, "LOCAL_WORLD_ALIGNED")}
+
+
+def accelerations(robot: Reference, given: Given, axes: str) -> Array:
+    """Return Pinocchio's accelerations of the contacts at constant joint rates, (k, rows), along `axes`, a name of
+    pinocchio.ReferenceFrame."""
     import pinocchio as pin
 
-    def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
+    along = getattr(pin, axes)
+
+    def of_contacts(model: Any, data: Any, q: Array, qd: Array) -> Array:
         pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
         found = [
-            pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector[:rows]
+            pin.getFrameClassicalAcceleration(model, data, frame, along).vector[:rows]
             for frame, rows in robot.contacts
         ]
         return np.concatenate(found)
 
-    return {"drift": robot.each(accelerations, given["q"], given["qd"])}
+    return robot.each(of_contacts, given["q"], given["qd"])
 
 
 RECIPE = Recipe(

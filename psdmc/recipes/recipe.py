@@ -199,7 +199,7 @@ class Recipe:
     straight: int = 8
 
     def __post_init__(self) -> None:
-        if self.needs is None and self.signature.factorises:
+        if self.needs is None and any("nv" in matrix.axes for matrix in self.signature.factorises):
             object.__setattr__(self, "needs", Needs.POSITIVE_MASS)
 
     @property
