@@ -301,8 +301,8 @@ def _files(
         )
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    facts = (*facts, own.get("estimator"))
-    return language.files(_emission(model, lowering, functions, options, name, progress, *facts))
+    estimator = own.get("estimator")
+    return language.files(_emission(model, lowering, functions, options, name, progress, *facts, estimator))
 
 
 @overload

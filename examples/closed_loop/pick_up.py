@@ -29,7 +29,7 @@ LOAD = Payload(mass=1.0, com=(0.02, 0.0, 0.05), inertia=0.001)
 PICKED_UP, END = 2.0, 7.0
 """s."""
 TAU_SHARE, Q_NOISE, QD_NOISE = 0.005, 1e-5, 1e-3
-"""Standard deviations of noise: of the actual torque, in shares of the effort limit; of measured positions (rad) and rates."""
+"""Standard deviations of noise: actual torques, in shares of the effort limit; measured positions (rad); rates."""
 LARGEST_MASS, REACH = 5.0, 0.2
 
 DECLARATIONS = """
@@ -111,8 +111,12 @@ def plot(run: PickUp, file: Path) -> None:
     above.plot(run.time, true, "k--", linewidth=1, label="true load")
     above.plot(run.time, run.mass, color="C0", label="estimate")
     low, high = run.mass - 2 * run.mass_sd, run.mass + 2 * run.mass_sd
-    above.fill_between(run.time, low, high, color="C0", alpha=0.25, linewidth=0, label="two standard deviations")
-    above.axvline(PICKED_UP + run.noticed(), color="C3", linewidth=1, label=f"noticed after {run.noticed():.2f} s")
+    above.fill_between(
+        run.time, low, high, color="C0", alpha=0.25, linewidth=0, label="two standard deviations"
+    )
+    above.axvline(
+        PICKED_UP + run.noticed(), color="C3", linewidth=1, label=f"noticed after {run.noticed():.2f} s"
+    )
     above.set(ylabel="mass at the tip (kg)", ylim=(-0.5, 2.0))
     above.legend(loc="upper left", fontsize="small")
     below.semilogy(run.time, np.abs(run.error).max(axis=1) + 1e-6, linewidth=0.8)

@@ -107,7 +107,9 @@ def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Ke
     if kind not in LOADS:
         raise InputError(f"estimator {kind!r} is not known", f"choose one of {', '.join(LOADS)}")
     if model.theta_b is None:
-        raise InputError(f"{robot.name}: no estimator: the base parameters are unknown", "calibrate the model first")
+        raise InputError(
+            f"{robot.name}: no estimator: the base parameters are unknown", "calibrate the model first"
+        )
     if robot.nq > robot.nv or not all(kind.about_z for kind in robot.types):
         raise InputError(
             f"{robot.name}: no estimator: a joint of the robot has several coordinates",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 LOADS = {"mass": 4, "inertia": 10}
-"""By the word of --estimator, how many of a load's parameters are estimated: mass and first moments, or the inertias, too."""
+"""By the word of --estimator, how many of a load's parameters are estimated: mass and first moments; inertias, too."""
 
 FUNCTION = "load_momentum"
 
@@ -31,7 +31,11 @@ def load_recipe(kind: str) -> Recipe:
         return _named(own, load_momentum(g.frames, g.tip, g.tip_body, q, qd, up, count))
 
     def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-        states, up, tip = (list(given["q"].T), list(given["qd"].T)), robot.base_acceleration, robot.chain.tip_frame
+        states, up, tip = (
+            (list(given["q"].T), list(given["qd"].T)),
+            robot.base_acceleration,
+            robot.chain.tip_frame,
+        )
         own = generalized_momentum(robot.frames, robot.bodies, robot.drives, *states, up)
         load = load_momentum(robot.frames, tip.placement, tip.joint, *states, up, count)
         return {name: entries(value, len(given["q"])) for name, value in _named(own, load).items()}
@@ -51,7 +55,14 @@ def load_recipe(kind: str) -> Recipe:
         theta=True,
     )
     return Recipe(
-        signature, "momentum with a load", trace, reference, "", _pinocchio, shares="inverse_dynamics", matters=()
+        signature,
+        "momentum with a load",
+        trace,
+        reference,
+        "",
+        _pinocchio,
+        shares="inverse_dynamics",
+        matters=(),
     )
 
 

@@ -24,7 +24,17 @@ class EstimatorLibrary:
         sources = [str(folder / "src" / name) for name in ("estimator.c", "load_momentum.c")]
         flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wdouble-promotion"]
         library = folder / "libestimator.so"
-        words = ["gcc", *flags, "-shared", "-fPIC", f"-I{folder / 'include'}", *sources, "-lm", "-o", str(library)]
+        words = [
+            "gcc",
+            *flags,
+            "-shared",
+            "-fPIC",
+            f"-I{folder / 'include'}",
+            *sources,
+            "-lm",
+            "-o",
+            str(library),
+        ]
         subprocess.run(words, check=True)
         header = (folder / "include" / "arm" / "arm.h").read_text()
         self.ffi: Any = cffi.FFI()

@@ -28,7 +28,9 @@ from psdmc.robot.reference import Reference, reference
 
 MASS, COM = 1.7, np.array([0.04, -0.03, 0.11])
 INERTIA = np.array([[0.012, 0.001, -0.002], [0.001, 0.011, 0.0005], [-0.002, 0.0005, 0.006]])
-PARAMETERS = standard_parameters(MASS, MASS * COM, INERTIA + MASS * (COM @ COM * np.eye(3) - np.outer(COM, COM)))
+PARAMETERS = standard_parameters(
+    MASS, MASS * COM, INERTIA + MASS * (COM @ COM * np.eye(3) - np.outer(COM, COM))
+)
 OFFSET = np.array([0.4, -0.7, 0.2, 0.1, -0.3, 0.5])
 DT, CUTOFF = 1e-3, 20.0
 
@@ -95,6 +97,8 @@ def test_momenta_of_robot_and_load_are_pinocchios(name: str, gripper: Path) -> N
     on_arrays = recipe.reference(RobotOnArrays.of(model, model.theta_b), {"q": q, "qd": qd})
     for key, value in on_arrays.items():
         np.testing.assert_allclose(found[key], value.reshape(20, -1), atol=1e-11 * np.abs(value).max())
+    if name != "gripper":
+        np.testing.assert_allclose(recipe.pinocchio(robot, {"q": q, "qd": qd})["p_rate"], rate, atol=1e-11)
 
 
 class Motion:
@@ -219,7 +223,7 @@ def test_what_the_model_lacks_widens_the_standard_deviations(mass: EstimatorLibr
     state = mass.began(np.full(6, 0.05), offset_sd=[2.0] * 6)
     motion.run(mass, state)
     load = mass.load(state)
-    assert 5.0 < state.misfit
+    assert state.misfit > 5.0
     assert abs(load["mass"] - MASS) < 3 * load["mass_sd"]
 
 
@@ -237,7 +241,8 @@ def test_the_reported_load_is_one_that_a_body_can_have(inertia: EstimatorLibrary
         assert np.abs(load["com"]).max() <= 0.1
         xx, xy, yy, xz, yz, zz = load["inertia"]
         moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        assert moments[0] > -1e-12 and moments[2] <= (moments[0] + moments[1]) * (1 + 1e-9) + 1e-12
+        assert moments[0] > -1e-12
+        assert moments[2] <= (moments[0] + moments[1]) * (1 + 1e-9) + 1e-12
 
 
 @pytest.mark.parametrize("kind", LOADS)
@@ -283,7 +288,8 @@ def test_after_a_pause_the_filters_begin_anew(mass: EstimatorLibrary, motion: Mo
         mass.step(state, motion.q[k], motion.qd[k], motion.tau[k], DT)
     value = list(state.value)
     assert mass.step(state, motion.q[500], motion.qd[500], motion.tau[500], 0.45) == 0
-    assert list(state.value) == value and state.weight == 0.0
+    assert list(state.value) == value
+    assert state.weight == 0.0
 
 
 def test_the_option_is_recorded_and_packages_without_it_stay(tmp_path: Path) -> None:
@@ -291,15 +297,30 @@ def test_the_option_is_recorded_and_packages_without_it_stay(tmp_path: Path) -> 
     emit_c(model, tmp_path / "with", functions=["gravity"], estimator="mass", trig="freestanding")
     emit_c(model, tmp_path / "without", functions=["gravity"])
     assert not compare_emitted(model, tmp_path / "with", {"estimator": "mass"})
-    with pytest.raises(InputError, match="--estimator contradicts manifest.json"):
+    with pytest.raises(InputError, match="--estimator contradicts"):
         compare_emitted(model, tmp_path / "with", {"estimator": "inertia"})
     header = (tmp_path / "without" / "include" / "scara" / "scara.h").read_text()
-    assert "estimat" not in header and not (tmp_path / "without" / "src" / "estimator.c").exists()
+    assert "estimat" not in header
+    assert not (tmp_path / "without" / "src" / "estimator.c").exists()
     sources = [str(path) for path in sorted((tmp_path / "with" / "src").glob("*.c"))]
-    words = ["gcc", "-O1", "-fno-math-errno", "-shared", "-fPIC", f"-I{tmp_path / 'with' / 'include'}", *sources]
+    words = [
+        "gcc",
+        "-O1",
+        "-fno-math-errno",
+        "-shared",
+        "-fPIC",
+        f"-I{tmp_path / 'with' / 'include'}",
+        *sources,
+    ]
     subprocess.run([*words, "-o", str(tmp_path / "with.so")], check=True)
-    undefined = subprocess.run(["nm", "-uD", tmp_path / "with.so"], capture_output=True, text=True, check=True)
-    assert not [line for line in undefined.stdout.splitlines() if "GLIBC" in line and " mem" not in line and " w " not in line]
+    undefined = subprocess.run(
+        ["nm", "-uD", tmp_path / "with.so"], capture_output=True, text=True, check=True
+    )
+    assert not [
+        line
+        for line in undefined.stdout.splitlines()
+        if "GLIBC" in line and " mem" not in line and " w " not in line
+    ]
 
 
 def test_what_cannot_have_one_is_refused(tmp_path: Path) -> None:
@@ -308,11 +329,11 @@ def test_what_cannot_have_one_is_refused(tmp_path: Path) -> None:
         emit_c(bundled_model("scara"), path, functions=["gravity"], estimator="all")
     with pytest.raises(InputError, match="back end rust has no --estimator"):
         emit(bundled_model("scara"), path, "rust", functions=["gravity"], estimator="mass")
+    unknown = derive(robot_path("rounded_arm"), unknown="all")
     with pytest.raises(InputError, match="base parameters are unknown"):
-        unknown = derive(robot_path("rounded_arm"), unknown="all")
         emit_c(unknown, path, functions=["gravity"], estimator="mass")
+    floating = derive(robot_path("rounded_arm"), floating=True)
     with pytest.raises(InputError, match="a joint of the robot has several coordinates"):
-        floating = derive(robot_path("rounded_arm"), floating=True)
         emit_c(floating, path, functions=["gravity"], estimator="mass")
     assert not path.exists()
 
@@ -324,6 +345,10 @@ def test_cpp_and_other_compilers_take_the_header(mass: EstimatorLibrary, tmp_pat
     (tmp_path / "main.cpp").write_text(main)
     include = f"-I{tmp_path / 'arm' / 'include'}"
     strict = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", include]
-    subprocess.run(["g++", "-std=c++17", *strict, "-c", tmp_path / "main.cpp", "-o", tmp_path / "main.o"], check=True)
+    subprocess.run(
+        ["g++", "-std=c++17", *strict, "-c", tmp_path / "main.cpp", "-o", tmp_path / "main.o"], check=True
+    )
     vectorless = ["gcc", "-std=c99", "-Darm_NO_VECTORS", *strict]
-    subprocess.run([*vectorless, "-c", tmp_path / "arm" / "src" / "estimator.c", "-o", tmp_path / "e.o"], check=True)
+    subprocess.run(
+        [*vectorless, "-c", tmp_path / "arm" / "src" / "estimator.c", "-o", tmp_path / "e.o"], check=True
+    )

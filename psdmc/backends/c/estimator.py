@@ -56,7 +56,9 @@ class EstimatorView:
     def step(self) -> Prototype:
         given = tuple(f"const {self.real} *{name}" for name in ("q", "qd", "tau"))
         return Prototype(
-            "int", f"{self.robot}_estimate_step", (f"{self.robot}_estimator *state", *given, f"{self.real} dt")
+            "int",
+            f"{self.robot}_estimate_step",
+            (f"{self.robot}_estimator *state", *given, f"{self.real} dt"),
         )
 
     @property
