@@ -218,6 +218,15 @@ def test_a_load_picked_up_at_rest_and_put_down_is_seen(mass: EstimatorLibrary) -
     assert load["mass"] > 3 * load["mass_sd"]
 
 
+def test_no_variance_grows_beyond_its_prior(mass: EstimatorLibrary, motion: Motion) -> None:
+    """What is forgotten in 0.05 s would leave more than is known before the first step."""
+    prior = np.array([0.02, 0.002, 0.002, 0.002])
+    state = mass.began(np.full(6, 5.0), memory=0.05, load_sd=prior.tolist())
+    for q, qd, tau in zip(motion.q, motion.qd, motion.tau, strict=True):
+        mass.step(state, q, qd, tau, DT)
+        assert all(state.covariance[k][k] <= 1.000001 * prior[k] ** 2 for k in range(4))
+
+
 def test_what_the_model_lacks_widens_the_standard_deviations(mass: EstimatorLibrary, motion: Motion) -> None:
     """An estimator without inertias, told of torques far more exact than it explains."""
     state = mass.began(np.full(6, 0.05), offset_sd=[2.0] * 6)
