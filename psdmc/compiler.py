@@ -36,7 +36,7 @@ from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.admitted import require
-from psdmc.lower.kernels import Lowering, lower, wanted
+from psdmc.lower.kernels import Lowering, lower, lower_estimator, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load_bytes, model_of
 from psdmc.model.store import file_bytes
@@ -161,6 +161,7 @@ def emit_c(
     target: str | Target = NATIVE,
     friction: bool = False,
     bodies: bool = False,
+    estimator: str | None = None,
 ) -> Changes:
     """Write the C package of a model into a folder. Returns the names of the files that psdmc wrote or removed.
 
@@ -181,6 +182,8 @@ def emit_c(
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
     friction   True: add the function that computes friction torques, for a model that was calibrated from logs
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
+    estimator  "mass" or "inertia": add functions that estimate a load at the tip while the robot moves. "mass" finds
+               mass and centre of mass, "inertia" also the inertia
 
     Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises
     InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
@@ -190,6 +193,7 @@ def emit_c(
     functions. In this case, let `functions` name only functions that do not need the inverse, such as "gravity".
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
+    own |= {"estimator": estimator}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
 
 
@@ -297,7 +301,8 @@ def _files(
         )
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    return language.files(_emission(model, lowering, functions, options, name, progress, *facts))
+    estimator = own.get("estimator")
+    return language.files(_emission(model, lowering, functions, options, name, progress, *facts, estimator))
 
 
 @overload
@@ -461,6 +466,7 @@ def _emission(
     adapters: Sequence[str] = (),
     friction: bool = False,
     bodies: bool = False,
+    estimator: str | None = None,
 ) -> Emission:
     names = _functions_of(model, functions, adapters)
     require(model, names)
@@ -470,11 +476,13 @@ def _emission(
         lambda: lower(model, lowering, names, progress, costs=costs),
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    shown = {**shown, "estimator": estimator} if estimator else shown
+    momenta = None if estimator is None else lower_estimator(model, estimator, costs)
     info = package_info(model, name, shown, payload, friction, bodies)
     references = reference_states(model, names)
     if payload:
         references = replace(references, load=reference_load(model))
-    return Emission(info, kernels, options, references, tuple(adapters))
+    return Emission(info, kernels, options, references, tuple(adapters), momenta)
 
 
 def _functions_of(

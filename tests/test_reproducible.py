@@ -33,6 +33,7 @@ STRANGE |= {"sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "asin"
 """What NumPy, SciPy and the C library compute by the processor's own kernels."""
 
 DECISIONS = {
+    "recipes/load_momentum.py": "Pinocchio's side of a comparison",
     "robot/reference.py": "Pinocchio's side of a comparison",
     "robot/mujoco_reading.py": "MuJoCo's side of a comparison",
     "robot/unit_lengths.py": "a refusal",

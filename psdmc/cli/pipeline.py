@@ -310,6 +310,14 @@ def emit(
         bool,
         typer.Option("--friction", help="also write R_friction, for a model calibrated from logs"),
     ] = False,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="also write R_estimate_step, which estimates a load; mass: its mass and centre, inertia: all of it",
+            autocompletion=lambda: ["mass", "inertia"],
+        ),
+    ] = None,
     adapters: Annotated[
         list[str] | None,
         typer.Option(
@@ -366,6 +374,7 @@ def emit(
             trig,  # type: ignore[arg-type]
             target,
             **{"payload": payload, "with": names(adapters), "friction": friction, "bodies": bodies},
+            estimator=estimator,
         )
     written = len(changed) - len(changed.removed)
     print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")

@@ -11,6 +11,7 @@ from psdmc.backends.c.bodies_view import BodiesView, PayloadView
 from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
 from psdmc.backends.c.describe import description
+from psdmc.backends.c.estimator import EstimatorView
 from psdmc.backends.c.friction import FrictionView
 from psdmc.backends.c.function_view import FunctionView, function_views
 from psdmc.backends.c.kernel_view import KernelView
@@ -46,6 +47,7 @@ class PackageView:
     references  inputs and expected results for the self-test; None: no self-test
     adapters    names of the other programs, such as CasADi, for which the package has files
     private     functions for one state that only adapters call; no header declares them
+    estimator   the load estimator; None: no estimator
     """
 
     robot: str
@@ -55,6 +57,7 @@ class PackageView:
     references: ReferenceView | None
     adapters: tuple[str, ...] = ()
     private: tuple[FunctionView, ...] = ()
+    estimator: EstimatorView | None = None
 
     @property
     def alone(self) -> PackageView:
@@ -164,7 +167,8 @@ class PackageView:
         bodies = ("src/bodies.c",) if self.info.bodies else ()
         friction = ("src/friction.c",) if self.info.friction else ()
         functions = (f"src/{unit.name}.c" for function in self.functions for unit in function.units)
-        return ("src/tables.c", *functions, *payload, *bodies, *friction)
+        estimator = self.estimator.sources if self.estimator else ()
+        return ("src/tables.c", *functions, *payload, *bodies, *friction, *estimator)
 
     @property
     def friction(self) -> FrictionView | None:
@@ -211,8 +215,13 @@ class PackageView:
 
     @property
     def _all_kernels(self) -> tuple[KernelView, ...]:
-        """The kernels of all functions, with those that only adapters call."""
-        return (*self.kernels, *(kernel for function in self.private for kernel in function.kernels))
+        """The kernels of all functions, with those that only adapters or the estimator call."""
+        return (*self.kernels, *(kernel for function in self.undeclared for kernel in function.kernels))
+
+    @property
+    def undeclared(self) -> tuple[FunctionView, ...]:
+        """Functions for one state that no header declares: those of adapters and of the estimator."""
+        return (*self.private, *((self.estimator.momentum,) if self.estimator else ()))
 
     @property
     def is_mixed(self) -> bool:
