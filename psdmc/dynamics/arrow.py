@@ -119,21 +119,22 @@ class Arrow:
                 found[k] = own[k]
         return found
 
-    def thin(self, matrix: Matrix) -> list[list[Scalar]]:
+    def thin(self, matrix: Matrix, owners: Sequence[int] | None = None) -> list[list[Scalar]]:
         """Return two factors of -M^-1 D in one matrix: E in the rows of the core, and Y in those of limbs (such as
         legs).
 
         For a column of E and Y, -M^-1 D is x = -V E in rows of the core, and Y - T x in rows of a limb. The module
         defines V and T. Y is zero in columns of other limbs. Entries of D that belong to two different limbs must be
         zero.
+
+        owners  for each column of D, the row of M that belongs to the same joint or contact; None: the row of its number
         """
         columns = [list(column) for column in zip(*matrix, strict=True)]
-        found = columns[:]
-        for k in self.core:
-            found[k] = self._reduced(columns[k])
-        for limb in self.limbs:
-            for k in limb.rates:
-                found[k] = limb.reduced(columns[k])
+        limb_of = {k: limb for limb in self.limbs for k in limb.rates}
+        found = [
+            limb_of[k].reduced(column) if k in limb_of else self._reduced(column)
+            for k, column in zip(owners or range(len(columns)), columns, strict=True)
+        ]
         rows = [list(row) for row in zip(*found, strict=True)]
         return [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
 

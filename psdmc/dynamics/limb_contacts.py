@@ -15,14 +15,19 @@ Source: Featherstone 2008, sections 6.5 and 8.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 
 from psdmc.dynamics.arrow import Arrow, Matrix, eliminated, limbs_of
+from psdmc.dynamics.contacts import pushed_slopes
 from psdmc.dynamics.frames import Frame, from_previous, inward, joint_turn, outward, to_previous
 from psdmc.dynamics.free_root import has_free_root
+from psdmc.dynamics.kinematics import AT_BASE
+from psdmc.dynamics.named_frames import Root
 from psdmc.dynamics.scalar import Matrix as Axes
 from psdmc.dynamics.scalar import Scalar, Vector, transform, transpose
-from psdmc.dynamics.slices import positions
+from psdmc.dynamics.slices import first_rates, joints_of_rates, positions
 from psdmc.dynamics.solve import is_zero
+from psdmc.robot.mechanism import NamedFrame
 
 LEAST_SHARE = 1e-3
 """The least share of its diagonal entry that a pivot of D must have."""
@@ -67,6 +72,31 @@ def eliminated_with_forces(
                 entry = entry + held[k][c] * held[k][c] * inverse
             margins[k] = pivot - LEAST_SHARE * entry
     return arrow, margins
+
+
+def pushed_slopes_of_limbs(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    forces: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[list[Scalar]]:
+    """Compute the derivatives of J^T f by q, as `pushed_slopes` (contacts.py), with contacts on equal limbs only. In the
+    rows and columns of the core, they are sums over limbs."""
+    core, groups = limbs_of(frames)
+    first, owner = first_rates(frames), {rate: k for k, (rates, _) in enumerate(groups) for rate in rates}
+    found: list[list[Scalar]] = [[0.0] * first[-1] for _ in range(first[-1])]
+    ends = list(accumulate(each.rows for each in named))
+    numbers = joints_of_rates(frames)
+    of_joint = {joint: owner[rate] for rate, joint in enumerate(numbers) if rate in owner}
+    for number, (_, total) in enumerate(groups):
+        own = [k for k, each in enumerate(named) if of_joint[each.joint] == number]
+        pushed = [x for k in own for x in forces[ends[k] - named[k].rows : ends[k]]]
+        slopes = pushed_slopes(frames, [named[k] for k in own], q, pushed, root)
+        for i, row in enumerate(slopes):
+            for j, value in enumerate(row):
+                found[i][j] = found[i][j] + (total(value) if i in core and j in core else value)
+    return found
 
 
 class Trunk:

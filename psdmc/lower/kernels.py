@@ -196,7 +196,12 @@ class _Lowered:
                 arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
                 traced = trace_dynamics(recipe, arranged, self._search(theta).robot)
                 program = written_out(traced, recipe.signature.products)
-            return Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
+            kernel = Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
+            return (
+                kernel
+                if theta or not recipe.in_limbs or not program.outputs
+                else self._in_limbs(recipe, kernel)
+            )
         candidates: list[Kernel] = []
         expanded = self._expanded(recipe, theta) if self._may_expand(recipe) else None
         if expanded is not None:

@@ -37,12 +37,12 @@ class TracedLimbs:
     program   operations of the core (all bodies outside limbs) and of one limb of each group, not yet divided into
               stages
     groups    the groups of equal limbs
-    products  matrix products that follow, if any
+    products  matrix products that follow
     """
 
     program: Program
     groups: tuple[LimbGroup, ...]
-    products: ThinProducts | None = None
+    products: tuple[ThinProducts, ...] = ()
 
 
 def trace_limbs(
@@ -137,7 +137,7 @@ class _Trace:
             arrangement,
             robot,
         )
-        self.products: ThinProducts | None = None
+        self.products: tuple[ThinProducts, ...] = ()
         self.tracer = Tracer()
         self.groups = [_Group(number, len(limbs)) for number, limbs in enumerate(groups)]
         self.sums = LimbSums(self.tracer, [len(limbs) for limbs in groups])
@@ -254,7 +254,7 @@ class _Trace:
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
         """Yield the output values to store, with slots (name and index) of a group of limbs or of the core (everything
         outside limbs). Zeros are not stored."""
-        self.products = self._products(found)
+        self.products = tuple(self._products(found))
         for quantity in self.signature.stored:
             entries = [self._along(axis) for axis in quantity.axes]
             for index, which in enumerate(product(*entries)):
@@ -273,8 +273,7 @@ class _Trace:
             Slot(quantity.name, self._flat(quantity, [own[limb if len(own) > 1 else 0] for _, own in which]))
             for limb in range(count)
         )
-        if self.products is not None:
-            slots = tuple(self.products.place(slot, THIN) for slot in slots)
+        slots = tuple(map(self._place, slots))
         if not numbers:
             yield slots[0], value
             return
@@ -286,31 +285,56 @@ class _Trace:
         if is_new:
             yield slot, value
 
-    def _products(self, found: Mapping[Slot, Scalar]) -> ThinProducts | None:
-        """What is multiplied behind the stages; None where nothing is, as the robot has no core."""
-        entries = [(place, own) for place in self.places for own in self._entries(place, "nv")]
-        core = [k for k, (place, _) in enumerate(entries) if place.group is None]
+    def _place(self, slot: Slot) -> Slot:
+        """The place in memory of an entry."""
+        if slot.vector == THIN:
+            nv = self.first["nv"][-1]
+            return self.products[0].place_of_factor(*divmod(slot.index, nv), nv)
+        for products in self.products:
+            slot = products.place(slot)
+        return slot
+
+    def _products(self, found: Mapping[Slot, Scalar]) -> Iterator[ThinProducts]:
+        """What is multiplied behind the stages, for each kind of columns; nothing where the robot has no core."""
+        rates = self._along("nv")
+        core = [k for k, (group, _) in enumerate(rates) if group is None]
         if not self.groups or not self.signature.thin or not core:
-            return None
-        groups = []
+            return
+        shares = list(self._shares(found, rates, core, 0))
+        if any(each.below for each in self.signature.thin):
+            shares += self._shares(found, self._along("contact_rows"), core, len(rates))
+        is_free, rows = has_free_root(self.reframed.frames), tuple(rates[k][1][0] for k in core)
+        columns = {each.name: each.axes[1] for each in self.signature.outputs if len(each.axes) > 1}
+        for axis in dict.fromkeys(columns[each.name] for each in self.signature.thin):
+            thin = [each for each in self.signature.thin if columns[each.name] == axis]
+            yield ThinProducts(
+                tuple(each.name for each in thin),
+                tuple(each.known if is_free else 0 for each in thin),
+                self.first[axis][-1],
+                rows,
+                tuple(shares),
+                tuple(each.below for each in thin if each.below),
+            )
+
+    def _shares(
+        self,
+        found: Mapping[Slot, Scalar],
+        entries: Sequence[tuple[int | None, tuple[int, ...]]],
+        core: Sequence[int],
+        first: int,
+    ) -> Iterator[Shares]:
+        """The factor T of each group, in the rows of joint rates or, from the row `first`, of contacts."""
+        wide = len(self._along("nv"))
         for group in self.groups:
-            rows = [k for k, (place, _) in enumerate(entries) if place.group == group.number]
+            rows = [k for k, (number, _) in enumerate(entries) if number == group.number]
             used = [
                 number
                 for number, column in enumerate(core)
-                if any(found[Slot(THIN, row * len(entries) + column)] != 0.0 for row in rows)
+                if any(found[Slot(THIN, (first + row) * wide + column)] != 0.0 for row in rows)
             ]
             whole = tuple(entries[row][1][limb] for limb in range(group.count) for row in rows)
-            groups.append(Shares(f"{group.vectors.name}_shares", whole, tuple(used)))
-        own = tuple(entries[k][1][0] for k in core)
-        thin, is_free = self.signature.thin, has_free_root(self.reframed.frames)
-        return ThinProducts(
-            tuple(each.name for each in thin),
-            tuple(each.known if is_free else 0 for each in thin),
-            self.first["nv"][-1],
-            own,
-            tuple(groups),
-        )
+            name = f"{group.vectors.name}_{'pushes' if first else 'shares'}"
+            yield Shares(name, whole, tuple(used), bool(first))
 
     def _flat(self, quantity: Quantity, indices: Sequence[int]) -> int:
         flat = 0

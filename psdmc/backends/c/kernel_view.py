@@ -175,10 +175,15 @@ class KernelView:
 
     @property
     def whole_arguments(self) -> str:
-        """Return C text of the arguments of `whole`. The inputs are copies, because outputs may overlap the inputs."""
-        names = [f"{vector.name}_given" for vector in self.inputs]
-        names += [output.name for output in self.outputs]
-        return ", ".join([*names, *([self.positive.name] if self.positive else [])])
+        """Return C text of the arguments of `whole`, without pivots. The inputs are copies, because outputs may overlap
+        the inputs."""
+        given = [f"{vector.name}_given" for vector in self.inputs]
+        return ", ".join([*given, *(output.name for output in self.outputs)])
+
+    @property
+    def own_arguments(self) -> str:
+        """Return C text of the names of the function's own arguments for one state."""
+        return ", ".join(vector.name for vector in (*self.inputs, *self.outputs))
 
     @property
     def lanes_arguments(self) -> str:
