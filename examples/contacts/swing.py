@@ -17,7 +17,11 @@ FEET = ["lf_foot", "lh_foot", "rf_foot", "rh_foot"]
 EVERY = 0.02
 """s between two stored energies."""
 
-RUNS = [(name, dt) for name in ("constrained_semi_implicit_euler", "constrained_rk4_step") for dt in (0.004, 0.002)]
+RUNS = [
+    (name, dt)
+    for name in ("constrained_semi_implicit_euler", "constrained_rk4_step")
+    for dt in (0.004, 0.002)
+]
 
 
 def resting(model: psdmc.DynamicsModel) -> tuple[np.ndarray, np.ndarray]:
@@ -40,13 +44,17 @@ def energies(robot, step: str, dt: float, seconds: float, q, qd, tau) -> np.ndar
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("urdf")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--plot", metavar="FILE")
     given = parser.parse_args()
     model = psdmc.derive(given.urdf, floating=True, contacts=FEET)
-    robot = psdmc.compile(model, functions=[*{name for name, _ in RUNS}, "kinetic_energy", "potential_energy"])
+    robot = psdmc.compile(
+        model, functions=[*{name for name, _ in RUNS}, "kinetic_energy", "potential_energy"]
+    )
     q, tau = resting(model)
     jacobian, push = model.contact_jacobian(q), np.array([0.3, 0.2, 0.1, 0.2, -0.3, 0.4])
     qd = np.concatenate([push, -np.linalg.solve(jacobian[:, 6:], jacobian[:, :6] @ push)])

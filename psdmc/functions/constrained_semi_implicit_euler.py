@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
-from psdmc.dynamics.slices import leading
 from psdmc.functions import constrained_forward_dynamics
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, Signature

@@ -111,8 +111,8 @@ RECIPE = Recipe(
     Signature(
         "constrained_semi_implicit_euler_derivatives",
         502,
-        "the state after dt seconds and the forces of constrained_semi_implicit_euler, and their derivatives: of the state A "
-        "by (q, qd), B by tau and B_error by error (rows: q_next, then qd_next); those by q hold error constant",
+        "the state after dt seconds and the forces of constrained_semi_implicit_euler, and their derivatives: of the state "
+        "A by (q, qd), B by tau, B_error by error (rows: q_next, then qd_next); those by q hold error constant",
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B, B_ERROR, *OF_FORCES),
         theta=True,

@@ -37,7 +37,9 @@ def trace(g: Ingredients) -> Outputs:
         pivots.append(found)
         return coordinate_rates(g.frames, q, qd), qdd
 
-    q_next, qd_next = runge_kutta_step((g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt)
+    q_next, qd_next = runge_kutta_step(
+        (g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt
+    )
     return {"q_next": q_next, "qd_next": qd_next, "pivot": pivots}
 
 
@@ -47,7 +49,7 @@ def runge_kutta_step(
     unit: Callable[[Sequence[Scalar]], Sequence[Scalar]],
     dt: Scalar,
 ) -> State:
-    """Return the state after dt. The slopes at the start, twice in the middle and at the end have the weights 1/6, 2/6, 2/6, 1/6.
+    """Return the state after dt. Slopes at the start, twice in the middle and at the end: weights 1/6, 2/6, 2/6, 1/6.
 
     `rates` are those of q's coordinates and of qd, `unit` makes quaternions of length one. The slopes are of the
     coordinates, and quaternions leave their sphere by the second order of dt between stages: taken back to it at each,

@@ -92,7 +92,11 @@ def state_and_jacobians(
                 found[f"way_{i}"] = [dt * x for row in own.by_way for x in row]
         return {name: Column(values) for name, values in found.items()}
 
-    places = [("A", 0, nv, 2 * nv), ("A", nv, nv, 2 * nv), *((name, 0, width, width) for name, width in others)]
+    places = [
+        ("A", 0, nv, 2 * nv),
+        ("A", nv, nv, 2 * nv),
+        *((name, 0, width, width) for name, width in others),
+    ]
     arrays = {f"{name}_{i}": n * n for i, n in wide.items() for name in ("start", "way")}
     return arrays, (
         straight(stepped_state),

@@ -60,7 +60,13 @@ def test_half_the_step_has_a_sixteenth_of_the_error_to_scipys_solution() -> None
         return np.asarray(model.forward_kinematics(q).position[0] - origin)
 
     def rates(_: float, state: Array) -> Array:
-        given = {"q": state[:nv], "qd": state[nv:], "tau": tau, "active": np.ones(1), "error": error(state[:nv])}
+        given = {
+            "q": state[:nv],
+            "qd": state[nv:],
+            "tau": tau,
+            "active": np.ones(1),
+            "error": error(state[:nv]),
+        }
         arrays = {name: array[None] for name, array in given.items()}
         arrays |= {name: np.array([value]) for name, value in (("mu", 0.0), ("kp", kp), ("kd", kd))}
         qdd = RECIPES["constrained_forward_dynamics"].pinocchio(theirs, arrays)["qdd"][0]
@@ -83,7 +89,9 @@ def test_half_the_step_has_a_sixteenth_of_the_error_to_scipys_solution() -> None
 @cache
 def hanging_brick() -> CompiledRobot:
     with without_optimisation():
-        return psdmc.compile(brick("edge"), functions=[NAME, "kinetic_energy", "potential_energy", "momentum"])
+        return psdmc.compile(
+            brick("edge"), functions=[NAME, "kinetic_energy", "potential_energy", "momentum"]
+        )
 
 
 def test_energy_drifts_with_the_order_of_the_method() -> None:
@@ -93,7 +101,7 @@ def test_energy_drifts_with_the_order_of_the_method() -> None:
     for steps in (100, 200):
         q, qd = np.array(BRICK), np.array([0.0, 0.0, 0.0, 1.0, 0.0, 3.0])
         qd[:3] = np.cross(qd[3:], [-0.1, 0.0, 0.0])  # the point, 0.1 m before the centre, is still
-        point, kept = q[:3] + [0.1, 0.0, 0.0], []
+        point, kept = np.add(q[:3], [0.1, 0.0, 0.0]), []
         for _ in range(steps):
             momentum = robot.momentum(q, qd)
             about = momentum[3:] - np.cross(point, momentum[:3])
@@ -109,7 +117,9 @@ def test_mean_forces_are_what_changes_the_momentum() -> None:
     q, qd, dt = np.array(BRICK), np.array([0.0, 0.0, 0.3, 0.0, 3.0, 0.0]), 1e-3
     step = getattr(robot, NAME)(q, qd, np.zeros(6), dt, [1])
     change = (robot.momentum(step.q_next, step.qd_next) - robot.momentum(q, qd))[:3]
-    np.testing.assert_allclose(change / dt, step.forces + weight, rtol=0, atol=1e-7 * np.abs(step.forces).max())
+    np.testing.assert_allclose(
+        change / dt, step.forces + weight, rtol=0, atol=1e-7 * np.abs(step.forces).max()
+    )
 
 
 @pytest.mark.slow

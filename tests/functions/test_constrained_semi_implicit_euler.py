@@ -43,8 +43,8 @@ def test_without_contacts_it_is_semi_implicit_euler_and_forces_are_those_of_forw
 
 
 def test_stabilisation_pulls_a_displaced_contact_back() -> None:
-    """A brick hangs at a point that is 1 cm from its place. Critically damped, the displacement falls by (1 + k t) exp(-k t),
-    here within what the steps' length leaves; without gains, it stays."""
+    """A brick hangs at a point that is 1 cm from its place. With gains k^2 and 2 k, it falls by (1 + k t) exp(-k t), here
+    within what the steps' length leaves; without gains, it stays."""
     model = brick("edge")
     with without_optimisation():
         robot = psdmc.compile(model, functions=[NAME, "forward_kinematics"])

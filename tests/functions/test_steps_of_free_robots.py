@@ -99,7 +99,9 @@ def test_a_steps_jacobians_are_its_slopes_along_the_tangents(function: str, name
     times M's condition number, of each column's largest entry (Higham, Accuracy and Stability, 10.1)."""
     own = wide_robot(name)
     recipe, nv, nq = RECIPES[f"{function}_derivatives"], own.model.nv, own.model.nq
-    blocks = [name for name in ("A", "B", "B_error") if name in {each.name for each in recipe.signature.outputs}]
+    blocks = [
+        name for name in ("A", "B", "B_error") if name in {each.name for each in recipe.signature.outputs}
+    ]
     given = {quantity.name: own.given[quantity.name] for quantity in recipe.signature.inputs}
     given["qdd"] = own.arrays.accelerations(given["q"], given["qd"], given["tau"])
     found = recipe.reference(own.arrays, given)
@@ -112,7 +114,9 @@ def test_a_steps_jacobians_are_its_slopes_along_the_tangents(function: str, name
 
     _, by_qd, by_tau, by_error = np.split(np.eye(width), [nv, 2 * nv, 3 * nv])
     by_q = rates_of_coordinates(given["q"]) @ np.eye(nv, width)
-    ways = {"q": by_q, "qd": by_qd[None], "tau": by_tau[None]} | ({"error": by_error[None]} if len(by_error) else {})
+    ways = {"q": by_q, "qd": by_qd[None], "tau": by_tau[None]} | (
+        {"error": by_error[None]} if len(by_error) else {}
+    )
     inputs = [quantity.name for quantity in recipe.signature.inputs]
     point = {name: given[name].reshape(len(given["q"]), -1) for name in inputs}
     step = lowered(own.model, functions=[function])[function].single
@@ -124,7 +128,9 @@ def test_a_steps_jacobians_are_its_slopes_along_the_tangents(function: str, name
     condition = np.linalg.cond(mass := own.arrays.mass_matrix(given["q"])).max()
     if len(by_error):
         rows = RECIPES["contact_jacobian"].reference(own.arrays, given)["J"]
-        condition *= np.linalg.cond(rows @ np.linalg.inv(mass) @ rows.swapaxes(1, 2) + 0.1 * np.eye(len(by_error))).max()
+        condition *= np.linalg.cond(
+            rows @ np.linalg.inv(mass) @ rows.swapaxes(1, 2) + 0.1 * np.eye(len(by_error))
+        ).max()
     largest = np.abs(slopes).max(axis=(0, 1))
     error = (np.abs(whole - slopes) / largest).max()
     assert error < nv * np.finfo(float).eps * condition
