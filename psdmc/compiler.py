@@ -352,7 +352,7 @@ def compile(
 
     model      a model, or the path of a model file
     functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
-               at once, and each other function at its first call
+               now, and each other function when you first call it
 
     `emit_c` explains the other options. Raises InputError if the target is a microcontroller, because its code lacks the
     batch functions that Python calls. Raises ToolchainError if the compiler or the CPU does not support the target.

@@ -197,8 +197,11 @@ def compare(
     a                 a model, or the path of its file
     b                 another model of the robot, the path of its file, or the path of a robot file (URDF, MJCF, DH table)
     logs              logs on which psdmc tests both models; at least one of them must then be calibrated
-    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: the models'
-    naming            topic of the joint states in the logs, and joint names that differ from the model's
+    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the
+                      models
+    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
+                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
+                      differ
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if a file is missing, a model has no values, or the models are of different robots.

@@ -58,8 +58,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of the centre of mass of all links: J qd is its velocity along the axes of "
-        "the base frame.",
+        summary="Compute the Jacobian J of the centre of mass of all links: J qd is this point's velocity along "
+        "the axes of the base frame.",
     ),
     "Jacobian of the centre of mass",
     trace,

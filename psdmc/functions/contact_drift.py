@@ -51,7 +51,7 @@ RECIPE = Recipe(
             Quantity(
                 "drift",
                 ("contact_rows",),
-                means=f"accelerations of the contacts (m/s^2, rad/s^2): {ROW_WORDS}",
+                means=f"accelerations (m/s^2, rad/s^2) in the order of the contacts: {ROW_WORDS}",
                 unit="1/s^2",
                 powers=(1,),
             ),

@@ -49,7 +49,7 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("contact_rows", "nv"),
-                means=f"Jacobian. Its column j is for qd[j], and its rows are those of the contacts: {ROW_WORDS}",
+                means=f"Jacobian. Column j is for qd[j], and the rows are in the order of the contacts: {ROW_WORDS}",
                 unit="1",
                 powers=(1, -1),
             ),

@@ -52,7 +52,7 @@ RECIPE = Recipe(
             Quantity(
                 "D",
                 ("contact_rows", "contact_rows"),
-                means=f"symmetric matrix. Its rows, and likewise its columns, are those of the contacts: {ROW_WORDS}",
+                means=f"symmetric matrix. Its rows, and likewise its columns, are in the order of the contacts: {ROW_WORDS}",
                 unit="1/(J s^2)",
                 powers=(1, 1),
             ),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
-from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along, solved, torque_slopes
+from psdmc.recipes.directions import DQ, DQD, DTAU, along, along_direction, solved, torque_slopes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -43,7 +42,7 @@ RECIPE = Recipe(
         190,
         "qdd, and its derivative along (dq, dqd, dtau)",
         (Q, QD, TAU, DQ, DQD, DTAU),
-        (QDD, replace(DQDD, means="derivative of qdd along the direction")),
+        (QDD, along_direction(QDD)),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics, and their derivative dqdd along the direction "
         "(dq, dqd, dtau).",

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from psdmc.dynamics.manifold import coordinate_rates
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import slopes
-from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along
+from psdmc.recipes.directions import DQ, DQD, DQDD, along, along_direction
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.torques import torques
@@ -54,7 +53,7 @@ RECIPE = Recipe(
         188,
         "tau, and its derivative along (dq, dqd, dqdd)",
         (Q, QD, QDD, *DIRECTIONS),
-        (TAU, replace(DTAU, means="derivative of tau along the direction")),
+        (TAU, along_direction(TAU)),
         theta=True,
         summary="Compute the torques tau of inverse dynamics, and their derivative dtau along the direction "
         "(dq, dqd, dqdd).",

@@ -45,7 +45,7 @@ RECIPE = Recipe(
         140,
         "potential energy U(q) (J), zero at q = 0; dU/dq = g(q)",
         (Q,),
-        (Quantity("U", means="potential energy, J; zero if no joint has moved (q = 0)", unit="J"),),
+        (Quantity("U", means="potential energy, J; zero at q = neutral()", unit="J"),),
         theta=True,
         summary="Compute the potential energy U(q) of the links, whose derivative by q is the gravity torques g(q).",
     ),

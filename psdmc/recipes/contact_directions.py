@@ -24,7 +24,7 @@ from psdmc.program.replay import substituted
 from psdmc.program.signature import PIVOTS, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.contacts import ACTIVE, MU, Held, Solved
-from psdmc.recipes.directions import along, direction_of, gradient_by, weighted
+from psdmc.recipes.directions import along, along_direction, direction_of, gradient_by, weighted
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
@@ -80,10 +80,7 @@ class ContactFunction:
 
     def along(self, order: int, meaning: str, summary: str) -> Recipe:
         """Return the recipe of the derivatives of the outputs along a direction."""
-        found = tuple(
-            replace(each, name=f"d{each.name}", means=f"derivative of {each.name} along the direction")
-            for each in self.outputs
-        )
+        found = tuple(map(along_direction, self.outputs))
         return self._recipe("jvp", order, meaning, summary, self.directions, found, "along a direction")
 
     def _recipe(

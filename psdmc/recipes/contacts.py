@@ -21,7 +21,7 @@ from psdmc.robot.mechanism import Array, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "three linear ones for a point; three linear, then three angular ones for a surface; along the base frame's axes"
+ROW_WORDS = "three linear for each point; three linear, then three angular for each surface; along the base frame's axes"
 
 ACTIVE = Quantity(
     "active",
@@ -38,7 +38,7 @@ MU = Quantity(
     largest=1.0,
     least=0.1,
     means="regularisation, 0 or more: added to the diagonal of J M^-1 J^T, with the Jacobian J and the mass matrix M; "
-    "1/kg in linear rows, 1/(kg m^2) in angular rows",
+    "unit 1/kg in linear rows, 1/(kg m^2) in angular rows",
     unit="1/kg",
     default=0.0,
 )

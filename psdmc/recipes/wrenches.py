@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from psdmc.dynamics.newton_euler import Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.program.signature import Quantity
-from psdmc.recipes.directions import along
+from psdmc.recipes.directions import along, direction_of
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients
 from psdmc.reproducible import times
@@ -32,7 +31,7 @@ WRENCHES = Quantity(
     powers=(0, -1),
 )
 
-DWRENCHES = replace(WRENCHES, name="dwrenches", largest=1.0, means="change of wrenches along the direction")
+DWRENCHES = direction_of(WRENCHES)
 
 GRADIENT_WRENCHES = Quantity(
     "grad_wrenches",
