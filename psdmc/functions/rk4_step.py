@@ -33,17 +33,19 @@ def trace(g: Ingredients) -> Outputs:
         pivots.append(found)
         return coordinate_rates(g.frames, q, qd), qdd
 
-    q_next, qd_next = _step((g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt)
+    q_next, qd_next = runge_kutta_step(
+        (g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt
+    )
     return {"q_next": q_next, "qd_next": qd_next, "pivot": pivots}
 
 
-def _step(
+def runge_kutta_step(
     start: State,
     rates: Callable[[Sequence[Scalar], Sequence[Scalar]], State],
     unit: Callable[[Sequence[Scalar]], Sequence[Scalar]],
     dt: Scalar,
 ) -> State:
-    """The state after dt: the slopes at the start, twice in the middle and at the end have the weights 1/6, 2/6, 2/6, 1/6.
+    """Return the state after dt. Slopes at the start, twice in the middle and at the end: weights 1/6, 2/6, 2/6, 1/6.
 
     `rates` are those of q's coordinates and of qd, `unit` makes quaternions of length one. The slopes are of the
     coordinates, and quaternions leave their sphere by the second order of dt between stages: taken back to it at each,
@@ -57,10 +59,11 @@ def _step(
         slopes.append(rates(unit(stepped(q, moved, part)), stepped(qd, pushed, part)))
     sixth = (1.0 / 6.0) * dt
     ways, kicks = zip(*slopes, strict=True)
-    return unit(stepped(q, _total(ways), sixth)), stepped(qd, _total(kicks), sixth)
+    return unit(stepped(q, total_of(ways), sixth)), stepped(qd, total_of(kicks), sixth)
 
 
-def _total(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+def total_of(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+    """Return six times the mean of the slopes at the four stages of a step, entry by entry."""
     return [(a + d) + 2.0 * (b + c) for a, b, c, d in zip(*slopes, strict=True)]
 
 
@@ -69,22 +72,23 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
         moved = coordinate_rates(robot.frames, list(q.T), list(qd.T))
         return columns(moved, len(q)), robot.accelerations(q, qd, given["tau"])
 
-    return _on_arrays(given, rates, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
+    return step_of_arrays(given, rates, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     def rates(q: Array, qd: Array) -> tuple[Array, Array]:
         return robot.coordinate_rates(q, qd), robot.forward_dynamics(q, qd, given["tau"])
 
-    return _on_arrays(given, rates, robot.restored)
+    return step_of_arrays(given, rates, robot.restored)
 
 
-def _on_arrays(
+def step_of_arrays(
     given: Given,
     rates: Callable[[Array, Array], tuple[Array, Array]],
     unit: Callable[[Array], Array],
 ) -> Arrays:
-    """Take the step on arrays of joints, (k, nq) and (k, nv), instead of lists of numbers."""
+    """Return the state after dt from arrays (k, nq) and (k, nv), in NumPy. Entries of q and qd have rates of their own;
+    those of q are coordinates of joints."""
     dt = step_on_arrays(given)
     q, qd = given["q"], given["qd"]
     first = rates(q, qd)

@@ -46,12 +46,30 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions:
-    """Return the function's body as a call of forward dynamics' derivatives and loops. The arrays are:
+    """Return the function's body as a call of forward dynamics' derivatives and loops. The internal arrays have the call's
+    results (by_q, by_qd and by_tau: derivatives of the accelerations), and those of `state_and_jacobians`."""
+    nv = first_rates(frames)[-1]
+    names = ("by_q", "by_qd", "by_tau")
+    found = (("qdd", 0), *((name, 0) for name in names))
+    call = Call(ACCELERATIONS.name, (("q", 0), ("qd", 0), ("tau", 0)), found, nv)
+    arrays, body = state_and_jacobians(frames, (*names,), (("B", nv),))
+    return Regions({"qdd": nv, "step": 1, **dict.fromkeys(names, nv * nv), **arrays}, (call, *body))
 
-    by_q, by_qd, by_tau  nv x nv, derivatives of the accelerations
-    step                 dt
+
+def state_and_jacobians(
+    frames: Sequence[Frame], blocks: Sequence[str], others: Sequence[tuple[str, int]]
+) -> tuple[dict[str, int], tuple[Region, ...]]:
+    """Return the arrays and the regions that compute the new state, A, and derivatives by other quantities.
+
+    blocks  arrays of the derivatives of the accelerations, by q, by qd and by the other quantities
+    others  name of the output of each other quantity, such as B, and its number of columns
+
+    The arrays are:
+
     start_J, way_J       of joint J of n rates, n x n: derivatives of the new position by the old one, and by the new
                          rates
+
+    The caller has the array qdd of accelerations, and the array step, which gets dt.
     """
     first = first_rates(frames)
     nv = first[-1]
@@ -69,31 +87,28 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
                 found[f"way_{i}"] = [dt * x for row in own.by_way for x in row]
         return {name: Column(values) for name, values in found.items()}
 
-    blocks = (("by_q", "A", 0, 2 * nv), ("by_qd", "A", nv, 2 * nv), ("by_tau", "B", 0, nv))
-    arrays = {"qdd": nv, "step": 1, **{name: nv * nv for name, *_ in blocks}}
-    arrays |= {f"{name}_{i}": n * n for i, n in wide.items() for name in ("start", "way")}
-    body: tuple[Region, ...] = (
-        Call(
-            ACCELERATIONS.name,
-            (("q", 0), ("qd", 0), ("tau", 0)),
-            (("qdd", 0), *((name, 0) for name, *_ in blocks)),
-            nv,
-        ),
+    places = [
+        ("A", 0, nv, 2 * nv),
+        ("A", nv, nv, 2 * nv),
+        *((name, 0, width, width) for name, width in others),
+    ]
+    arrays = {f"{name}_{i}": n * n for i, n in wide.items() for name in ("start", "way")}
+    return arrays, (
         straight(stepped_state),
         *(
-            copied(nv, nv, Block(name, nv), Block(into, width).moved(nv, column), "step")
-            for name, into, column, width in blocks
+            copied(nv, columns, Block(block, columns), Block(into, width).moved(nv, column), "step")
+            for block, (into, column, columns, width) in zip(blocks, places, strict=True)
         ),
         one_more(nv, Slice("entry", "A", nv * 2 * nv + nv, 2 * nv + 1)),
-        *_positions(first, wide, nv),
+        *_positions(first, wide, nv, (("A", 2 * nv), *others)),
     )
-    return Regions(arrays, body)
 
 
-def _positions(first: Sequence[int], wide: Mapping[int, int], nv: int) -> Iterator[For]:
+def _positions(
+    first: Sequence[int], wide: Mapping[int, int], nv: int, matrices: Sequence[tuple[str, int]]
+) -> Iterator[For]:
     """Rows of the new positions: what rates' rows move them by, and one by the old position. Neighbouring joints of one
-    rate share a loop. `wide` has the number of rates of the other joints."""
-    matrices = ("A", 2 * nv), ("B", nv)
+    rate share a loop. `wide` has the number of rates of the other joints, `matrices` the number of columns of each."""
     starts, ends = [0, *(first[i + 1] for i in wide)], [*(first[i] for i in wide), nv]
     for start, end in zip(starts, ends, strict=True):
         if end > start:

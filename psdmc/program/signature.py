@@ -170,6 +170,7 @@ class Signature:
     theta     whether a variant exists that takes the base parameters (theta_b, length l) at run time
     factorises  symmetric matrices that the function factorises, in order. The divisors (pivots) must be positive. If
                 one is not, the outputs are NaN and the function returns its number; none: the function cannot fail
+    stages    how often the code factorises these matrices, one time after the other
     products  matrix products that compute outputs after the traced arithmetic, in C loops
     thin      outputs (nv, nv) that are computed as factors if a robot has equal limbs, such as legs, and multiplied
               last (thin_products.py)
@@ -186,6 +187,7 @@ class Signature:
     outputs: tuple[Quantity, ...]
     theta: bool
     factorises: tuple[SymmetricMatrix, ...] = ()
+    stages: int = 1
     products: tuple[Product, ...] = ()
     thin: tuple[Thin, ...] = ()
     calls: tuple[str, ...] = ()
@@ -210,7 +212,8 @@ class Signature:
     def pivots(self) -> Quantity | None:
         """Return the description of the pivots, the divisors in matrix factorisations, which must be positive. Return
         None if the function factorises no matrix."""
-        parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in self.factorises]
+        matrices = self.factorises * self.stages
+        parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in matrices]
         if len(parts) < 2:
             return parts[0] if parts else None
         whole = "+".join("*".join(part.axes) for part in parts)
@@ -226,8 +229,12 @@ class Signature:
     def pivot_numbers(self) -> tuple[str, ...]:
         """Return for each factorised matrix a phrase that says which pivot (divisor of the factorisation) is not
         positive. Pivots are numbered from 0 over all matrices."""
-        lengths = [f"{' '.join(matrix.axes)} + " for matrix in self.factorises]
-        return tuple("".join(lengths[:k]) + matrix.number for k, matrix in enumerate(self.factorises))
+        lengths = [" ".join(matrix.axes) for matrix in self.factorises]
+        later = f", + ({' + '.join(lengths)}) times the stage of the step" if self.stages > 1 else ""
+        return tuple(
+            "".join(f"{length} + " for length in lengths[:k]) + matrix.number + later
+            for k, matrix in enumerate(self.factorises)
+        )
 
     @property
     def traced(self) -> frozenset[str]:

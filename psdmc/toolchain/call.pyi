@@ -208,6 +208,28 @@ class InverseDynamicsWithWrenchesJvp(NamedTuple, Generic[RealT]):
     tau: NDArray[RealT]
     dtau: NDArray[RealT]
 
+class ConstrainedSemiImplicitEuler(NamedTuple, Generic[RealT]):
+    q_next: NDArray[RealT]
+    qd_next: NDArray[RealT]
+    forces: NDArray[RealT]
+
+class ConstrainedSemiImplicitEulerDerivatives(NamedTuple, Generic[RealT]):
+    q_next: NDArray[RealT]
+    qd_next: NDArray[RealT]
+    forces: NDArray[RealT]
+    A: NDArray[RealT]
+    B: NDArray[RealT]
+    B_error: NDArray[RealT]
+    dforces_dq: NDArray[RealT]
+    dforces_dqd: NDArray[RealT]
+    dforces_dtau: NDArray[RealT]
+    dforces_derror: NDArray[RealT]
+
+class ConstrainedRk4Step(NamedTuple, Generic[RealT]):
+    q_next: NDArray[RealT]
+    qd_next: NDArray[RealT]
+    forces: NDArray[RealT]
+
 class CompiledRobot(CompiledFunctions, Generic[RealT]):
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None, *, out: NDArray[RealT] | None = None) -> NDArray[RealT]: ...
     def inverse_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsDerivatives[RealT]: ...
@@ -288,3 +310,6 @@ class CompiledRobot(CompiledFunctions, Generic[RealT]):
     def inverse_dynamics_with_wrenches_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsWithWrenchesDerivatives[RealT]: ...
     def inverse_dynamics_with_wrenches_vjp(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsWithWrenchesVjp[RealT]: ...
     def inverse_dynamics_with_wrenches_jvp(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, dq: ArrayLike, dqd: ArrayLike, dqdd: ArrayLike, dwrenches: ArrayLike, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> InverseDynamicsWithWrenchesJvp[RealT]: ...
+    def constrained_semi_implicit_euler(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedSemiImplicitEuler[RealT]: ...
+    def constrained_semi_implicit_euler_derivatives(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedSemiImplicitEulerDerivatives[RealT]: ...
+    def constrained_rk4_step(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, active: ArrayLike, mu: ArrayLike = 0.0, kp: ArrayLike = 0.0, kd: ArrayLike = 0.0, error: ArrayLike = 0.0, theta_b: ArrayLike | None = None, *, out: tuple[NDArray[RealT], ...] | None = None) -> ConstrainedRk4Step[RealT]: ...
