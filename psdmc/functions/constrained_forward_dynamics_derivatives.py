@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.solve import inner_product, inverse
 from psdmc.functions import (
@@ -37,6 +36,7 @@ from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, copied
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques import torque_derivatives
 from psdmc.robot.mechanism import Array, NamedFrame
 
 if TYPE_CHECKING:
@@ -54,9 +54,7 @@ def trace(g: Ingredients) -> Outputs:
     found, signs, factors, jacobian = constrained_forward_dynamics.solved(g)
     q, qd = g.inputs["q"], g.inputs["qd"]
     (kp,), (kd,), (mu,) = (g.inputs[each.name] for each in (KP, KD, MU))
-    slopes = inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, found.motion, g.base_acceleration, g.choices
-    )
+    slopes = torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
     by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)

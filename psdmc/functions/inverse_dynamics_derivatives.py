@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.program.signature import QD, QDD, Q, Signature, jacobian_of
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques import torque_derivatives
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -16,16 +16,7 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    found = inverse_dynamics_derivatives(
-        g.frames,
-        g.bodies,
-        g.drives,
-        g.inputs["q"],
-        g.inputs["qd"],
-        g.inputs["qdd"],
-        g.base_acceleration,
-        g.choices,
-    )
+    found = torque_derivatives(g, g.inputs["qdd"])
     return {"dtau_dq": found.by_q, "dtau_dqd": found.by_qd, "dtau_dqdd": found.by_qdd}
 
 

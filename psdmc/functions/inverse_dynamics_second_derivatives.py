@@ -10,6 +10,7 @@ from psdmc.program.signature import QD, QDD, Q, Signature
 from psdmc.recipes.directions import COTANGENT, hessian_of, weighted
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques import on_diagonal
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -21,6 +22,14 @@ def trace(g: Ingredients) -> Outputs:
     found = inverse_dynamics_second_derivatives(
         g.frames, g.bodies, q, qd, qdd, weights, g.base_acceleration, g.choices
     )
+    if g.friction is not None:
+        bends = ([w * x for w, x in zip(weights, each, strict=True)] for each in g.friction.bends(q, qd))
+        found = found._replace(
+            **{
+                name: on_diagonal(getattr(found, name), own)
+                for name, own in zip(("by_q_q", "by_q_qd", "by_qd_qd"), bends, strict=True)
+            }
+        )
     return {"hessian": found.hessian}
 
 
