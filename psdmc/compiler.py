@@ -418,7 +418,15 @@ class _Request:
     @property
     def key(self) -> str:
         """A text that is equal for two calls of `compile` with equal results: a hash of the model and of all options."""
-        parts = (self.model_hash, self.lowering, self.functions, self.real, self.trig, self.target, *self._law)
+        parts = (
+            self.model_hash,
+            self.lowering,
+            self.functions,
+            self.real,
+            self.trig,
+            self.target,
+            *self._law,
+        )
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     def compiled(self, progress: Progress = silent) -> CompiledRobot[Any]:

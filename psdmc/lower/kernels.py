@@ -10,8 +10,8 @@ from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
-from psdmc.functions import BY_ROWS, DEFAULT, RECIPES, default_of, recipe_of
 from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.functions import BY_ROWS, DEFAULT, RECIPES, default_of, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.dimension_check import check_dimensions

@@ -57,17 +57,18 @@ def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = N
         )
     chain, name = model.mechanism, shown(model.mechanism.name)
     places: dict[str, tuple[int, int]] = {}
-    nq = nv = 0
+    nq, nv, is_turned = 0, 0, False
     for joint in (chain.joints[i] for i in chain.own_joints):
         if joint.type.nv == 1:
             places[joint.name] = nq, nv
+            is_turned |= joint.type.nq > 1
         nq, nv = nq + joint.type.nq, nv + joint.type.nv
     friction = _friction_of(model, list(places))
     if model.calibrated is not None and not {row.joint for row in model.calibrated.friction} <= set(places):
         raise InputError(f"{name}: friction is of joints of one rate that follow no other", "lock the others")
-    if friction.by_position and nq > nv:
+    if friction.by_position and is_turned:
         raise InputError(
-            f"{name}: its friction depends on positions, which are quaternions or cosines and sines here",
+            f"{name}: its friction depends on positions, and a joint's position is a cosine and a sine",
             "calibrate with laws of speed",
         )
     if smoothing_speed is not None:

@@ -120,11 +120,14 @@ class RobotOnArrays:
         found = inverse_dynamics_second_derivatives(self.frames, self.bodies, *given, self.base_acceleration)
         hessian = matrix(found.hessian, len(q))
         if self.friction is not None:
-            q_q, q_qd, qd_qd = (
-                weights * columns(each, len(q)) for each in self.friction.bends(*given[:2])
-            )
+            q_q, q_qd, qd_qd = (weights * columns(each, len(q)) for each in self.friction.bends(*given[:2]))
             own, rate = np.arange(self.nv), np.arange(self.nv) + self.nv
-            for rows, others, block in ((own, own, q_q), (own, rate, q_qd), (rate, own, q_qd), (rate, rate, qd_qd)):
+            for rows, others, block in (
+                (own, own, q_q),
+                (own, rate, q_qd),
+                (rate, own, q_qd),
+                (rate, rate, qd_qd),
+            ):
                 hessian[:, rows, others] += block
         return hessian
 

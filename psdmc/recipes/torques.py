@@ -60,7 +60,9 @@ def with_friction_slopes(g: Ingredients, found: Derivatives) -> Derivatives:
 
 def less_friction(g: Ingredients, tau: Sequence[Scalar]) -> Sequence[Scalar]:
     """Return motor torques less the friction `g.friction`, if any: the torques that move the rigid bodies."""
-    return tau if g.friction is None else list(map(sub, tau, g.friction.torques(g.inputs["q"], g.inputs["qd"])))
+    return (
+        tau if g.friction is None else list(map(sub, tau, g.friction.torques(g.inputs["q"], g.inputs["qd"])))
+    )
 
 
 def on_diagonal(rows: Sequence[Sequence[Scalar]], added: Sequence[Scalar]) -> list[list[Scalar]]:

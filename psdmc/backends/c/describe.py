@@ -58,8 +58,14 @@ def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str
             for joint, values in zip(_with_friction(info), law.values.tolist(), strict=True)
         ),
         *wrap(f"Functions with friction: {', '.join(names[True]) or 'none'}.", WIDTH, subsequent_indent="  "),
-        *wrap(f"Functions without friction: {', '.join(names[False]) or 'none'}.", WIDTH, subsequent_indent="  "),
-        *((f"The calibration also found what tau does not have: {'; '.join(law.beyond)}.",) if law.beyond else ()),
+        *wrap(
+            f"Functions without friction: {', '.join(names[False]) or 'none'}.", WIDTH, subsequent_indent="  "
+        ),
+        *(
+            (f"The calibration also found what tau does not have: {'; '.join(law.beyond)}.",)
+            if law.beyond
+            else ()
+        ),
         "",
     )
 
