@@ -195,8 +195,8 @@ def emit_c(
     is not positive definite at some pose within the joint limits, psdmc raises InputError instead of generating these
     functions. In this case, let `functions` name only functions that do not need the inverse, such as "gravity".
     """
-    own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
-    own |= {"smoothing-speed": smoothing_speed}
+    own: dict[str, Any] = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
+    own["smoothing-speed"] = smoothing_speed
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
 
 
@@ -372,8 +372,9 @@ def compile(
     friction   True: inverse dynamics, forward dynamics and all functions made from them contain the friction of a model
                that was calibrated from logs
 
-    `emit_c` explains the other options. Raises InputError if the model has no such friction, or if the target is a microcontroller, because its code lacks the
-    batch functions that Python calls. Raises ToolchainError if the compiler or the CPU does not support the target.
+    `emit_c` explains the other options. Raises InputError if the model has no such friction. Raises InputError also if the
+    target is a microcontroller, because its code lacks the batch functions that Python calls. Raises ToolchainError if the
+    compiler or the CPU does not support the target.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP
@@ -509,7 +510,7 @@ def _emission(
         key if law is None else (*key, law.key),
         lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
     )
-    shown = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     if law is not None:
         shown |= {"friction": "in-dynamics", "smoothing-speed": repr(law.friction.sign_speed)}
     own = None if law is None else law.friction

@@ -124,8 +124,8 @@ def _motor_torques(
     robot: RobotOnArrays, given: Mapping[str, Array], friction: FrictionInDynamics | None
 ) -> Array:
     """(k, nv) torques of the motors at q, qd and qdd."""
-    states = (given[name] for name in ("q", "qd", "qdd"))
-    return replace(robot, friction=friction).torques(*states, robot.base_acceleration)
+    resisted = replace(robot, friction=friction)
+    return resisted.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)
 
 
 def _by_rows(

@@ -337,7 +337,7 @@ def emit(
         float | None,
         typer.Option(
             metavar="V",
-            help="rad/s (m/s): with --friction=in-dynamics, the sign of a speed v is tanh(v / V); default: the calibration's",
+            help="rad/s (m/s), with --friction=in-dynamics: the sign of a speed v is tanh(v / V); default: as calibrated",
         ),
     ] = None,
     adapters: Annotated[

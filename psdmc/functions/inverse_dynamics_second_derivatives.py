@@ -25,10 +25,9 @@ def trace(g: Ingredients) -> Outputs:
     if g.friction is not None:
         bends = ([w * x for w, x in zip(weights, each, strict=True)] for each in g.friction.bends(q, qd))
         found = found._replace(
-            **{
-                name: on_diagonal(getattr(found, name), own)
-                for name, own in zip(("by_q_q", "by_q_qd", "by_qd_qd"), bends, strict=True)
-            }
+            by_q_q=on_diagonal(found.by_q_q, next(bends)),
+            by_q_qd=on_diagonal(found.by_q_qd, next(bends)),
+            by_qd_qd=on_diagonal(found.by_qd_qd, next(bends)),
         )
     return {"hessian": found.hessian}
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import add, sub
 
-from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
+from psdmc.dynamics.derivatives import Derivatives, Rows, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import part_of, with_carriers
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.scalar import Scalar, Vector
@@ -65,12 +65,12 @@ def less_friction(g: Ingredients, tau: Sequence[Scalar]) -> Sequence[Scalar]:
     )
 
 
-def on_diagonal(rows: Sequence[Sequence[Scalar]], added: Sequence[Scalar]) -> list[list[Scalar]]:
+def on_diagonal(rows: Sequence[Sequence[Scalar]], added: Sequence[Scalar]) -> Rows:
     """Return a square matrix with `added` added to its diagonal."""
     found = [list(row) for row in rows]
     for i, x in enumerate(added):
         found[i][i] = found[i][i] + x
-    return found
+    return tuple(map(tuple, found))
 
 
 def with_friction(recipe: Recipe, friction: FrictionInDynamics | None) -> Recipe:

@@ -43,7 +43,7 @@ def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str
     law = info.in_dynamics
     if law is None:
         return ()
-    names = {True: [], False: []}
+    names: dict[bool, list[str]] = {True: [], False: []}
     for function in functions:
         names[function.signature.has_motor_torques].append(function.name)
     headings = [name for term in law.terms for name in term.names]
