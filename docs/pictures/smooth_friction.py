@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from pictures.canvas import Canvas
 
+from pictures.canvas import Canvas
 from psdmc.friction.joints import Friction
 from psdmc.friction.terms import every_joint_s
 
