@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -111,18 +112,30 @@ class Held(NamedTuple):
     ) -> tuple[Constrained, list[Scalar]]:
         """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact,
         too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
-        rows = self.counts
         found = constrained(factors, jacobian, load, wanted, *self.rows)
         signs, first, inverse = [], 0, inverse_diagonal(found.factors)
-        for on, count in zip(self.active, rows, strict=True):
-            off = on - on * on
-            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
-            sign = Op.SELECT(-NOTHING, off, sign, -1.0)
+        for sign, count in zip(self._signs_of_inputs(), self.counts, strict=True):
             for k in range(first, first + count):
                 sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
             signs.append(sign)
             first += count
         return found, signs
+
+    def signs(self, positive: Sequence[Scalar]) -> list[Scalar]:
+        """Return a sign for each contact: -1 if a number of one of its rows is not positive, or if active or mu is not
+        allowed, else 1."""
+        signs, left = [], iter(positive)
+        for sign, count in zip(self._signs_of_inputs(), self.counts, strict=True):
+            for value in islice(left, count):
+                sign = Op.SELECT(0.0, value, sign, -1.0)
+            signs.append(sign)
+        return signs
+
+    def _signs_of_inputs(self) -> Iterator[Scalar]:
+        for on in self.active:
+            off = on - on * on
+            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+            yield Op.SELECT(-NOTHING, off, sign, -1.0)
 
 
 def held_on_arrays(
