@@ -12,7 +12,6 @@ from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, resp
 from psdmc.dynamics.contacts import contact_jacobian as contact_jacobian_of
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
-from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product, inverse
 from psdmc.functions import (
     constrained_forward_dynamics,

@@ -183,6 +183,9 @@ class _Lowered:
                 f"{recipe.name}: the entries that it stores are those of rigid bodies, without friction",
                 f"emit {whole.name}, or leave friction out of the dynamics",
             )
+        calls = any(RECIPES[name].signature.has_motor_torques for name in recipe.signature.calls)
+        if self.friction is not None and calls and not recipe.signature.has_motor_torques:
+            return replace(recipe, regions=None)  # its loops would call a function with friction
         return with_friction(recipe, self.friction)
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:

@@ -299,11 +299,23 @@ def test_c_is_pinocchios_with_the_law(robot: str, names: tuple[str, ...]) -> Non
                 named = dict(zip((each.name for each in recipe.signature.outputs), values, strict=True))
                 kept = {key: value for key, value in wanted.items() if key != recipe.gradient}
                 compared(name, kept, named, 1e-10 if "rk4" in name or found is one else EXACT)
-    plain = psdmc.compile(own.model, functions=["nonlinear_effects", "mass_matrix"])
-    if robot == "walker":
-        for name in ("nonlinear_effects", "mass_matrix"):
-            given = [own.given[quantity.name] for quantity in RECIPES[name].signature.inputs]
-            assert np.allclose(getattr(compiled, name)(*given), getattr(plain, name)(*given), rtol=1e-12)
+
+
+def test_functions_without_torques_of_motors_are_the_same() -> None:
+    """Among them one whose loops call derivatives of inverse dynamics, for a robot with more than eight rates."""
+    own, names = case("floating"), ("nonlinear_effects", "mass_matrix", "impulse_derivatives")
+    with without_optimisation():
+        found = psdmc.compile(own.model, functions=names, friction=True)
+        plain = psdmc.compile(own.model, functions=names)
+    rng = np.random.default_rng(2)
+    for name in names:
+        signature = RECIPES[name].signature
+        given = [
+            own.given.get(q.name, q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *own.sizes.shape(q.axes)))))
+            for q in signature.inputs
+        ]
+        for one, other in zip(found.call(signature, given), plain.call(signature, given), strict=True):
+            assert np.allclose(one, other, rtol=1e-10, atol=1e-9), name
 
 
 def test_functions_with_torques_of_motors_are_found() -> None:
