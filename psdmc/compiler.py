@@ -37,7 +37,7 @@ from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.admitted import require
-from psdmc.lower.kernels import Lowering, lower, wanted
+from psdmc.lower.kernels import Lowering, lower, lower_estimator, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import friction_in_dynamics
 from psdmc.model.load import load_bytes, model_of
@@ -163,6 +163,7 @@ def emit_c(
     target: str | Target = NATIVE,
     friction: bool | Literal["in-dynamics"] = False,
     bodies: bool = False,
+    estimator: str | None = None,
     smoothing_speed: float | None = None,
 ) -> Changes:
     """Write the C package of a model into a folder. Returns the names of the files that psdmc wrote or removed.
@@ -185,6 +186,8 @@ def emit_c(
     friction   for a model that was calibrated from logs. True: add the function that computes friction torques.
                "in-dynamics": inverse dynamics, forward dynamics and all functions made from them contain friction
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
+    estimator  "mass" or "inertia": add functions that estimate a load at the tip while the robot moves. "mass" finds
+               mass and centre of mass, "inertia" also the inertia
     smoothing_speed  rad/s (m/s for sliding joints), the speed near which the sign of the motion changes smoothly in
                friction in the dynamics; None: that of the calibration, usually 0.03 rad/s
 
@@ -197,6 +200,7 @@ def emit_c(
     """
     own: dict[str, Any] = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     own["smoothing-speed"] = smoothing_speed
+    own["estimator"] = estimator
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
 
 
@@ -304,8 +308,8 @@ def _files(
         )
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    speed = own.get("smoothing-speed")
-    return language.files(_emission(model, lowering, functions, options, name, progress, *facts, speed))
+    further = (own.get("estimator"), own.get("smoothing-speed"))
+    return language.files(_emission(model, lowering, functions, options, name, progress, *facts, *further))
 
 
 @overload
@@ -368,7 +372,7 @@ def compile(
 
     model      a model, or the path of a model file
     functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
-               at once, and each other function at its first call
+               now, and each other function when you first call it
     friction   True: inverse dynamics, forward dynamics and all functions made from them contain the friction of a model
                that was calibrated from logs
 
@@ -442,7 +446,7 @@ class _Request:
 
         def make() -> PackageView:
             given = (self.opened(), self.lowering, self.functions, options, None, progress)
-            package = _package(*given, False, (), self.friction, False, self.smoothing_speed)
+            package = _package(*given, False, (), self.friction, False, None, self.smoothing_speed)
             progress("compiling")
             return package
 
@@ -499,6 +503,7 @@ def _emission(
     adapters: Sequence[str] = (),
     friction: bool | Literal["in-dynamics"] = False,
     bodies: bool = False,
+    estimator: str | None = None,
     smoothing_speed: float | None = None,
 ) -> Emission:
     names = _functions_of(model, functions, adapters)
@@ -511,6 +516,9 @@ def _emission(
         lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
     )
     shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    if estimator:
+        shown["estimator"] = estimator
+    momenta = None if estimator is None else lower_estimator(model, estimator, costs)
     if law is not None:
         shown |= {"friction": "in-dynamics", "smoothing-speed": repr(law.friction.sign_speed)}
     own = None if law is None else law.friction
@@ -518,7 +526,7 @@ def _emission(
     references = reference_states(model, names, friction=law)
     if payload:
         references = replace(references, load=reference_load(model))
-    return Emission(info, kernels, options, references, tuple(adapters))
+    return Emission(info, kernels, options, references, tuple(adapters), momenta)
 
 
 def _friction_in_dynamics(

@@ -67,7 +67,7 @@ def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
         "lowering": options.get("lowering"),
         "real": options.get("real"),
         "target": options.get("target", NATIVE.name),
-        **({"trig": options["trig"]} if "trig" in options else {}),
+        **{key: options[key] for key in ("trig", "estimator") if key in options},
     }
     wrong = [key for key, value in texts.items() if not isinstance(value, str)]
     wrong += [] if texts["backend"] in BACK_ENDS else ["back end"]

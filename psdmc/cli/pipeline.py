@@ -14,8 +14,7 @@ import typer
 from typer.core import TyperCommand
 
 from psdmc.cli.lists import assignments, names, numbers
-from psdmc.cli.next_step import quoted, say_next, say_next_line
-from psdmc.cli.output import check_output
+from psdmc.cli.output import check_output, quoted, say_next, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 from psdmc.robot.load_options import DEFAULT_SNAP
@@ -340,6 +339,14 @@ def emit(
             help="rad/s (m/s), with --friction=in-dynamics: the sign of a speed v is tanh(v / V); default: as calibrated",
         ),
     ] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="also write R_estimate_step, which estimates a load; mass: its mass and centre, inertia: all of it",
+            autocompletion=lambda: ["mass", "inertia"],
+        ),
+    ] = None,
     adapters: Annotated[
         list[str] | None,
         typer.Option(
@@ -371,7 +378,7 @@ def emit(
     from psdmc.backends.c.adapters import remarks
     from psdmc.backends.protocol import back_end
     from psdmc.backends.write import require_own_folder
-    from psdmc.cli.next_step import one_line
+    from psdmc.cli.output import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
@@ -397,6 +404,7 @@ def emit(
             target,
             **{"payload": payload, "with": names(adapters), "friction": friction or False, "bodies": bodies},
             **{"smoothing-speed": smoothing_speed},
+            estimator=estimator,
         )
     written = len(changed) - len(changed.removed)
     print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")
@@ -428,7 +436,7 @@ def emit(
 def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
     """Say in which files a package differs from what the options that it records give; exit status 5 if it does."""
     from psdmc import compiler
-    from psdmc.cli.next_step import one_line
+    from psdmc.cli.output import one_line
 
     typed = {key for key in context.params if str(context.get_parameter_source(key)).endswith("COMMANDLINE")}
     given = {key: context.params[key] for key in sorted(typed - {"model", "output", "check"})}

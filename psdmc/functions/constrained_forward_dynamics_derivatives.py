@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -40,13 +39,9 @@ from psdmc.recipes.contact_derivatives import (
 )
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, copied
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torque_derivatives
-from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.robot.mechanism import NamedFrame
 
 WITHOUT = constrained_forward_dynamics.RECIPE
 FREE = forward_dynamics_derivatives.RECIPE.signature
@@ -189,7 +184,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     return Regions(counts.arrays | arrays, body, MINUS)
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = WITHOUT.reference(robot, given)
     kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
     q, qd = given["q"], given["qd"]
@@ -203,7 +198,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return found | dict(zip(NAMES, (*motions, *forces), strict=True))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = WITHOUT.pinocchio(robot, given)
     kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
     q, qd, qdd = given["q"], given["qd"], found["qdd"]

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.manifold import coordinate_rates, restored
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 MASS_MATRICES = MASS_MATRIX.in_blocks(
     "4",
@@ -68,7 +64,7 @@ def _total(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
     return [(a + d) + 2.0 * (b + c) for a, b, c, d in zip(*slopes, strict=True)]
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     def rates(q: Array, qd: Array) -> tuple[Array, Array]:
         moved = coordinate_rates(robot.frames, list(q.T), list(qd.T))
         return columns(moved, len(q)), robot.accelerations(q, qd, given["tau"])
@@ -76,7 +72,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return _on_arrays(given, rates, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     def rates(q: Array, qd: Array) -> tuple[Array, Array]:
         return robot.coordinate_rates(q, qd), robot.forward_dynamics(q, qd, given["tau"])
 
@@ -84,7 +80,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 def _on_arrays(
-    given: Mapping[str, Array],
+    given: Given,
     rates: Callable[[Array, Array], tuple[Array, Array]],
     unit: Callable[[Array], Array],
 ) -> Arrays:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
@@ -14,8 +13,7 @@ from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.regions import Call, Column, For, Reader, Region, Regions, Slice, straight
 from psdmc.program.signature import Signature
 from psdmc.recipes.loops import Block, added, copied, one_more
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import (
     DT,
     A,
@@ -27,9 +25,6 @@ from psdmc.recipes.steps import (
     stepped,
 )
 from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STEP = semi_implicit_euler.RECIPE
 ACCELERATIONS = forward_dynamics_derivatives.RECIPE
@@ -124,19 +119,19 @@ def _turned(i: int, n: int, first: int, matrix: str, width: int, nv: int) -> For
     return For(width, columns, (straight(turned),))
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = STEP.reference(robot, given)
     slopes = slopes_on_arrays(robot.frames, step_on_arrays(given) * found["qd_next"])
     return found | _jacobians(ACCELERATIONS.reference(robot, given), given, slopes)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = STEP.pinocchio(robot, given)
     slopes = robot.integrated_slopes(given["q"], step_on_arrays(given) * found["qd_next"])
     return found | _jacobians(ACCELERATIONS.pinocchio(robot, given), given, slopes)
 
 
-def _jacobians(found: Arrays, given: Mapping[str, Array], slopes: tuple[Array, Array]) -> Arrays:
+def _jacobians(found: Arrays, given: Given, slopes: tuple[Array, Array]) -> Arrays:
     by_q, by_qd, by_tau = (found[name] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))
     by_state, by_torque = semi_implicit_on_arrays(by_q, by_qd, by_tau, step_on_arrays(given), slopes)
     return {"A": by_state, "B": by_torque}

@@ -34,6 +34,7 @@ from psdmc.program.program import Program
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import kernel_by_rows
 from psdmc.progress import Step
+from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.recipes.torques import with_friction
 from psdmc.robot.derivable import require_derivable
@@ -99,6 +100,31 @@ def lower(
             kernel = kernel_by_rows(kernel) if is_by_rows else kernel
             kernels[kernel.name] = kernel
     return kernels
+
+
+def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Kernel:
+    """Return the kernel (operations) of the momenta that a load estimator calls, with the model's theta_b compiled in.
+
+    kind  "mass" or "inertia": which parameters of a load the estimator finds
+
+    Raises InputError for another kind, for unknown base parameters, and for joints of several coordinates.
+    """
+    robot = model.mechanism
+    if kind not in LOADS:
+        raise InputError(f"estimator {kind!r} is not known", f"choose one of {', '.join(LOADS)}")
+    if model.theta_b is None:
+        raise InputError(
+            f"{robot.name}: no estimator: the base parameters are unknown", "calibrate the model first"
+        )
+    if robot.nq > robot.nv or not all(kind.about_z for kind in robot.types):
+        raise InputError(
+            f"{robot.name}: no estimator: a joint of the robot has several coordinates",
+            "derive the model without --floating, or lock the joint with --lock",
+        )
+    require_derivable(robot)
+    lowered, recipe = _Lowered(model, "factored", costs, None), load_recipe(kind)
+    lowered.check(recipe)
+    return lowered.kernel(recipe, False)
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:

@@ -298,8 +298,8 @@ TAU = Quantity(
 """Those of q, qd and qdd if states are drawn."""
 
 OF_Q = (
-    "q[j]. If the robot has a ball joint or a floating base, q[j] here stands for entry x[j] of a small displacement x, "
-    "which moves q to integrate(q, x)"
+    "q[j]. If the robot has a ball joint or a floating base, q is replaced by integrate(q, x), and the derivative is by "
+    "x[j] at x = 0"
 )
 """What an entry of a derivative by q belongs to."""
 

@@ -17,17 +17,22 @@ from psdmc.dynamics.structure import Places
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.program.regions import Regions
 from psdmc.program.signature import Signature
+from psdmc.recipes.on_arrays import RobotOnArrays as RobotOnArrays
 from psdmc.robot.mechanism import Array, Mechanism, NamedFrame, Placement
 
 if TYPE_CHECKING:
-    from psdmc.recipes.on_arrays import RobotOnArrays
-    from psdmc.robot.reference import Reference
+    from psdmc.robot.reference import Reference as Reference
+else:
+    Reference = object  # for annotations alone: its module imports Pinocchio, which takes half a second
 
 Outputs = Mapping[str, Any]
 """A scalar, or nested sequences of them, for each quantity of a signature that is stored, in the signature's order."""
 
 Arrays = dict[str, Array]
 """Quantity's name -> (k, ...) values at k states, trailing axes as in the signature."""
+
+Given = Mapping[str, Array]
+"""The inputs at k states, as Arrays has the outputs."""
 
 
 class ByTheta(NamedTuple):
@@ -176,9 +181,9 @@ class Recipe:
     signature: Signature
     title: str
     trace: Callable[[Ingredients], Outputs]
-    reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays]
+    reference: Callable[[RobotOnArrays, Given], Arrays]
     against: str
-    pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays]
+    pinocchio: Callable[[Reference, Given], Arrays]
     starts: str | None = None
     shares: str | None = None
     matters: tuple[str, ...] = Choices.__slots__
@@ -197,7 +202,7 @@ class Recipe:
     straight: int = 8
 
     def __post_init__(self) -> None:
-        if self.needs is None and self.signature.factorises:
+        if self.needs is None and any("nv" in matrix.axes for matrix in self.signature.factorises):
             object.__setattr__(self, "needs", Needs.POSITIVE_MASS)
 
     @property

@@ -35,8 +35,12 @@ FUNCTIONS = (
     "impulse_vjp",
     "impulse_jvp",
     "contact_jacobian",
+    "contact_jacobian_local",
     "contact_drift",
+    "contact_drift_local",
     "delassus",
+    "contact_space_inertia",
+    "contact_inverse_dynamics",
 )
 
 SHAPES = ("a trunk with two arms", "four legs on a body", "a wrist with two fingers")
