@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from psdmc.cli.lists import assignments, names, numbers
 from psdmc.cli.output import check_output, quoted, say_next, say_next_line
@@ -250,6 +251,21 @@ def check(
     say_what_a_model_is_for(model, found)
 
 
+class EmitCommand(TyperCommand):
+    """A command whose option --friction has a value or none: `--friction MODEL` is no value MODEL."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line."""
+        return super().parse_args(ctx, [f"{word}=" if word == "--friction" else word for word in args])
+
+
+def _chosen_friction(value: str | None) -> Any:
+    """What the compiler takes: True for --friction alone, else its word."""
+    if value not in (None, "", "in-dynamics"):
+        raise InputError(f"--friction={value}", "type --friction or --friction=in-dynamics")
+    return True if value == "" else value
+
+
 def emit(
     context: typer.Context,
     model: ModelFile,
@@ -307,9 +323,22 @@ def emit(
         typer.Option("--bodies", help="also write R_theta_from_bodies: theta_b from masses and inertias"),
     ] = False,
     friction: Annotated[
-        bool,
-        typer.Option("--friction", help="also write R_friction, for a model calibrated from logs"),
-    ] = False,
+        str | None,
+        typer.Option(
+            "--friction",
+            metavar="[=in-dynamics]",
+            help="also write R_friction, for a model calibrated from logs; =in-dynamics: instead, torques contain friction",
+            callback=_chosen_friction,
+            show_default=False,
+        ),
+    ] = None,
+    smoothing_speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="V",
+            help="rad/s (m/s), with --friction=in-dynamics: the sign of a speed v is tanh(v / V); default: as calibrated",
+        ),
+    ] = None,
     estimator: Annotated[
         str | None,
         typer.Option(
@@ -373,7 +402,8 @@ def emit(
             progress,
             trig,  # type: ignore[arg-type]
             target,
-            **{"payload": payload, "with": names(adapters), "friction": friction, "bodies": bodies},
+            **{"payload": payload, "with": names(adapters), "friction": friction or False, "bodies": bodies},
+            **{"smoothing-speed": smoothing_speed},
             estimator=estimator,
         )
     written = len(changed) - len(changed.removed)
@@ -415,6 +445,8 @@ def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
         raise InputError(
             "--check writes nothing, and --force is about what is overwritten", "leave out --force"
         )
+    if "smoothing_speed" in given:
+        given["smoothing-speed"] = given.pop("smoothing_speed")
     lists = {"adapters": "with", "functions": "functions"}
     given |= {word: names(given.pop(key)) for key, word in lists.items() if key in given}
     with steps() as progress:

@@ -9,10 +9,8 @@ import numpy as np
 from psdmc.dynamics.arrow import any_limbs
 from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
 from psdmc.dynamics.contacts import contact_jacobian as contact_jacobian_of
-from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
-from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product, inverse
 from psdmc.functions import (
     constrained_forward_dynamics,
@@ -42,6 +40,7 @@ from psdmc.recipes.contact_derivatives import (
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, copied
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import torque_derivatives
 from psdmc.robot.mechanism import NamedFrame
 
 WITHOUT = constrained_forward_dynamics.RECIPE
@@ -58,7 +57,7 @@ def trace(g: Ingredients) -> Outputs:
     found, signs, factors, jacobian = constrained_forward_dynamics.solved(g)
     q, qd = g.inputs["q"], g.inputs["qd"]
     (kp,), (kd,), (mu,) = (g.inputs[each.name] for each in (KP, KD, MU))
-    slopes = _torque_derivatives(g, found.motion)
+    slopes = torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
     by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
@@ -89,7 +88,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     of the limbs."""
     q, qd, nv = g.inputs["q"], g.inputs["qd"], len(g.still)
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
-    at_rest = _torque_derivatives(g, g.still)
+    at_rest = torque_derivatives(g, g.still)
     rows = contact_jacobian_of(g.frames, g.named, q, g.root)
     mask, arrow, margins, wanted = constrained_forward_dynamics.of_limbs(g, at_rest.by_qdd, rows, None)
     on, count = mask.rows[0], len(rows)
@@ -97,7 +96,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     by_qd = [*([*row, *[0.0] * count] for row in at_rest.by_qd), *([0.0] * (nv + count) for _ in rows)]
     found = arrow.solved([*load, *wanted], by_qd, [*(0.5 * rate for rate in qd), *[0.0] * count])
     motion, forces = found[:nv], [-value for value in found[nv:]]
-    moving = _torque_derivatives(g, motion)
+    moving = torque_derivatives(g, motion)
     turn = pushed_slopes_of_limbs(g.frames, g.named, q, forces, g.root)
     damped = [x + kd * rate for x, rate in zip(motion, qd, strict=True)]
     slopes = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
@@ -119,13 +118,6 @@ def _in_limbs(g: Ingredients) -> Outputs:
         **thin_outputs(arrow, nv, found_by, "qdd", "forces"),
         PIVOTS: [*arrow.pivots[:nv], *mask.signs(margins)],
     }
-
-
-def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
-    q, qd = g.inputs["q"], g.inputs["qd"]
-    return inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
-    )
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:

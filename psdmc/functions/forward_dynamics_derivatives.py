@@ -15,6 +15,7 @@ from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_o
 from psdmc.program.thin_products import Thin
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import less_friction, with_friction_slopes
 from psdmc.reproducible import inverse as inverted
 from psdmc.reproducible import times
 
@@ -40,9 +41,10 @@ def traced(
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
     bias = [0.5 * inner_product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
-    load = [tau - h for tau, h in zip(torques, bias, strict=True)]
+    load = [tau - h for tau, h in zip(less_friction(g, torques), bias, strict=True)]
     accelerations = solve(factors, load)
-    moving = _torque_derivatives(g, accelerations, external)
+    at_rest = with_friction_slopes(g, at_rest)
+    moving = with_friction_slopes(g, _torque_derivatives(g, accelerations, external))
     by_tau = inverse(factors)
     return {
         "dtau_dqd": list(zip(*at_rest.by_qd, strict=True)),

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.program.signature import QD, QDD, Q, Signature, jacobian_of
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import torque_derivatives
 
 
 def trace(g: Ingredients) -> Outputs:
-    found = inverse_dynamics_derivatives(
-        g.frames,
-        g.bodies,
-        g.drives,
-        g.inputs["q"],
-        g.inputs["qd"],
-        g.inputs["qdd"],
-        g.base_acceleration,
-        g.choices,
-    )
+    found = torque_derivatives(g, g.inputs["qdd"])
     return {"dtau_dq": found.by_q, "dtau_dqd": found.by_qd, "dtau_dqdd": found.by_qdd}
 
 

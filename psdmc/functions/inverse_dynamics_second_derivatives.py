@@ -6,6 +6,7 @@ from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivative
 from psdmc.program.signature import QD, QDD, Q, Signature
 from psdmc.recipes.directions import COTANGENT, hessian_of, weighted
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import on_diagonal
 from psdmc.robot.mechanism import Array
 
 
@@ -14,6 +15,13 @@ def trace(g: Ingredients) -> Outputs:
     found = inverse_dynamics_second_derivatives(
         g.frames, g.bodies, q, qd, qdd, weights, g.base_acceleration, g.choices
     )
+    if g.friction is not None:
+        bends = ([w * x for w, x in zip(weights, each, strict=True)] for each in g.friction.bends(q, qd))
+        found = found._replace(
+            by_q_q=on_diagonal(found.by_q_q, next(bends)),
+            by_q_qd=on_diagonal(found.by_q_qd, next(bends)),
+            by_qd_qd=on_diagonal(found.by_qd_qd, next(bends)),
+        )
     return {"hessian": found.hessian}
 
 

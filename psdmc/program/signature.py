@@ -203,6 +203,13 @@ class Signature:
             raise ValueError(f"{self.name}: a function has outputs")
 
     @property
+    def has_motor_torques(self) -> bool:
+        """Return whether the function depends on motor torques at rates qd, or on the motion from which they follow. Then
+        joint friction can be a part of the function."""
+        names = {quantity.name for quantity in self.inputs}
+        return self.theta and QD.name in names and bool({TAU.name, QDD.name} & names)
+
+    @property
     def stored(self) -> tuple[Quantity, ...]:
         """Return all quantities that the function's PROGRAMs (lists of operations to generate) store: outputs, then
         pivots."""

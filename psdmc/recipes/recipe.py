@@ -14,6 +14,7 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.structure import Places
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.program.regions import Regions
 from psdmc.program.signature import Signature
 from psdmc.recipes.on_arrays import RobotOnArrays as RobotOnArrays
@@ -72,6 +73,7 @@ class Ingredients:
     by_theta           returns theta_b as symbols, for derivatives by theta_b. The function can be called even if the
                        code contains fixed values of theta_b: torques are linear in theta_b, so derivatives do not
                        depend on the values
+    friction           joint friction, which the torques of motors contain; None: they have none
     """
 
     frames: tuple[Frame, ...]
@@ -90,6 +92,7 @@ class Ingredients:
     si: Callable[[float, str], Scalar]
     inputs: Mapping[str, list[Any]]
     by_theta: Callable[[], ByTheta]
+    friction: FrictionInDynamics | None = None
 
     @property
     def root(self) -> tuple[Matrix, Vector]:

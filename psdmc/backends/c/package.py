@@ -319,12 +319,12 @@ def package_view(
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
     check_range(info, kernels, c_real(options))
-    _check_calls(info, kernels, options)
-    if info.friction and options.trig == "freestanding":
+    if (info.friction or info.in_dynamics) and options.trig == "freestanding":
         raise InputError(
             f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
             "emit it with --trig inline, or leave --friction out",
         )
+    _check_calls(info, kernels, options)
     robot = identifier(info.name)
     functions = function_views(kernels, info.sizes, robot, options, info.base_frame)
     package = PackageView(robot, info, options, functions, None, tuple(adapters))
