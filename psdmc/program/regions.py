@@ -130,6 +130,36 @@ def _read_by(region: Straight | Call) -> list[str]:
     return [name for name, _ in region.given]
 
 
+def read_late(body: Regions, inputs: Sequence[str], outputs: Sequence[str], theta: str) -> tuple[str, ...]:
+    """Return the inputs that the function body reads after it has written an output. If the caller's arrays overlap, these
+    inputs must be copied first.
+
+    theta  name of the base parameters, which calls read; empty if they are no input
+    """
+    written, late = False, set[str]()
+    for region in body.regions:
+        read, found = set[str](), set[str]()
+        _collect_read((region,), {}, read)
+        _collect_written((region,), {}, found)
+        is_loop = isinstance(region, For)
+        if written or (is_loop and found.intersection(outputs)):
+            late |= read | ({theta} if _called((region,)) else set())
+        written = written or bool(found.intersection(outputs))
+    return tuple(name for name in inputs if name in late)
+
+
+def _collect_written(regions: Sequence[Region], roots: Mapping[str, str], written: set[str]) -> None:
+    """Adds the arrays that regions write; `roots` are those that slices are parts of."""
+    for region in regions:
+        if isinstance(region, For):
+            inner = {each.name: roots.get(each.array, each.array) for each in region.slices}
+            _collect_written(region.regions, {**roots, **inner}, written)
+        elif isinstance(region, Call):
+            written.update(roots.get(name, name) for name, _ in region.found)
+        else:
+            written.update(roots.get(slot.vector, slot.vector) for slot, _ in region.program.outputs)
+
+
 def _called(regions: Sequence[Region]) -> set[str]:
     """Arrays that calls write."""
     found: set[str] = set()

@@ -11,7 +11,18 @@ from region_functions import MATRICES, doubled, multiplied
 from psdmc.errors import InternalError
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Slot
-from psdmc.program.regions import Call, Column, For, Regions, Slice, Straight, drop_unread, run, straight
+from psdmc.program.regions import (
+    Call,
+    Column,
+    For,
+    Regions,
+    Slice,
+    Straight,
+    drop_unread,
+    read_late,
+    run,
+    straight,
+)
 from psdmc.program.text import parse, show
 from psdmc.program.trace import Tracer
 
@@ -93,3 +104,18 @@ def test_dropping_keeps_outputs(rows: int, columns: int) -> None:
     given = {name: list(np.random.default_rng(3).normal(size=size)) for name in ("a", "b")}
     outputs = {"c": rows * rows}
     assert run(drop_unread(more), given, outputs, doubled) == run(body, given, outputs, doubled)
+
+
+def test_inputs_that_are_read_after_an_output_was_written() -> None:
+    """A call writes the output y; then a loop reads a through a slice, and a second call reads c and the parameters."""
+    first = Call("f", (("a", 0), ("b", 0)), (("y", 0),))
+    loop = For(2, (Slice("part", "a"),), (Straight(parse("x = load part[0]\nout work[0] = x")),))
+    second = Call("g", (("c", 0),), (("z", 0),))
+    inputs, outputs = ("a", "b", "c", "theta_b"), ("y", "z")
+    body = Regions({"work": 1}, (first, loop, second))
+    assert read_late(body, inputs, outputs, "theta_b") == ("a", "c", "theta_b")
+    assert read_late(Regions({"work": 1}, (loop, first)), inputs, outputs, "") == ()
+    stores = For(
+        2, (Slice("part", "a"), Slice("end", "y")), (Straight(parse("x = load part[0]\nout end[0] = x")),)
+    )
+    assert read_late(Regions({}, (stores,)), inputs, outputs, "") == ("a",)

@@ -46,7 +46,10 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
     regions = None
     if kernel.regions is not None:
         single_body = lanes_body = Body((), ())
-        regions = regions_view(kernel.regions, kernel.inputs, robot, suffix)
+        lengths = {q.name: sizes.size(q) for q in function.inputs}
+        lengths |= dict.fromkeys(kernel.inputs[len(lengths) :], sizes.l)
+        names = [q.name for q in function.outputs]
+        regions = regions_view(kernel.regions, lengths, names, robot, suffix)
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body

@@ -3,14 +3,14 @@ the template. Loops and calls are C text; straight-line code is a list of statem
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.c_expr import literal
 from psdmc.backends.c.lines import Body
 from psdmc.program.operations import Op
-from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight
+from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight, read_late
 from psdmc.program.theta_rows import THETAS
 
 
@@ -27,10 +27,15 @@ class Piece:
 @dataclass(frozen=True, slots=True)
 class RegionsView:
     """The body of a C function that contains loops or calls. First come declarations of the internal arrays and
-    constants, then the parts of the code in their order."""
+    constants, then the parts of the code in their order.
+
+    kept  names and lengths of inputs that are copied first. The code reads them after it has written an output, and the
+          caller's arrays may overlap
+    """
 
     declarations: tuple[str, ...]
     pieces: tuple[Piece, ...]
+    kept: tuple[tuple[str, int], ...]
 
     @property
     def calls(self) -> frozenset[Op]:
@@ -38,9 +43,11 @@ class RegionsView:
         return frozenset(op for piece in self.pieces if piece.body for op in piece.body.calls)
 
 
-def regions_view(body: Regions, inputs: Sequence[str], robot: str, suffix: str) -> RegionsView:
+def regions_view(
+    body: Regions, inputs: Mapping[str, int], outputs: Sequence[str], robot: str, suffix: str
+) -> RegionsView:
     """Return the C code of a function that consists of regions (straight-line code, loops, and calls of other
-    functions). `inputs` are the names of the function's inputs.
+    functions). `inputs` are the lengths of the function's inputs by name, `outputs` the names of its outputs.
 
     robot   prefix of the names of the called functions
     suffix  of C constants: '' for double, 'f' for float
@@ -52,7 +59,8 @@ def regions_view(body: Regions, inputs: Sequence[str], robot: str, suffix: str) 
     arrays = tuple(f"real {name}[{size}]" for name, size in body.arrays.items())
     theta = next((name for name in inputs if name in ("theta_b", THETAS.name)), "")
     writer = _Writer(robot, theta, suffix, {*inputs, *body.constants})
-    return RegionsView((*constants, *arrays), tuple(writer.pieces(body.regions, 1)))
+    kept = tuple((name, inputs[name]) for name in read_late(body, tuple(inputs), outputs, theta))
+    return RegionsView((*constants, *arrays), tuple(writer.pieces(body.regions, 1)), kept)
 
 
 @dataclass(frozen=True, slots=True)
