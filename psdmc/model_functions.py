@@ -159,13 +159,25 @@ def _axes(model: DynamicsModel, recipe: Recipe) -> RobotAxes:
     kept = len(recipe.packs.places(robot, model.representative)) if recipe.packs else 0
     frames = tuple(frame.name for frame in robot.frames)
     return RobotAxes(
-        Sizes(len(own), robot.nq, robot.nv, model.l, len(frames), kept, robot.rows_of_contacts),
+        Sizes(
+            len(own),
+            robot.nq,
+            robot.nv,
+            model.l,
+            len(frames),
+            kept,
+            robot.rows_of_contacts,
+            robot.rows_of_loops,
+        ),
         {
             "n": tuple(robot.joints[i].name for i in own),
             "nq": robot.q_names,
             "nv": robot.v_names,
             "frames": frames,
-            **contact_names((frame.name, frame.rows) for frame in robot.contacts),
+            **contact_names(
+                ((frame.name, frame.rows) for frame in robot.contacts),
+                ((loop.name, loop.rows) for loop in robot.loops),
+            ),
         },
         units_of(robot.joints[i].type for i in own),
     )
