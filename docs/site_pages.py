@@ -62,6 +62,7 @@ MENU = {
         "how-to/pytorch",
         "how-to/adapters",
         "how-to/contacts",
+        "how-to/loops",
         "how-to/whole-body",
         "how-to/reproducible-builds",
     ),

@@ -5,6 +5,7 @@ A robot file describes a tree. A loop closes it between two frames of the tree, 
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,15 +15,31 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.dh import LENGTH, CheckedTable, angle, as_it_is, plain_text, triple_of
+from psdmc.robot.dh import (
+    LENGTH,
+    CheckedTable,
+    angle,
+    any_list,
+    as_it_is,
+    finite,
+    plain_text,
+    triple_of,
+)
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, ROW_NAMES, Loop, NamedFrame, Placement
 from psdmc.robot.names import naming_faults
-from psdmc.robot.rotation import roll_pitch_yaw
+from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
+from psdmc.robot.snap import snap_rotation
 
 FORMAT = "see the format of loops in docs/how-to/loops.md"
 LOOP_KEYS = ("name", "rows", "first", "second")
-FRAME_KEYS = ("link", "xyz", "rpy")
+FRAME_KEYS = ("link", "xyz", "rpy", "quaternion")
+
+UNTURNED = (0.0, 0.0, 0.0, 1.0)
+"""x, y, z and w of a quaternion."""
+
+UNIT = 1e-6
+"""Accepted error of its length."""
 
 CLOSED = {3: (0, 1, 2), 6: (0, 1, 2, 3, 4, 5)}
 """Rows by the number that stands for them: a point, and all motion."""
@@ -96,6 +113,29 @@ def _rows(value: object) -> tuple[int, ...]:
     return tuple(sorted(ROW_NAMES.index(row) for row in value))
 
 
+def _unit(value: object) -> tuple[float, ...]:
+    """x, y, z and w of a rotation, made of length one."""
+    numbers = [finite(each) for each in any_list(value)]
+    size = math.hypot(*numbers)
+    if len(numbers) != len(UNTURNED) or abs(size - 1.0) > UNIT:
+        raise ValueError(f"found {shown(value)}, expected x, y, z and w of length one")
+    return tuple(each / size for each in numbers)
+
+
+def merged_loops(found: Tables, given: Tables) -> tuple[Mapping[str, Any], ...]:
+    """Return the tables of a file, with the keys that given tables of the same name replace, then the other given
+    tables."""
+    own = {table["name"]: dict(table) for table in found}
+    others = []
+    for table in given:
+        known = own.get(str(table.get("name")))
+        if known is None:
+            others.append(table)
+        else:
+            known.update(table)
+    return (*own.values(), *others)
+
+
 def _frame(
     value: object,
     where: str,
@@ -106,10 +146,12 @@ def _frame(
 ) -> NamedFrame:
     table = CheckedTable({"link": value} if isinstance(value, str) else value, where, FRAME_KEYS, problems)
     link = table.read("link", plain_text, "")
-    place = Placement(
-        roll_pitch_yaw(table.read("rpy", triple_of(angle), (0.0, 0.0, 0.0)), snap),
-        np.array(table.read("xyz", triple_of(LENGTH), (0.0, 0.0, 0.0))),
-    )
+    turn = roll_pitch_yaw(table.read("rpy", triple_of(angle), (0.0, 0.0, 0.0)), snap)
+    if "quaternion" in table.table:
+        turn = snap_rotation(from_quaternion(*table.read("quaternion", _unit, UNTURNED)), snap)[0]
+    if {"rpy", "quaternion"} <= table.table.keys():
+        problems.append(f"{where}: rpy and quaternion are both given")
+    place = Placement(turn, np.array(table.read("xyz", triple_of(LENGTH), (0.0, 0.0, 0.0))))
     if not link:
         problems += [] if "link" in table.table or not table.table else [f"{where}: link is missing"]
         return NamedFrame(name, BASE, place, 0)

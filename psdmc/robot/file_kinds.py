@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from psdmc.errors import InputError
+from psdmc.robot.closed_loops import merged_loops
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.xml_text import root_tag
 
@@ -27,8 +28,8 @@ SourceFormat = Literal["urdf", "dh"]
 def as_source(
     file: Path, text: str, options: LoadOptions, packages: Mapping[str, Path]
 ) -> tuple[str, SourceFormat, LoadOptions]:
-    """Return the text of the robot to read, the format of the text, and the options. An MJCF file adds gravity and a
-    floating base to the options.
+    """Return the text of the robot to read, the format of the text, and the options. An MJCF file adds gravity, a
+    floating base and closed loops to the options.
 
     packages   folders of ROS packages that a xacro file uses, by name
 
@@ -78,4 +79,6 @@ def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, Loa
             "leave --base and --tip out; --lock holds joints",
         )
     gravity = found.gravity if options.gravity is None else options.gravity
-    return found.text, "urdf", replace(options, gravity=gravity, floating=options.floating or found.is_free)
+    floating = options.floating or found.is_free
+    loops = merged_loops(found.loops, options.loops)
+    return found.text, "urdf", replace(options, gravity=gravity, floating=floating, loops=loops)

@@ -90,10 +90,10 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
 def _add_loop_frame(model: pinocchio.Model, name: str, given: Any, base_name: str) -> None:
     """Add a frame of a loop, given by a link and by a placement in it, as a table [[loop]] has it."""
     table = {"link": given} if isinstance(given, str) else given
-    angles = [_radians(each) for each in table.get("rpy", (0.0, 0.0, 0.0))]
-    place = pinocchio.SE3(
-        pinocchio.rpy.rpyToMatrix(*angles), np.array(table.get("xyz", (0.0, 0.0, 0.0)), float)
-    )
+    turn = pinocchio.rpy.rpyToMatrix(*(_radians(each) for each in table.get("rpy", (0.0, 0.0, 0.0))))
+    if "quaternion" in table:
+        turn = pinocchio.Quaternion(np.array(table["quaternion"], float)).normalized().toRotationMatrix()
+    place = pinocchio.SE3(turn, np.array(table.get("xyz", (0.0, 0.0, 0.0)), float))
     number = model.getFrameId(table["link"]) if model.existFrame(table["link"]) else 0
     above, kind = model.frames[number], pinocchio.FrameType.OP_FRAME
     if above.parentJoint == 0 and model.existFrame(base_name):
