@@ -44,8 +44,6 @@ DECISIONS = {
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
     "derivation/closed_loops.py": "a refusal",
-    "functions/loop_drift.py": "Pinocchio's side of a comparison",
-    "functions/loop_jacobian.py": "Pinocchio's side of a comparison",
     "recipes/contacts.py": "Pinocchio's side of a comparison",
     "functions/delassus.py": "Pinocchio's side of a comparison",
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",

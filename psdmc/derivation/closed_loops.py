@@ -6,6 +6,9 @@ if its row of the Jacobian depends on the other rows in all of these configurati
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,9 +16,9 @@ from psdmc.derivation.units import length_unit
 from psdmc.dynamics.closed_loops import loop_error, loop_jacobian
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.manifold import integrated, restored
+from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InputError
 from psdmc.model.random_states import states_of
-from psdmc.recipes.on_arrays import columns, matrix
 from psdmc.robot.mechanism import ROW_NAMES, Loop, Mechanism
 
 Array = NDArray[np.float64]
@@ -70,7 +73,7 @@ def _assembled(robot: Mechanism, scales: Array) -> tuple[Array, Array]:
     q, _, _ = states_of(robot, np.random.default_rng(SEED), STARTS)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
-            errors = columns(loop_error(frames, robot.loops, list(q.T)), STARTS) * scales
+            errors = _errors(robot, q) * scales
             rows = _jacobian(robot, q) * scales[:, None]
             wide = rows @ np.swapaxes(rows, 1, 2)
             largest = np.max(np.abs(wide), axis=(1, 2), initial=1e-300)
@@ -82,13 +85,22 @@ def _assembled(robot: Mechanism, scales: Array) -> tuple[Array, Array]:
             step[bad] = 0.0
             largest = np.abs(step).max(axis=1, initial=0.0)
             step *= np.minimum(1.0, LONGEST / np.maximum(largest, 1e-300))[:, None]
-            moved = integrated(frames, list(q.T), list(step.T))
-            q = columns(restored(frames, moved), STARTS)
-        return q, columns(loop_error(frames, robot.loops, list(q.T)), STARTS) * scales
+            q = _rows(restored(frames, integrated(frames, list(q.T), list(step.T))), q)
+        return q, _errors(robot, q) * scales
+
+
+def _rows(values: Sequence[Scalar], q: Array) -> Array:
+    """(states, values) from numbers, and from arrays with a value for each state."""
+    return np.stack([np.broadcast_to(value, len(q)) for value in values], axis=1)
+
+
+def _errors(robot: Mechanism, q: Array) -> Array:
+    return _rows(loop_error(frames_of(robot), robot.loops, list(q.T)), q)
 
 
 def _jacobian(robot: Mechanism, q: Array) -> Array:
-    return matrix(loop_jacobian(frames_of(robot), robot.loops, list(q.T)), len(q))
+    rows = loop_jacobian(frames_of(robot), robot.loops, list(q.T))
+    return np.stack([_rows(row, q) for row in rows], axis=1)
 
 
 def _refuse_redundant(robot: Mechanism, q: Array, scales: Array) -> None:
@@ -128,7 +140,7 @@ def _refuse_one_rotation(robot: Mechanism, loop: Loop, q: Array) -> None:
     if len(closed) != 1:
         return
     whole = Loop(loop.name, loop.first, loop.second, tuple(range(6)))
-    turns = matrix(loop_jacobian(frames_of(robot), (whole,), list(q.T)), len(q))[:, 3:]
+    turns = _jacobian(replace(robot, loops=(whole,)), q)[:, 3:]
     others = np.delete(turns, closed[0] - 3, axis=1)
     if np.abs(others).max() > DEPENDENT * np.abs(turns).max():
         raise InputError(

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Literal
 
 from psdmc.errors import InputError
-from psdmc.robot.closed_loops import merged_loops
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.xml_text import root_tag
 
@@ -70,6 +69,7 @@ def as_source(
 
 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:
+    from psdmc.robot.closed_loops import merged_loops
     from psdmc.robot.mjcf import read_mjcf
 
     found = read_mjcf(file, file.name, options.root)
