@@ -119,21 +119,22 @@ class Arrow:
                 found[k] = own[k]
         return found
 
-    def thin(self, matrix: Matrix) -> list[list[Scalar]]:
+    def thin(self, matrix: Matrix, owners: Sequence[int] | None = None) -> list[list[Scalar]]:
         """Return two factors of -M^-1 D in one matrix: E in the rows of the core, and Y in those of limbs (such as
         legs).
 
         For a column of E and Y, -M^-1 D is x = -V E in rows of the core, and Y - T x in rows of a limb. The module
         defines V and T. Y is zero in columns of other limbs. Entries of D that belong to two different limbs must be
         zero.
+
+        owners  for each column of D, the row of M that belongs to the same joint or contact; None: the row of its number
         """
         columns = [list(column) for column in zip(*matrix, strict=True)]
-        found = columns[:]
-        for k in self.core:
-            found[k] = self._reduced(columns[k])
-        for limb in self.limbs:
-            for k in limb.rates:
-                found[k] = limb.reduced(columns[k])
+        limb_of = {k: limb for limb in self.limbs for k in limb.rates}
+        found = [
+            limb_of[k].reduced(column) if k in limb_of else self._reduced(column)
+            for k, column in zip(owners or range(len(columns)), columns, strict=True)
+        ]
         rows = [list(row) for row in zip(*found, strict=True)]
         return [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
 
@@ -161,13 +162,18 @@ class Arrow:
         return found
 
 
-def eliminated(frames: Sequence[Frame], matrix: Matrix) -> Arrow:
+def eliminated(frames: Sequence[Frame], matrix: Matrix, further: Sequence[Sequence[int]] = ()) -> Arrow:
     """Factorize a symmetric matrix M with one row per joint rate, such as the mass matrix, limb by limb.
 
     A limb is a branch of the robot that equals other branches, such as a leg. Raises SingularMatrix if a pivot is a
     constant that is not positive.
+
+    further  for each group of limbs, indices of rows that M has besides those of joint rates, such as those of contact
+             forces on a limb. They are eliminated after the limb's rates
     """
     core, groups = limbs_of(frames)
+    if further:
+        groups = [((*own, *rates), total) for own, (rates, total) in zip(further, groups, strict=True)]
     rest = {(i, j): matrix[i][j] for i in core for j in core if j <= i}
     pivots: list[Scalar] = [0.0] * len(matrix)
     limbs = [_eliminated(rates, total, core, matrix) for rates, total in groups]

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.dynamics import closed_loops, contacts
+from psdmc.dynamics.arrow import Arrow, any_limbs
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
+from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_drift, contact_jacobian, loop_drift, loop_error, loop_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
@@ -18,6 +21,7 @@ from psdmc.recipes.contacts import (
     CONTACTS,
     MU,
     Held,
+    Rows,
     Solved,
     dense_solution,
     held_on_arrays,
@@ -67,8 +71,48 @@ FORCES = Quantity(
 
 
 def trace(g: Ingredients) -> Outputs:
+    if any_limbs(g.frames):
+        return _in_limbs(g)
     found, signs, factors, _ = solved(g)
     return {"qdd": found.motion, "forces": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def _in_limbs(g: Ingredients) -> Outputs:
+    """Eliminate limb by limb. Signs are negative also where this loses digits."""
+    q, trunk = g.inputs["q"], Trunk(g.frames, g.inputs["q"], g.base_axes)
+    rows = contacts.contact_jacobian(g.frames, g.named, trunk.q, g.root)
+    mass = mass_matrix(g.frames, g.bodies, g.drives, q, g.choices)
+    mask, arrow, margins, wanted = of_limbs(g, mass, rows, trunk)
+    bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
+    load = [given - h for given, h in zip(g.inputs["tau"], bias, strict=True)]
+    found = arrow.solved([*load, *wanted])
+    return {
+        "qdd": found[: len(load)],
+        "forces": trunk.rows_back([-value for value in found[len(load) :]]),
+        PIVOTS: [*arrow.pivots[: len(load)], *mask.signs(margins)],
+    }
+
+
+def of_limbs(
+    g: Ingredients, mass: Rows, rows: Rows, trunk: Trunk | None
+) -> tuple[Held, Arrow, list[Scalar], list[Scalar]]:
+    """Eliminate the mass matrix and the contact Jacobian limb by limb. Return the active contacts, the elimination, a
+    number per row of the Jacobian that is positive if the elimination keeps its digits, and the wanted accelerations.
+
+    trunk  the axes along which the Jacobian is; None: those of the base
+    """
+    qd, error = g.inputs["qd"], g.inputs[ERROR.name]
+    (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
+    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    on, shift, one = mask.rows
+    arrow, margins = eliminated_with_forces(g.frames, mass, rows, on, shift, one)
+    q, errors = (g.inputs["q"], error) if trunk is None else (trunk.q, trunk.rows_along(error))
+    drifts = contacts.contact_drift(g.frames, g.named, q, qd, g.root)
+    wanted = [
+        -each * (own + kd * inner_product(row, qd) + kp * off)
+        for each, own, row, off in zip(on, drifts, rows, errors, strict=True)
+    ]
+    return mask, arrow, margins, wanted
 
 
 def solved(g: Ingredients) -> Solved:
@@ -158,4 +202,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     closes=True,
+    in_limbs=True,
 )

@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics.arrow import any_limbs
 from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.dynamics.contacts import contact_jacobian as contact_jacobian_of
+from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
+from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product, inverse
 from psdmc.functions import (
     constrained_forward_dynamics,
@@ -31,7 +35,10 @@ from psdmc.recipes.contact_derivatives import (
     held_inverse,
     pushed_motion,
     responses,
+    scaled,
     slopes_on_arrays,
+    thin_blocks,
+    thin_outputs,
 )
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, copied
@@ -51,12 +58,12 @@ NAMES = tuple(block.name for block in BLOCKS)
 def trace(g: Ingredients) -> Outputs:
     """Solve for accelerations and forces. The derivatives solve the same equations: the load changes by those of J^T f less
     those of inverse dynamics, the prescribed accelerations by minus those of the contacts' accelerations."""
+    if any_limbs(g.frames):
+        return _in_limbs(g)
     found, signs, factors, jacobian = constrained_forward_dynamics.solved(g)
     q, qd = g.inputs["q"], g.inputs["qd"]
     (kp,), (kd,), (mu,) = (g.inputs[each.name] for each in (KP, KD, MU))
-    slopes = inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, found.motion, g.base_acceleration, g.choices
-    )
+    slopes = _torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
     by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
@@ -80,6 +87,50 @@ def trace(g: Ingredients) -> Outputs:
     )
     blocks = dict(zip(NAMES, (*motions, *forces), strict=True))
     return {"qdd": found.motion, "forces": found.forces, **blocks, PIVOTS: [*factors.pivots, *signs]}
+
+
+def _in_limbs(g: Ingredients) -> Outputs:
+    """The same by thin factors, limb by limb (forward_dynamics_derivatives). Minus the contact forces are further unknowns
+    of the limbs."""
+    q, qd, nv = g.inputs["q"], g.inputs["qd"], len(g.still)
+    (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
+    at_rest = _torque_derivatives(g, g.still)
+    rows = contact_jacobian_of(g.frames, g.named, q, g.root)
+    mask, arrow, margins, wanted = constrained_forward_dynamics.of_limbs(g, at_rest.by_qdd, rows, None)
+    on, count = mask.rows[0], len(rows)
+    load = [tau - own for tau, own in zip(g.inputs["tau"], at_rest.gravity, strict=True)]
+    by_qd = [*([*row, *[0.0] * count] for row in at_rest.by_qd), *([0.0] * (nv + count) for _ in rows)]
+    found = arrow.solved([*load, *wanted], by_qd, [*(0.5 * rate for rate in qd), *[0.0] * count])
+    motion, forces = found[:nv], [-value for value in found[nv:]]
+    moving = _torque_derivatives(g, motion)
+    turn = pushed_slopes_of_limbs(g.frames, g.named, q, forces, g.root)
+    damped = [x + kd * rate for x, rate in zip(motion, qd, strict=True)]
+    slopes = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
+    by_rate = [[x + kd * y for x, y in zip(*pair, strict=True)] for pair in zip(slopes[1], rows, strict=True)]
+    loads = [[x - y for x, y in zip(*pair, strict=True)] for pair in zip(moving.by_q, turn, strict=True)]
+    unit = [[float(i == j) for j in range(nv + count)] for i in range(nv + count)]
+    found_by = {
+        "q": arrow.thin([*loads, *scaled(on, slopes[0])], range(nv)),
+        "qd": arrow.thin([*at_rest.by_qd, *scaled(on, by_rate)], range(nv)),
+        "tau": arrow.thin([[-x for x in row[:nv]] for row in unit], range(nv)),
+        "error": arrow.thin(
+            [row[nv:] for row in scaled([*[1.0] * nv, *(kp * each for each in on)], unit)],
+            range(nv, nv + count),
+        ),
+    }
+    return {
+        "qdd": motion,
+        "forces": forces,
+        **thin_outputs(arrow, nv, found_by, "qdd", "forces"),
+        PIVOTS: [*arrow.pivots[:nv], *mask.signs(margins)],
+    }
+
+
+def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    return inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
+    )
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
@@ -193,6 +244,7 @@ RECIPE = Recipe(
         "qd, tau and error. The derivatives by q hold error constant.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, FREE.name),
+        thin=thin_blocks("qdd", "forces", ("q", "qd", "tau", "error")),
     ),
     "derivatives of constrained forward dynamics",
     trace,
@@ -201,4 +253,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    in_limbs=True,
 )

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psdmc.dynamics import contacts
+from psdmc.dynamics.arrow import Arrow, any_limbs
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
+from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_jacobian
 from psdmc.program.operations import Op
@@ -20,6 +23,7 @@ from psdmc.recipes.contacts import (
     CONTACTS,
     MU,
     Held,
+    Rows,
     Solved,
     dense_solution,
     held_on_arrays,
@@ -60,8 +64,33 @@ TOUCHING = replace(
 
 
 def trace(g: Ingredients) -> Outputs:
+    if any_limbs(g.frames):
+        trunk = Trunk(g.frames, g.inputs["q"], g.base_axes)
+        rows = contacts.contact_jacobian(g.frames, g.named, trunk.q, g.root)
+        mass = mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices)
+        change, impulses, pivots, _ = of_limbs(g, mass, rows)
+        after = [rate + each for rate, each in zip(g.inputs[BEFORE.name], change, strict=True)]
+        return {"qd_after": after, "impulses": trunk.rows_back(impulses), PIVOTS: pivots}
     found, signs, factors, _ = solved_after(g)
     return {"qd_after": found.motion, "impulses": found.forces, PIVOTS: [*factors.pivots, *signs]}
+
+
+def of_limbs(
+    g: Ingredients, mass: Rows, rows: Rows
+) -> tuple[list[Scalar], list[Scalar], list[Scalar], Arrow]:
+    """Return the change of the rates, the impulses, the pivots and signs, and the elimination limb by limb, from the mass
+    matrix and the contact Jacobian."""
+    (mu,), (restitution,) = g.inputs[MU.name], g.inputs[RESTITUTION.name]
+    mask, count = Held(g.named, g.inputs[ACTIVE.name], mu, g.si), len(g.still)
+    on, shift, one = mask.rows
+    arrow, margins = eliminated_with_forces(g.frames, mass, rows, on, shift, one)
+    before = g.inputs[BEFORE.name]
+    wanted = [
+        -each * (1.0 + restitution) * inner_product(row, before) for each, row in zip(on, rows, strict=True)
+    ]
+    found = arrow.solved([*g.still, *wanted])
+    signs = [_within(restitution, sign) for sign in mask.signs(margins)]
+    return found[:count], [-value for value in found[count:]], [*arrow.pivots[:count], *signs], arrow
 
 
 def solved_after(g: Ingredients) -> Solved:
@@ -128,4 +157,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     matters=("fold_double_angle",),
+    in_limbs=True,
 )

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics import contacts
+from psdmc.dynamics.arrow import any_limbs
 from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
 from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.dynamics.solve import inverse
 from psdmc.functions import (
@@ -22,7 +25,7 @@ from psdmc.functions import (
 from psdmc.functions import inverse_dynamics_derivatives as torque_derivatives
 from psdmc.functions.impulse import AFTER, BEFORE, IMPULSES, RESTITUTION
 from psdmc.program.regions import Call, Column, Reader, Regions, Slice, straight
-from psdmc.program.signature import Q, Signature, derivative_of
+from psdmc.program.signature import PIVOTS, Q, Signature, derivative_of
 from psdmc.recipes.contact_derivatives import (
     MINUS,
     Changes,
@@ -31,8 +34,12 @@ from psdmc.recipes.contact_derivatives import (
     changed_on_arrays,
     flat,
     geometry,
+    minus,
     responses,
+    scaled,
     slopes_on_arrays,
+    thin_blocks,
+    thin_outputs,
 )
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, Product, added, filled, one_more
@@ -54,12 +61,12 @@ NAMES = tuple(block.name for block in BLOCKS)
 def trace(g: Ingredients) -> Outputs:
     """Solve for the change of the rates and the impulses. The derivatives solve the same equations, as those of
     constrained forward dynamics do, without gravity and at rest."""
+    if any_limbs(g.frames):
+        return _in_limbs(g)
     found, _, factors, jacobian = impulse.solved(g)
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
     (restitution,), (mu,) = (g.inputs[each.name] for each in (RESTITUTION, MU))
-    slopes = inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, g.still, found.motion, ZERO, g.choices
-    )
+    slopes = _torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     seen = [x + (1.0 + restitution) * rate for x, rate in zip(found.motion, before, strict=True)]
     by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
@@ -73,6 +80,41 @@ def trace(g: Ingredients) -> Outputs:
         row[i] = row[i] + 1.0
     blocks = dict(zip(NAMES, (rates_q, rates_v, impulses_q, impulses_v), strict=True))
     return {**impulse.trace(g), **blocks}
+
+
+def _in_limbs(g: Ingredients) -> Outputs:
+    """The same by thin factors, limb by limb (constrained_forward_dynamics_derivatives)."""
+    q, before, nv = g.inputs["q"], g.inputs[BEFORE.name], len(g.still)
+    (restitution,) = g.inputs[RESTITUTION.name]
+    jacobian = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    mass = _torque_derivatives(g, g.still).by_qdd
+    change, impulses, pivots, arrow = impulse.of_limbs(g, mass, jacobian)
+    turn = pushed_slopes_of_limbs(g.frames, g.named, q, impulses, g.root)
+    seen = [x + (1.0 + restitution) * rate for x, rate in zip(change, before, strict=True)]
+    by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
+    on = Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si).rows[0]
+    loads = [
+        [x - y for x, y in zip(*rows, strict=True)]
+        for rows in zip(_torque_derivatives(g, change).by_q, turn, strict=True)
+    ]
+    rates = [restitution * each for each in on]
+    found = {
+        "q": arrow.thin([*loads, *scaled(on, by_q)], range(nv)),
+        BEFORE.name: arrow.thin([*minus(mass), *scaled(rates, jacobian)], range(nv)),
+    }
+    after = [rate + x for rate, x in zip(before, change, strict=True)]
+    return {
+        "qd_after": after,
+        "impulses": impulses,
+        **thin_outputs(arrow, nv, found, "qd_after", "impulses"),
+        PIVOTS: pivots,
+    }
+
+
+def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
+    return inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, g.inputs["q"], g.still, qdd, ZERO, g.choices
+    )
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
@@ -181,6 +223,7 @@ RECIPE = Recipe(
         "before the impact.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, TORQUES.name, GRAVITY.name, INVERSE.name),
+        thin=thin_blocks("qd_after", "impulses", ("q", BEFORE.name)),
     ),
     "derivatives of impulses of an impact",
     trace,
@@ -190,4 +233,5 @@ RECIPE = Recipe(
     shares="inverse_dynamics",
     matters=("fold_double_angle",),
     regions=regions,
+    in_limbs=True,
 )

@@ -19,6 +19,7 @@ from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbArrangement, LimbSearch
+from psdmc.lower.limbs import have_contacts_alike
 from psdmc.lower.loops import in_loops
 from psdmc.lower.packed import packed
 from psdmc.lower.reframe import Reframed
@@ -196,7 +197,12 @@ class _Lowered:
                 arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
                 traced = trace_dynamics(recipe, arranged, self._search(theta).robot)
                 program = written_out(traced, recipe.signature.products)
-            return Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
+            kernel = Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
+            return (
+                kernel
+                if theta or not recipe.in_limbs or not program.outputs
+                else self._in_limbs(recipe, kernel)
+            )
         candidates: list[Kernel] = []
         expanded = self._expanded(recipe, theta) if self._may_expand(recipe) else None
         if expanded is not None:
@@ -239,7 +245,7 @@ class _Lowered:
             return kernel
         shared = RECIPES[recipe.shares] if recipe.shares else recipe
         found = self._limb_arrangement(shared)
-        if found is None:
+        if found is None or not have_contacts_alike(recipe, found.arrangement.reframed, found.groups):
             return kernel
         search = self._limb_search(recipe)
         limbs = search.lowered(found if shared is recipe else search.within(found), kernel.single)

@@ -16,7 +16,7 @@ from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.program.lanes import lanes
 from psdmc.robot.limbs import Limbs, limb_groups
-from psdmc.robot.mechanism import Placement
+from psdmc.robot.mechanism import NamedFrame, Placement
 
 QUARTER = math.pi / 2
 
@@ -113,6 +113,40 @@ class Place:
         rows = [(body.mass, *body.moment, *body.second) for body in bodies]
         m, hx, hy, hz, *second = (self.constant(column) for column in zip(*rows, strict=True))
         return Body(m, (hx, hy, hz), tuple(second))
+
+
+class LimbContact(NamedTuple):
+    """The corresponding contacts of all limbs of a group, such as the feet of the legs.
+
+    group    number of the group of limbs
+    numbers  numbers of the contacts, limb by limb
+    frame    one named frame for all, which moves with a place. Numbers that differ are constants per limb
+    """
+
+    group: int
+    numbers: tuple[int, ...]
+    frame: NamedFrame
+
+
+def merged_contacts(named: Sequence[NamedFrame], among: Sequence[Place]) -> tuple[LimbContact, ...] | None:
+    """Return the contacts of one limb of each group. Return None if a contact is not on a limb, if the limbs of a group
+    have other contacts, or if a limb has less joints than rows of contacts."""
+    contacts = [each for each in named if each.rows]
+    found = []
+    for place, own in enumerate(among):
+        limbs = [[k for k, each in enumerate(contacts) if each.joint == joint] for joint in own.joints]
+        rows = {tuple(contacts[k].rows for k in numbers) for numbers in limbs}
+        if len(rows) > 1 or (rows != {()} and own.group is None):
+            return None
+        for numbers in zip(*limbs, strict=True):
+            frames = [contacts[k] for k in numbers]
+            merged = replace(frames[0], joint=place, placement=own.placed([f.placement for f in frames]))
+            found.append(LimbContact(own.group or 0, numbers, merged))
+    for group in {each.group for each in found}:
+        joints = sum(place.group == group for place in among)
+        if joints < sum(each.frame.rows for each in found if each.group == group):
+            return None
+    return tuple(sorted(found, key=lambda each: each.numbers))
 
 
 def places(count: int, groups: Sequence[Limbs]) -> tuple[Place, ...]:

@@ -24,7 +24,14 @@ from psdmc.lower.branches import limbs_in
 from psdmc.lower.descent import ROUNDING
 from psdmc.lower.factored import Arrangement, RobotConstants
 from psdmc.lower.limb_frames import possible_groups
-from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, has_columns, have_columns_alike, trace_limbs
+from psdmc.lower.limbs import (
+    TracedLimbs,
+    cost_of_limbs,
+    has_columns,
+    has_contacts,
+    have_columns_alike,
+    trace_limbs,
+)
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import for_lanes, for_one_state
 from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, Search, distinct
@@ -60,9 +67,8 @@ def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
     lanes  number of slots of a vector, each of which computes one limb
     """
     found = weight_of_stages(limbs.groups, stage_costs(limbs), lanes, costs)
-    if limbs.products is None:
-        return found
-    return found + for_lanes(costs).weight(limbs.products.cost) * max(1.0, AT_ONCE / lanes)
+    products = sum(for_lanes(costs).weight(each.cost) for each in limbs.products)
+    return found + products * max(1.0, AT_ONCE / lanes)
 
 
 def weight_of_stages(
@@ -154,7 +160,7 @@ class LimbSearch:
         """Return this function with limbs in SIMD lanes, with the frames, parameters and groups of limbs that a search
         found. Return None if no number of lanes makes it cheaper than straight-line code."""
         limbs = self._ordered(self._traced(found.arrangement, found.groups))
-        if limbs.products is not None and limbs.products.narrowest < AT_ONCE:
+        if any(each.narrowest < AT_ONCE for each in limbs.products):
             return None
         limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
         paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]
@@ -237,6 +243,7 @@ class LimbSearch:
             traced.groups,
             tuple(Stage(s.group, program) for s, program in zip(stages, in_order, strict=True)),
             products=traced.products,
+            checked=has_contacts(self.recipe.signature),
         )
 
     def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:

@@ -15,13 +15,14 @@ from psdmc.dynamics.free_root import has_free_root
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
-from psdmc.lower.limb_frames import Place, one_limb, places
+from psdmc.lower.limb_frames import Place, merged_contacts, one_limb, places
 from psdmc.lower.link_parameters import bodies_from_carriers
+from psdmc.lower.reframe import Reframed
 from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
 from psdmc.program.limb_sums import LimbSums
 from psdmc.program.program import Program, Slot
-from psdmc.program.signature import THIN, Quantity
+from psdmc.program.signature import THIN, Quantity, Signature
 from psdmc.program.thin_products import Shares, ThinProducts
 from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
@@ -36,12 +37,12 @@ class TracedLimbs:
     program   operations of the core (all bodies outside limbs) and of one limb of each group, not yet divided into
               stages
     groups    the groups of equal limbs
-    products  matrix products that follow, if any
+    products  matrix products that follow
     """
 
     program: Program
     groups: tuple[LimbGroup, ...]
-    products: ThinProducts | None = None
+    products: tuple[ThinProducts, ...] = ()
 
 
 def trace_limbs(
@@ -78,6 +79,19 @@ class _Group:
     @property
     def vectors(self) -> LimbGroup:
         return LimbGroup(self.number, self.count, tuple(self.inputs), (), tuple(self.outputs))
+
+
+def has_contacts(signature: Signature) -> bool:
+    """Return whether an input of the function has an entry for each contact."""
+    return any("contacts" in quantity.axes for quantity in signature.inputs)
+
+
+def have_contacts_alike(recipe: Recipe, frames: Reframed, groups: Sequence[Limbs]) -> bool:
+    """Return whether the function has no contacts, or all contacts are at corresponding places of equal limbs, without
+    closed loops."""
+    if not has_contacts(recipe.signature):
+        return True
+    return not frames.loops and merged_contacts(frames.named, places(len(frames.frames), groups)) is not None
 
 
 def has_columns(recipe: Recipe) -> bool:
@@ -124,14 +138,20 @@ class _Trace:
             arrangement,
             robot,
         )
-        self.products: ThinProducts | None = None
+        self.products: tuple[ThinProducts, ...] = ()
         self.tracer = Tracer()
         self.groups = [_Group(number, len(limbs)) for number, limbs in enumerate(groups)]
         self.sums = LimbSums(self.tracer, [len(limbs) for limbs in groups])
         whole = in_unit(arrangement.reframed, arrangement.unit)
         self.places = places(len(whole.frames), groups)
         frames = zip(one_limb(whole.frames, self.places), self.places, strict=True)
-        self.reframed = replace(whole, frames=tuple(self._with_sums(*each) for each in frames))
+        alike = merged_contacts(whole.named, self.places) if has_contacts(self.signature) else ()
+        self.contacts = alike or ()
+        self.reframed = replace(
+            whole,
+            frames=tuple(self._with_sums(*each) for each in frames),
+            named=tuple(each.frame for each in self.contacts) or whole.named,
+        )
         self.first = {
             axis: [
                 0,
@@ -140,6 +160,11 @@ class _Trace:
             for axis in ("nq", "nv")
         }
         self.first["nxa"] = [3 * self.first["nv"][-1]]
+        self.first["contacts"] = [0, *range(1, 1 + len([each for each in whole.named if each.rows]))]
+        self.first["contact_rows"] = [0, *accumulate(each.rows for each in whole.named if each.rows)]
+        # Limbs have no closed loops (have_contacts_alike): all constraints are contacts.
+        self.first["constraints"] = self.first["contacts"]
+        self.first["constraint_rows"] = self.first["contact_rows"]
         if has_columns(recipe):
             self._select_columns(whole.link_frames)
 
@@ -181,20 +206,18 @@ class _Trace:
         )
 
     def _inputs(self, quantity: Quantity) -> Iterator[Symbol]:
-        (axis,) = quantity.axes
         used: dict[int, int] = {}
-        for place in self.places:
-            for own in self._entries(place, axis):
-                slots = tuple(Slot(quantity.name, index) for index in own)
-                if place.group is None:
-                    yield self.tracer.symbol(slots[0])
-                    continue
-                group = self.groups[place.group]
-                slot = Slot(group.vectors.input_of(quantity.name), used.setdefault(place.group, 0))
-                used[place.group] += 1
-                self.sums.add_input(slot.vector, place.group)
-                group.inputs.append((slot, slots))
-                yield self.tracer.symbol(slot)
+        for number, own in self._along(*quantity.axes) if quantity.axes else [(None, (0,))]:
+            slots = tuple(Slot(quantity.name, index) for index in own)
+            if number is None:
+                yield self.tracer.symbol(slots[0])
+                continue
+            group = self.groups[number]
+            slot = Slot(group.vectors.input_of(quantity.name), used.setdefault(number, 0))
+            used[number] += 1
+            self.sums.add_input(slot.vector, number)
+            group.inputs.append((slot, slots))
+            yield self.tracer.symbol(slot)
 
     def _entries(self, place: Place, axis: str) -> list[tuple[int, ...]]:
         """For each coordinate, rate or base parameter of a place the robot's, limb by limb."""
@@ -214,12 +237,28 @@ class _Trace:
             return [
                 (group, tuple(first + k for k in own)) for first in (0, nv, 2 * nv) for group, own in each
             ]
+        if "+" in axis:
+            return self._along_several(axis.split("+"))
+        if axis in ("contacts", "constraints", "contact_rows", "constraint_rows"):
+            return [
+                (each.group, tuple(self.first[axis][k] + row for k in each.numbers))
+                for each in self.contacts
+                for row in range(each.frame.rows if axis.endswith("rows") else 1)
+            ]
         return [(place.group, own) for place in self.places for own in self._entries(place, axis)]
+
+    def _along_several(self, parts: Sequence[str]) -> list[tuple[int | None, tuple[int, ...]]]:
+        found: list[tuple[int | None, tuple[int, ...]]] = []
+        before = 0
+        for axis in parts:
+            found += [(group, tuple(before + k for k in own)) for group, own in self._along(axis)]
+            before += self.first[axis][-1]
+        return found
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
         """Yield the output values to store, with slots (name and index) of a group of limbs or of the core (everything
         outside limbs). Zeros are not stored."""
-        self.products = self._products(found)
+        self.products = tuple(self._products(found))
         for quantity in self.signature.stored:
             entries = [self._along(axis) for axis in quantity.axes]
             for index, which in enumerate(product(*entries)):
@@ -238,8 +277,7 @@ class _Trace:
             Slot(quantity.name, self._flat(quantity, [own[limb if len(own) > 1 else 0] for _, own in which]))
             for limb in range(count)
         )
-        if self.products is not None:
-            slots = tuple(self.products.place(slot, THIN) for slot in slots)
+        slots = tuple(map(self._place, slots))
         if not numbers:
             yield slots[0], value
             return
@@ -251,36 +289,61 @@ class _Trace:
         if is_new:
             yield slot, value
 
-    def _products(self, found: Mapping[Slot, Scalar]) -> ThinProducts | None:
-        """What is multiplied behind the stages; None where nothing is, as the robot has no core."""
-        entries = [(place, own) for place in self.places for own in self._entries(place, "nv")]
-        core = [k for k, (place, _) in enumerate(entries) if place.group is None]
+    def _place(self, slot: Slot) -> Slot:
+        """The place in memory of an entry."""
+        if slot.vector == THIN:
+            nv = self.first["nv"][-1]
+            return self.products[0].place_of_factor(*divmod(slot.index, nv), nv)
+        for products in self.products:
+            slot = products.place(slot)
+        return slot
+
+    def _products(self, found: Mapping[Slot, Scalar]) -> Iterator[ThinProducts]:
+        """What is multiplied behind the stages, for each kind of columns; nothing where the robot has no core."""
+        rates = self._along("nv")
+        core = [k for k, (group, _) in enumerate(rates) if group is None]
         if not self.groups or not self.signature.thin or not core:
-            return None
-        groups = []
+            return
+        shares = list(self._shares(found, rates, core, 0))
+        if any(each.below for each in self.signature.thin):
+            shares += self._shares(found, self._along("contact_rows"), core, len(rates))
+        is_free, rows = has_free_root(self.reframed.frames), tuple(rates[k][1][0] for k in core)
+        columns = {each.name: each.axes[1] for each in self.signature.outputs if len(each.axes) > 1}
+        for axis in dict.fromkeys(columns[each.name] for each in self.signature.thin):
+            thin = [each for each in self.signature.thin if columns[each.name] == axis]
+            yield ThinProducts(
+                tuple(each.name for each in thin),
+                tuple(each.known if is_free else 0 for each in thin),
+                self.first[axis][-1],
+                rows,
+                tuple(shares),
+                tuple(each.below for each in thin if each.below),
+            )
+
+    def _shares(
+        self,
+        found: Mapping[Slot, Scalar],
+        entries: Sequence[tuple[int | None, tuple[int, ...]]],
+        core: Sequence[int],
+        first: int,
+    ) -> Iterator[Shares]:
+        """The factor T of each group, in the rows of joint rates or, from the row `first`, of contacts."""
+        wide = len(self._along("nv"))
         for group in self.groups:
-            rows = [k for k, (place, _) in enumerate(entries) if place.group == group.number]
+            rows = [k for k, (number, _) in enumerate(entries) if number == group.number]
             used = [
                 number
                 for number, column in enumerate(core)
-                if any(found[Slot(THIN, row * len(entries) + column)] != 0.0 for row in rows)
+                if any(found[Slot(THIN, (first + row) * wide + column)] != 0.0 for row in rows)
             ]
             whole = tuple(entries[row][1][limb] for limb in range(group.count) for row in rows)
-            groups.append(Shares(f"{group.vectors.name}_shares", whole, tuple(used)))
-        own = tuple(entries[k][1][0] for k in core)
-        thin, is_free = self.signature.thin, has_free_root(self.reframed.frames)
-        return ThinProducts(
-            tuple(each.name for each in thin),
-            tuple(each.known if is_free else 0 for each in thin),
-            self.first["nv"][-1],
-            own,
-            tuple(groups),
-        )
+            name = f"{group.vectors.name}_{'pushes' if first else 'shares'}"
+            yield Shares(name, whole, tuple(used), bool(first))
 
     def _flat(self, quantity: Quantity, indices: Sequence[int]) -> int:
         flat = 0
         for axis, index in zip(quantity.axes, indices, strict=True):
-            flat = flat * self.first[axis][-1] + index
+            flat = flat * sum(self.first[part][-1] for part in axis.split("+")) + index
         return flat
 
     def counted(self, outputs: list[tuple[Slot, Scalar]]) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:

@@ -118,8 +118,14 @@ def _limbs_to_plain(limbs: LimbProgram) -> dict[str, Any]:
         [group.number, group.count, group.inputs, group.constants, group.outputs] for group in limbs.groups
     ]
     stages = [[stage.group, _program_to_plain(stage.program)] for stage in limbs.stages]
-    products = None if limbs.products is None else asdict(limbs.products)
-    return {"groups": groups, "stages": stages, "least": limbs.least, "products": products}
+    products = list(map(asdict, limbs.products))
+    return {
+        "groups": groups,
+        "stages": stages,
+        "least": limbs.least,
+        "products": products,
+        "checked": limbs.checked,
+    }
 
 
 def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
@@ -134,16 +140,18 @@ def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
         for number, count, inputs, constants, outputs in plain["groups"]
     )
     stages = tuple(Stage(group, _program_from_plain(program)) for group, program in plain["stages"])
-    return LimbProgram(groups, stages, plain["least"], _products_from_plain(plain["products"]))
-
-
-def _products_from_plain(plain: Any) -> ThinProducts | None:
-    if plain is None:
-        return None
-    groups = tuple(Shares(g["vector"], tuple(g["rows"]), tuple(g["carriers"])) for g in plain["groups"])
-    return ThinProducts(
-        tuple(plain["outputs"]), tuple(plain["known"]), plain["n"], tuple(plain["core"]), groups
+    return LimbProgram(
+        groups, stages, plain["least"], tuple(map(_products_from_plain, plain["products"])), plain["checked"]
     )
+
+
+def _products_from_plain(plain: Mapping[str, Any]) -> ThinProducts:
+    groups = tuple(
+        Shares(each["vector"], tuple(each["rows"]), tuple(each["carriers"]), each["is_below"])
+        for each in plain["groups"]
+    )
+    outputs, known, core, below = (tuple(plain[name]) for name in ("outputs", "known", "core", "below"))
+    return ThinProducts(outputs, known, plain["n"], core, groups, below)
 
 
 def _spread(plain: Any) -> tuple[Spread, ...]:

@@ -43,7 +43,7 @@ def whole_cost(limbs: LimbProgram) -> Cost:
     """Return the cost of all stages of a function with limbs, and of the matrix products after them. Operations of
     equal limbs are counted once."""
     costs = [cost(stage.program) for stage in limbs.stages]
-    costs += [limbs.products.cost] if limbs.products else []
+    costs += [each.cost for each in limbs.products]
     return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))
 
 

@@ -90,13 +90,16 @@ class LimbProgram:
     """A function as stages, in their order. A group of equal limbs, or the core outside the limbs, computes each stage.
 
     least     the smallest number of lanes with which this is cheaper than the function's straight-line code
-    products  matrix products after the stages; None if there are none
+    products  matrix products after the stages
+    checked   whether a pivot that is not positive says only that the limbs cannot be eliminated one by one. C then
+              computes the state with the function's straight-line code
     """
 
     groups: tuple[LimbGroup, ...]
     stages: tuple[Stage, ...]
     least: int = 2
-    products: ThinProducts | None = None
+    products: tuple[ThinProducts, ...] = ()
+    checked: bool = False
 
     def with_least(self, least: int) -> LimbProgram:
         return replace(self, least=least)
@@ -128,11 +131,10 @@ def unpacked(limbs: LimbProgram) -> Program:
             found.append(values)
         core |= _sums(group, stage.program, found)
         outputs += _spread(group, stage.program, found)
-    if limbs.products is None:
-        return tracer.finish(outputs)
     known = dict(outputs)
-    whole = dict(limbs.products.multiplied(known))
-    kept = [each for each in outputs if each[0] not in whole and each[0].vector not in limbs.products.sizes]
+    whole = {slot: value for each in limbs.products for slot, value in each.multiplied(known)}
+    internal = {vector for each in limbs.products for vector in each.sizes}
+    kept = [each for each in outputs if each[0] not in whole and each[0].vector not in internal]
     return tracer.finish([*kept, *whole.items()])
 
 

@@ -263,6 +263,9 @@ class Signature:
         if not self.thin:
             return self
         factors = Quantity(THIN, ("nv", "nv"), unit="1", powers=(1, -1))
+        if any(each.below for each in self.thin):
+            below = Quantity(THIN, ("contact_rows", "nv"), unit="J s^2", powers=(-1, -1))
+            factors = Joined(THIN, ("nv+contact_rows", "nv"), parts=(factors, below))
         return replace(self, products=(), outputs=(*self.outputs, factors))
 
     def label(self, output: Quantity, theta: bool = False) -> str:

@@ -31,10 +31,12 @@ class Thin:
 
     name   name of the output
     known  number of its first columns that are computed without the factors, if a floating base carries the whole robot
+    below  name of an output with the same columns, whose rows belong to contacts on limbs; empty: there is none
     """
 
     name: str
     known: int = 0
+    below: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +47,13 @@ class Shares:
     vector    name of the vector of T: one row after the other, with an entry for each carrier
     rows      rows of the output matrix that belong to the group, limb by limb
     carriers  for each column of T, the row of the core that belongs to it, counted within the core from 0
+    is_below  whether the rows are those of the outputs `below`
     """
 
     vector: str
     rows: tuple[int, ...]
     carriers: tuple[int, ...]
+    is_below: bool = False
 
     @property
     def size(self) -> int:
@@ -59,7 +63,8 @@ class Shares:
 
 @dataclass(frozen=True, slots=True)
 class ThinProducts:
-    """Outputs (n, n) that are products of factors, for a robot with limbs (equal branches, such as legs) on a core.
+    """Outputs with n columns that are products of factors, for a robot with limbs (equal branches, such as legs) on a
+    core.
 
     The rows x of the core (the other joints) are x = -V E. The rows of a limb are Y - T x. Here V is the core's block
     of the inverse mass matrix, E the right side, T the factor of the limb. The code for limbs computes V, T and E, and
@@ -67,9 +72,10 @@ class ThinProducts:
 
     outputs  names of the outputs
     known    for each output, the number of first columns that are stored without the products
-    n        number of rows and of columns, which is the number of joint rates
+    n        number of columns
     core     rows of the core
-    groups   the factor T of each group of limbs
+    groups   the factor T of each group of limbs, for rows of the outputs or of those below
+    below    for each output, the name of an output with the rows of contacts on limbs; () if there are none
     """
 
     outputs: tuple[str, ...]
@@ -77,6 +83,7 @@ class ThinProducts:
     n: int
     core: tuple[int, ...]
     groups: tuple[Shares, ...]
+    below: tuple[str, ...] = ()
 
     @staticmethod
     def right(output: str) -> str:
@@ -115,26 +122,31 @@ class ThinProducts:
         add = mul - blocks * len(self.core)
         return Cost(mul, add, div=0, neg=0, sincos=0, fused=add)
 
-    def place(self, slot: Slot, factors: str) -> Slot:
-        """Return the place (slot) in memory of an entry that the recorded arithmetic computes. `factors` is the name of
-        the quantity that contains V and T."""
-        row, column = divmod(slot.index, self.n)
-        known = dict(zip(self.outputs, self.known, strict=True)).get(slot.vector, self.n)
-        if row in self.core and column >= known:
-            return Slot(self.right(slot.vector), self.core.index(row) * self.n + column)
-        if slot.vector != factors:
+    def place(self, slot: Slot) -> Slot:
+        """Return the place (slot) in memory of an entry that the recorded arithmetic computes."""
+        if slot.vector not in self.outputs:
             return slot
+        row, column = divmod(slot.index, self.n)
+        if row in self.core and column >= self.known[self.outputs.index(slot.vector)]:
+            return Slot(self.right(slot.vector), self.core.index(row) * self.n + column)
+        return slot
+
+    def place_of_factor(self, row: int, column: int, rows: int) -> Slot:
+        """Return the place in memory of an entry of the factors V and T. The rows of outputs below follow those of the
+        outputs, which are `rows` in number."""
         number = self.core.index(column)
         if row in self.core:
             return Slot(INVERSE, self.core.index(row) * len(self.core) + number)
-        group = next(group for group in self.groups if row in group.rows)
-        return Slot(group.vector, group.rows.index(row) * len(group.carriers) + group.carriers.index(number))
+        own = row - rows if row >= rows else row
+        group = next(each for each in self.groups if own in each.rows and each.is_below == (row >= rows))
+        return Slot(group.vector, group.rows.index(own) * len(group.carriers) + group.carriers.index(number))
 
     def multiplied(self, stored: Mapping[Slot, Any]) -> Iterator[tuple[Slot, Any]]:
         """Yield each entry of the outputs that the products compute, as (slot, value). `stored` are the factors V, T, E
         and Y; entries that are missing count as zero."""
         n, wide = self.n, len(self.core)
-        for output, known in zip(self.outputs, self.known, strict=True):
+        beneath = self.below or ("",) * len(self.outputs)
+        for output, below, known in zip(self.outputs, beneath, self.known, strict=True):
             for column in range(known, n):
                 given = [stored.get(Slot(self.right(output), c * n + column), 0.0) for c in range(wide)]
                 found = []
@@ -147,8 +159,8 @@ class ThinProducts:
                     for number, row in enumerate(group.rows):
                         first = number * len(used)
                         weights = [stored.get(Slot(group.vector, first + k), 0.0) for k in range(len(used))]
-                        own = stored.get(Slot(output, row * n + column), 0.0)
-                        yield Slot(output, row * n + column), own - _times(weights, used)
+                        place = Slot(below if group.is_below else output, row * n + column)
+                        yield place, stored.get(place, 0.0) - _times(weights, used)
 
 
 def _times(weights: Sequence[Any], values: Sequence[Any]) -> Any:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from psdmc.dynamics.arrow import Arrow
 from psdmc.dynamics.contacts import (
     contact_jacobian,
     contact_slopes,
@@ -22,6 +23,8 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.slices import first_rates, leading
 from psdmc.dynamics.solve import factorize
 from psdmc.program.regions import Column, Reader, Region, Straight, straight
+from psdmc.program.signature import THIN
+from psdmc.program.thin_products import Thin
 from psdmc.recipes.contacts import ACTIVE, MU, Held, dense_solution
 from psdmc.recipes.loops import Block, Product, copied, nonzero
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix
@@ -165,6 +168,38 @@ def held_inverse(
     seen, push = Block("seen", nv), Block("push", nv)
     yield Product(push.turned(), seen, Block(motion, nv), nv, nv, True, True).loop(range(rows))
     yield copied(rows, nv, push, Block(forces, nv), "minus")
+
+
+def thin_outputs(
+    arrow: Arrow, nv: int, changes: Mapping[str, Rows], motion: str, forces: str
+) -> dict[str, list[list[Scalar]]]:
+    """Return the factors of derivatives of the motion and of the contact forces, as outputs of a trace with limbs.
+
+    changes  for each quantity, the result of `Arrow.thin` for its derivatives of minus the residuals, whose last rows
+             belong to minus the contact forces
+    """
+    thin = [row[:nv] for row in arrow.thin_factors]
+    return {
+        **{f"d{motion}_d{by}": [list(row) for row in rows[:nv]] for by, rows in changes.items()},
+        **{f"d{forces}_d{by}": minus(rows[nv:]) for by, rows in changes.items()},
+        THIN: [*thin[:nv], *minus(thin[nv:])],
+    }
+
+
+def thin_blocks(motion: str, forces: str, by: Sequence[str]) -> tuple[Thin, ...]:
+    """Return which outputs are products of factors, if contacts are on equal limbs. A translation of a floating base
+    changes neither the motion nor the forces."""
+    return tuple(Thin(f"d{motion}_d{each}", 3 if each == "q" else 0, f"d{forces}_d{each}") for each in by)
+
+
+def scaled(factors: Sequence[Scalar], rows: Rows) -> list[list[Scalar]]:
+    """Return the rows of a matrix, each times its factor."""
+    return [[factor * x for x in row] for factor, row in zip(factors, rows, strict=True)]
+
+
+def minus(rows: Rows) -> list[list[Scalar]]:
+    """Return minus a matrix."""
+    return [[-x for x in row] for row in rows]
 
 
 def changed_on_arrays(

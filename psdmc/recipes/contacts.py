@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -88,6 +89,11 @@ class Held(NamedTuple):
         return [*(range(each.rows) for each in self.named if each.rows), *(loop.rows for loop in self.loops)]
 
     @property
+    def counts(self) -> list[int]:
+        """The number of rows of each contact and of each loop."""
+        return [len(own) for own in self.axes]
+
+    @property
     def acting(self) -> list[Scalar]:
         """For each contact and each loop, whether it acts."""
         return [*self.active, *(1.0 for _ in self.loops)]
@@ -121,23 +127,34 @@ class Held(NamedTuple):
         for each loop, too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
         found = constrained(factors, jacobian, load, wanted, *self.rows)
         signs, first, inverse = [], 0, inverse_diagonal(found.factors)
-        for number, own in enumerate(self.axes):
-            if number < len(self.active):
-                on = self.active[number]
-                off = on - on * on
-                sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
-                sign = Op.SELECT(-NOTHING, off, sign, -1.0)
-            else:
-                sign = Op.SELECT(self.mu, 0.0, -1.0, 1.0)
-            untested = sign
-            for k in range(first, first + len(own)):
+        for number, (untested, count) in enumerate(zip(self._signs_of_inputs(), self.counts, strict=True)):
+            sign = untested
+            for k in range(first, first + count):
                 sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
             if self.loops and number < len(self.active):
                 # Where loops have no solution, contacts that are not active are not at fault.
                 sign = Op.SELECT(self.active[number], 0.5, untested, sign)
             signs.append(sign)
-            first += len(own)
+            first += count
         return found, signs
+
+    def signs(self, positive: Sequence[Scalar]) -> list[Scalar]:
+        """Return a sign for each contact: -1 if a number of one of its rows is not positive, or if active or mu is not
+        allowed, else 1."""
+        signs, left = [], iter(positive)
+        for sign, count in zip(self._signs_of_inputs(), self.counts, strict=True):
+            for value in islice(left, count):
+                sign = Op.SELECT(0.0, value, sign, -1.0)
+            signs.append(sign)
+        return signs
+
+    def _signs_of_inputs(self) -> Iterator[Scalar]:
+        for on in self.active:
+            off = on - on * on
+            sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
+            yield Op.SELECT(-NOTHING, off, sign, -1.0)
+        for _ in self.loops:
+            yield Op.SELECT(self.mu, 0.0, -1.0, 1.0)
 
 
 def held_on_arrays(

@@ -143,3 +143,16 @@ def test_redundant_rows_of_a_connect_are_told_with_the_tables_that_leave_them_ou
         psdmc.derive(path, expand=False)
     assert 'rows = ["x", "z"] in loop \'pin\'' in str(error.value.hint)
     assert psdmc.derive(path, loops=[{"name": "pin", "rows": ["x", "z"]}], expand=False).loops
+
+
+def test_equal_limbs_that_a_loop_joins_keep_it_in_c(tmp_path: Path) -> None:
+    """Without the loop, both arms and their contacts are computed in lanes."""
+    model = psdmc.derive(written(tmp_path, CONNECT), expand=False)
+    robot = psdmc.compile(model, functions=["constrained_forward_dynamics"])
+    q, qd, tau = np.random.default_rng(2).normal(size=(3, 9, model.nv))
+    active = np.zeros(len(model.contacts))
+    found, expected = (each.constrained_forward_dynamics(q, qd, tau, active) for each in (robot, model))
+    one = robot.constrained_forward_dynamics(q[4], qd[4], tau[4], active)
+    for many, single, values in zip(found, one, expected, strict=True):
+        assert np.abs(many - values).max() < 1e-9 * np.abs(values).max()
+        assert np.abs(single - values[4]).max() < 1e-9 * np.abs(values).max()

@@ -168,6 +168,24 @@ class KernelView:
         return ", ".join(names)
 
     @property
+    def whole(self) -> str:
+        """Return the name of the static C function for states that the code with limbs (such as legs) in lanes cannot
+        compute."""
+        return f"{self.name}_whole"
+
+    @property
+    def whole_arguments(self) -> str:
+        """Return C text of the arguments of `whole`, without pivots. The inputs are copies, because outputs may overlap
+        the inputs."""
+        given = [f"{vector.name}_given" for vector in self.inputs]
+        return ", ".join([*given, *(output.name for output in self.outputs)])
+
+    @property
+    def own_arguments(self) -> str:
+        """Return C text of the names of the function's own arguments for one state."""
+        return ", ".join(vector.name for vector in (*self.inputs, *self.outputs))
+
+    @property
     def lanes_arguments(self) -> str:
         return self._arguments(f"{output.name}_block + lane" for output in self.outputs)
 

@@ -100,7 +100,7 @@ def stores(limbs: LimbProgram, sizes: Mapping[str, int]) -> Iterator[Stored]:
     (code outside limbs) has stored are kept. Outputs that matrix products store are left out.
     """
     own = {slot for stage in limbs.stages for slot, _ in stage.program.outputs}
-    own |= limbs.products.written if limbs.products else set()
+    own |= {slot for each in limbs.products for slot in each.written}
     for vector, size in sizes.items():
         cores = {slot.index for slot in own if slot.vector == vector}
         yield from _Vector(vector, size, cores, limbs.groups).stores()

@@ -211,12 +211,14 @@ class SharesView:
     width    number of limbs
     places   where the rows of each limb begin in an output
     product  C text of the product T x
+    is_below  whether the rows are those of the outputs `below`
     """
 
     vector: str
     width: int
     places: tuple[int, ...]
     product: str
+    is_below: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +234,6 @@ class ThinView:
 
     The code here computes the rows X_c = -V E of the core, and then the rows X_l = Y - T X_c of each limb.
 
-    arrays   names and lengths of the C arrays of V, T and E
     outputs  names of the output matrices X; at first, their rows of limbs contain Y
     rights   for each output, the name of the array E
     known    for each output, how many of its first columns are complete already
@@ -241,9 +242,9 @@ class ThinView:
     begins   for each row of the core, the index of its first entry in E
     rows     for each row of the core, C text of the row's entry of V E
     groups   for each group of equal limbs, the code of the limbs' rows
+    below    for each output, the name of the output matrix with the rows of contacts on limbs; () if there are none
     """
 
-    arrays: tuple[tuple[str, int], ...]
     outputs: tuple[str, ...]
     rights: tuple[str, ...]
     known: tuple[int, ...]
@@ -252,12 +253,12 @@ class ThinView:
     begins: tuple[int, ...]
     rows: tuple[str, ...]
     groups: tuple[SharesView, ...]
+    below: tuple[str, ...]
 
 
 def _thin_view(products: ThinProducts) -> ThinView:
     n, wide = products.n, len(products.core)
     return ThinView(
-        tuple(products.sizes.items()),
         products.outputs,
         tuple(map(products.right, products.outputs)),
         products.known,
@@ -273,10 +274,12 @@ def _thin_view(products: ThinProducts) -> ThinView:
                 len(group.carriers),
                 tuple(row * n for row in group.rows),
                 " + ".join(f"share[{k}] * new_{number}" for k, number in enumerate(group.carriers)),
+                group.is_below,
             )
             for group in products.groups
             if group.carriers
         ),
+        products.below,
     )
 
 
@@ -291,8 +294,10 @@ class LimbsView:
     groups    the groups of limbs
     stages    parts of the code, in their order
     stores    C statements that store the outputs of limbs, and zeros
-    products  matrix products after all other code; None if there are none
+    products  matrix products after all other code
+    factors   names and lengths of the C arrays of the factors in these products
     cost      number of operations
+    checked   whether the function's straight-line code computes states with a pivot that is not positive
     """
 
     file: str
@@ -302,8 +307,10 @@ class LimbsView:
     groups: tuple[GroupView, ...]
     stages: tuple[StageView, ...]
     stores: tuple[StoreView, ...]
-    products: ThinView | None
+    products: tuple[ThinView, ...]
+    factors: tuple[tuple[str, int], ...]
     cost: Cost
+    checked: bool
 
     @property
     def core_name(self) -> str:
@@ -327,6 +334,7 @@ def limbs_view(
     stages = tuple(
         _stage(stage, None if stage.group is None else groups[stage.group], suffix) for stage in limbs.stages
     )
+    factors = {name: length for each in limbs.products for name, length in each.sizes.items()}
     return LimbsView(
         file=f"{name}_limbs.inc",
         least=limbs.least,
@@ -334,9 +342,11 @@ def limbs_view(
         core=_length(limbs.stages, CORE),
         groups=tuple(_group(group, limbs.stages, suffix) for group in limbs.groups),
         stages=stages,
-        stores=store_views(limbs, sizes | (limbs.products.sizes if limbs.products else {})),
-        products=_thin_view(limbs.products) if limbs.products else None,
+        stores=store_views(limbs, sizes | factors),
+        products=tuple(map(_thin_view, limbs.products)),
+        factors=tuple(factors.items()),
         cost=whole_cost(limbs),
+        checked=limbs.checked,
     )
 
 
