@@ -8,8 +8,7 @@ import pytest
 
 from psdmc.bench.__main__ import SEED, eight_joints
 from psdmc.bench.case import generic_chain
-from psdmc.bench.cases import bundled_chain
-from psdmc.bench.fresh import derive_fresh
+from psdmc.bench.cases import bundled_chain, derive_fresh
 from psdmc.derivation.derive import derive_model
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Mechanism

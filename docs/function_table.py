@@ -40,8 +40,15 @@ UNRELEASED = frozenset(
         "constrained_forward_dynamics_jvp",
         "constrained_forward_dynamics_vjp",
         "constrained_forward_dynamics_vjp_parameters",
+        "constrained_rk4_step",
+        "constrained_semi_implicit_euler",
+        "constrained_semi_implicit_euler_derivatives",
         "contact_drift",
+        "contact_drift_local",
+        "contact_inverse_dynamics",
         "contact_jacobian",
+        "contact_jacobian_local",
+        "contact_space_inertia",
         "loop_drift",
         "loop_error",
         "loop_jacobian",
@@ -100,9 +107,10 @@ def _outputs(outputs: Sequence[Quantity]) -> str:
     values = [each for each in outputs if "_d" not in each.name]
     pairs = [each.name[1:].split("_d", 1) for each in outputs if "_d" in each.name and each.name[0] == "d"]
     above, below = (list(dict.fromkeys(names)) for names in zip(*pairs, strict=True)) if pairs else ([], [])
-    if len(above) < 2 or len(pairs) < len(above) * len(below):
+    is_short = len(above) < 2 and len(outputs) < 8
+    if is_short or len(pairs) < len(above) * len(below):
         return ", ".join(map(_shape, outputs))
-    shown = ", ".join(map(_shape, values))
+    shown = ", ".join(map(_shape, values) if len(values) < 6 else (each.name for each in values))
     return f"{shown}, d`X`_d`Y` with `X` = {', '.join(above)} and `Y` = {', '.join(below)}"
 
 

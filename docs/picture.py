@@ -10,7 +10,16 @@ from importlib import import_module
 from pathlib import Path
 
 IMAGES = Path(__file__).parent / "images"
-MODULES = ("pipeline", "link_frames", "batch_layout", "limb_lanes", "log_to_model", "sparsity", "speed")
+MODULES = (
+    "pipeline",
+    "link_frames",
+    "batch_layout",
+    "limb_lanes",
+    "log_to_model",
+    "smooth_friction",
+    "sparsity",
+    "speed",
+)
 
 
 def pictures() -> dict[str, Callable[[], str]]:

@@ -46,6 +46,7 @@ MENU = {
         "how-to/no-inertias",
         "how-to/frames",
         "how-to/payload",
+        "how-to/load-estimator",
         "how-to/floating-base",
     ),
     "How to use the code": (

@@ -33,11 +33,13 @@ from psdmc.backends.reference_load import reference_load
 from psdmc.backends.reference_states import reference_states
 from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.admitted import require
-from psdmc.lower.kernels import Lowering, lower, wanted
+from psdmc.lower.kernels import Lowering, lower, lower_estimator, wanted
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.linear_friction import friction_in_dynamics
 from psdmc.model.load import load_bytes, model_of
 from psdmc.model.store import file_bytes
 from psdmc.progress import Progress, silent
@@ -162,8 +164,10 @@ def emit_c(
     payload: bool = False,
     adapters: Sequence[str] | str = (),
     target: str | Target = NATIVE,
-    friction: bool = False,
+    friction: bool | Literal["in-dynamics"] = False,
     bodies: bool = False,
+    estimator: str | None = None,
+    smoothing_speed: float | None = None,
 ) -> Changes:
     """Write the C package of a model into a folder. Returns the names of the files that psdmc wrote or removed.
 
@@ -182,17 +186,24 @@ def emit_c(
     payload    True: add the functions that change theta_b for a load
     adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
-    friction   True: add the function that computes friction torques, for a model that was calibrated from logs
+    friction   for a model that was calibrated from logs. True: add the function that computes friction torques.
+               "in-dynamics": inverse dynamics, forward dynamics and all functions made from them contain friction
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
+    estimator  "mass" or "inertia": add functions that estimate a load at the tip while the robot moves. "mass" finds
+               mass and centre of mass, "inertia" also the inertia
+    smoothing_speed  rad/s (m/s for sliding joints), the speed near which the sign of the motion changes smoothly in
+               friction in the dynamics; None: that of the calibration, usually 0.03 rad/s
 
-    Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises
+    Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises
     InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
 
     Forward dynamics, a default function, and some other functions need the inverse of the mass matrix. If the mass matrix
     is not positive definite at some pose within the joint limits, psdmc raises InputError instead of generating these
     functions. In this case, let `functions` name only functions that do not need the inverse, such as "gravity".
     """
-    own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
+    own: dict[str, Any] = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
+    own["smoothing-speed"] = smoothing_speed
+    own["estimator"] = estimator
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
 
 
@@ -300,7 +311,8 @@ def _files(
         )
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    return language.files(_emission(model, lowering, functions, options, name, progress, *facts))
+    further = (own.get("estimator"), own.get("smoothing-speed"))
+    return language.files(_emission(model, lowering, functions, options, name, progress, *facts, *further))
 
 
 @overload
@@ -312,6 +324,8 @@ def compile(
     trig: Trig | None = ...,
     progress: Progress = ...,
     target: str | Target = ...,
+    friction: bool = ...,
+    smoothing_speed: float | None = ...,
 ) -> CompiledRobot: ...
 
 
@@ -325,6 +339,8 @@ def compile(
     trig: Trig | None = ...,
     progress: Progress = ...,
     target: str | Target = ...,
+    friction: bool = ...,
+    smoothing_speed: float | None = ...,
 ) -> CompiledRobot[np.float32]: ...
 
 
@@ -337,6 +353,8 @@ def compile(
     trig: Trig | None = ...,
     progress: Progress = ...,
     target: str | Target = ...,
+    friction: bool = ...,
+    smoothing_speed: float | None = ...,
 ) -> CompiledRobot[np.float32] | CompiledRobot: ...
 
 
@@ -348,6 +366,8 @@ def compile(
     trig: Trig | None = None,
     progress: Progress = silent,
     target: str | Target = NATIVE,
+    friction: bool = False,
+    smoothing_speed: float | None = None,
 ) -> CompiledRobot[Any]:
     """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
 
@@ -355,10 +375,13 @@ def compile(
 
     model      a model, or the path of a model file
     functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
-               at once, and each other function at its first call
+               now, and each other function when you first call it
+    friction   True: inverse dynamics, forward dynamics and all functions made from them contain the friction of a model
+               that was calibrated from logs
 
-    `emit_c` explains the other options. Raises InputError if the target is a microcontroller, because its code lacks the
-    batch functions that Python calls. Raises ToolchainError if the compiler or the CPU does not support the target.
+    `emit_c` explains the other options. Raises InputError if the model has no such friction. Raises InputError also if the
+    target is a microcontroller, because its code lacks the batch functions that Python calls. Raises ToolchainError if the
+    compiler or the CPU does not support the target.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP
@@ -368,7 +391,9 @@ def compile(
     names = (functions,) if isinstance(functions, str) else functions
     kept = None if names is None else tuple(names)
     chosen_names = wanted(kept, found.mechanism)
-    request = _Request(found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
+    law: Literal[False, "in-dynamics"] = "in-dynamics" if friction else False
+    known = (found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
+    request = _Request(*known, law, smoothing_speed)
     return request.compiled(progress)
 
 
@@ -390,16 +415,26 @@ class _Request:
     real: Real | None
     trig: Trig | None
     target: str | Target
+    friction: Literal[False, "in-dynamics"]
+    smoothing_speed: float | None
 
     def __reduce__(self) -> tuple[Any, ...]:
         filed = self.model if isinstance(self.model, bytes) else zlib.compress(file_bytes(self.model))
-        others = (self.lowering, self.functions, self.real, self.trig, self.target)
+        others = (self.lowering, self.functions, self.real, self.trig, self.target, *self._law)
         return _Request, (filed, self.model_hash, self.names, *others)
 
     @property
     def key(self) -> str:
         """A text that is equal for two calls of `compile` with equal results: a hash of the model and of all options."""
-        parts = (self.model_hash, self.lowering, self.functions, self.real, self.trig, self.target)
+        parts = (
+            self.model_hash,
+            self.lowering,
+            self.functions,
+            self.real,
+            self.trig,
+            self.target,
+            *self._law,
+        )
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     def compiled(self, progress: Progress = silent) -> CompiledRobot[Any]:
@@ -413,11 +448,13 @@ class _Request:
             )
 
         def make() -> PackageView:
-            package = _package(self.opened(), self.lowering, self.functions, options, None, progress)
+            given = (self.opened(), self.lowering, self.functions, options, None, progress)
+            package = _package(*given, False, (), self.friction, False, None, self.smoothing_speed)
             progress("compiling")
             return package
 
         parts = (self.model_hash, self.lowering, options.real, options.trig, *self.names)
+        parts += (f"friction {self._law}",) if self.friction or self.smoothing_speed is not None else ()
 
         def more(function: str) -> CompiledRobot[Any]:
             return replace(self, functions=(function,), names=wanted((function,))).compiled(progress)
@@ -429,6 +466,11 @@ class _Request:
         )
         _ROBOTS[self.key] = robot
         return robot
+
+    @property
+    def _law(self) -> tuple[object, ...]:
+        """What the friction in the dynamics depends on beside the model."""
+        return self.friction, self.smoothing_speed
 
     def opened(self) -> DynamicsModel:
         """Return the model of this request, which a pickled request stores as compressed bytes."""
@@ -462,22 +504,45 @@ def _emission(
     progress: Progress,
     payload: bool = False,
     adapters: Sequence[str] = (),
-    friction: bool = False,
+    friction: bool | Literal["in-dynamics"] = False,
     bodies: bool = False,
+    estimator: str | None = None,
+    smoothing_speed: float | None = None,
 ) -> Emission:
     names = _functions_of(model, functions, adapters)
+    law = _friction_in_dynamics(model, friction, smoothing_speed)
     require(model, names)
     costs = options.target.costs
+    key = (model.content_hash, lowering, repr(costs), *names)
     kernels = lowered_once(
-        (model.content_hash, lowering, repr(costs), *names),
-        lambda: lower(model, lowering, names, progress, costs=costs),
+        key if law is None else (*key, law.key),
+        lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
     )
-    shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    info = package_info(model, name, shown, payload, friction, bodies)
-    references = reference_states(model, names)
+    shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    if estimator:
+        shown["estimator"] = estimator
+    momenta = None if estimator is None else lower_estimator(model, estimator, costs)
+    if law is not None:
+        shown |= {"friction": "in-dynamics", "smoothing-speed": repr(law.friction.sign_speed)}
+    own = None if law is None else law.friction
+    info = package_info(model, name, shown, payload, friction is True, bodies, own)
+    references = reference_states(model, names, friction=law)
     if payload:
         references = replace(references, load=reference_load(model))
-    return Emission(info, kernels, options, references, tuple(adapters))
+    return Emission(info, kernels, options, references, tuple(adapters), momenta)
+
+
+def _friction_in_dynamics(
+    model: DynamicsModel, friction: bool | str, speed: float | None
+) -> FrictionInDynamics | None:
+    """The friction that motor torques contain, None without the option."""
+    if friction == "in-dynamics":
+        return friction_in_dynamics(model, speed)
+    if friction not in (True, False):
+        raise InputError(f"friction is {friction!r}", "choose --friction or --friction=in-dynamics")
+    if speed is not None:
+        raise InputError("a smoothing speed without friction in the dynamics", "add --friction=in-dynamics")
+    return None
 
 
 def _functions_of(

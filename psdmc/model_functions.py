@@ -22,7 +22,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Expansion
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Recipe
+from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism, contact_names
 from psdmc.robot.unit_lengths import units_of
 from psdmc.toolchain.call_arguments import (
@@ -105,7 +105,7 @@ def evaluated(
         )
         for quantity, array in zip(signature.inputs, arrays, strict=True)
     }
-    if recipe.needs is not None and theta_b is None:
+    if recipe.lack_of_loops(model.mechanism) or (recipe.needs is not None and theta_b is None):
         _admit(model, recipe.name)
     if by_rows:
         found = _values_by_rows(model, recipe, given, axes.sizes)
@@ -204,7 +204,8 @@ def _values(
     robot = RobotOnArrays.of(model, theta)
     if not recipe.signature.factorises:
         return recipe.reference(robot, whole)
-    solvable = _solvable(robot, given[Q.name])
+    is_solved = recipe.needs is Needs.POSITIVE_MASS
+    solvable = _solvable(robot, given[Q.name]) if is_solved else np.ones(count, np.bool_)
     chosen = {name: values[solvable] for name, values in given.items()}
     if TAU.name in chosen and QDD.name not in chosen:
         chosen[QDD.name] = robot.accelerations(chosen["q"], chosen["qd"], chosen[TAU.name])

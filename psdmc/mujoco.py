@@ -29,9 +29,7 @@ from psdmc.robot.coordinates import Following
 from psdmc.robot.joints.quaternion import inverse, rotation_of
 from psdmc.robot.joints.scalars import unit
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import BASE, Array, Mechanism
 
 KINDS = ("free", "ball", "slide", "hinge")
 """MuJoCo's types of joints, by their numbers (mjtJoint)."""
@@ -182,7 +180,7 @@ class _Layout:
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
         """Return joint rates with the linear velocity of a floating base rotated from the base's axes to the world's
-        axes. If `back` is true, it is rotated from the world's axes to the base's axes."""
+        axes. If `back` is true, the velocity is rotated from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

@@ -22,10 +22,10 @@ MAY_IMPORT = {
     "target": set(),
     "program": {"target"},
     "friction": {"program"},
-    "recipes": {"robot", "dynamics", "model", "program"},
+    "recipes": {"robot", "dynamics", "friction", "model", "program"},
     "functions": {"robot", "dynamics", "model", "program", "recipes"},
     "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
-    "lower": {"robot", "dynamics", "model", "program", "recipes", "functions", "target"},
+    "lower": {"robot", "dynamics", "friction", "model", "program", "recipes", "functions", "target"},
     "backends": {"robot", "program", "friction", "model", "recipes", "functions", "target"},
     "toolchain": {"robot", "backends", "program", "functions", "target"},
 }

@@ -158,7 +158,7 @@ OWN = {
     "bench/measure.py": "the kernel's figures",
     "bench/callgrind.py": "valgrind's output",
     "bench/contestant.py": "psdmc's own sources",
-    "bench/fresh.py": "the kernel's figures",
+    "bench/cases.py": "the kernel's figures",
     "bench/machine.py": "the kernel's figures",
     "bench/rivals/casadi_c.py": "a file that was just written",
     "bench/rivals/cppadcg_c.py": "a file that was just written",

@@ -33,6 +33,7 @@ STRANGE |= {"sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "asin"
 """What NumPy, SciPy and the C library compute by the processor's own kernels."""
 
 DECISIONS = {
+    "recipes/load_momentum.py": "Pinocchio's side of a comparison",
     "robot/reference.py": "Pinocchio's side of a comparison",
     "robot/mujoco_reading.py": "MuJoCo's side of a comparison",
     "robot/unit_lengths.py": "a refusal",
@@ -46,6 +47,8 @@ DECISIONS = {
     "derivation/closed_loops.py": "a refusal",
     "recipes/contacts.py": "Pinocchio's side of a comparison",
     "functions/delassus.py": "Pinocchio's side of a comparison",
+    "functions/contact_inverse_dynamics.py": "Pinocchio's side of a comparison",
+    "functions/contact_space_inertia.py": "Pinocchio's side of a comparison",
     "functions/operational_space_inertia.py": "Pinocchio's side of a comparison",
     "functions/tangent_map.py": "Pinocchio's side of a comparison",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",

@@ -9,14 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.model.bodies import refuse_outside
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.inertia import six_of
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array
 
 MASS = 1.25
 COM = np.array([0.0625, -0.03125, 0.125])

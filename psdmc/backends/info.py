@@ -66,6 +66,7 @@ class PackageInfo:
     units       index ranges (start, end) of q whose length must be one (quaternions)
     bodies      map from the parameters of all bodies to theta_b; None if the package has no function for the map
     friction    joint friction from a calibration with plain logs; None if the package has no function for friction
+    in_dynamics  joint friction that motor torques contain; None if they have none
     q_names     names of the nq entries of q, untrusted text
     v_names     names of the nv entries of rates and torques
     base_frame  in words, the frame in which gravity, frames and velocities are given
@@ -88,6 +89,7 @@ class PackageInfo:
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
     friction: Friction | None = None
+    in_dynamics: Friction | None = None
     bodies: BodiesMap | None = None
     q_names: tuple[str, ...] = ()
     v_names: tuple[str, ...] = ()
@@ -146,9 +148,11 @@ def package_info(
     payload: bool = False,
     friction: bool = False,
     bodies: bool = False,
+    in_dynamics: Friction | None = None,
 ) -> PackageInfo:
     """Return the metadata of a model for a package. `name` replaces the name of the robot. The options `payload`,
     `friction` and `bodies` add the data for further functions: adding loads, friction, and base parameters from bodies.
+    `in_dynamics` is the friction that motor torques contain, if any.
 
     Raises InputError if the model was derived under an assumption that excludes some loads or bodies. Also raises
     InputError if friction is wanted and the model was not calibrated from plain logs.
@@ -191,6 +195,7 @@ def package_info(
         followers=tuple(_followers(chain)),
         units=units_of(chain.joints[i].type for i in chain.own_joints),
         friction=linear_friction(model) if friction else None,
+        in_dynamics=in_dynamics,
         bodies=bodies_map(model) if bodies else None,
         q_names=chain.q_names,
         v_names=chain.v_names,

@@ -41,6 +41,7 @@ class Emission:
     kernels     the arithmetic of each function variant, by name
     references  states and the functions' values there, for the package's self-test; None: no self-test
     adapters    names of the other programs for which the package has files
+    estimator   the arithmetic that the load estimator calls; None: no estimator
     """
 
     info: PackageInfo
@@ -48,6 +49,7 @@ class Emission:
     options: EmitOptions
     references: ReferenceStates | None = None
     adapters: tuple[str, ...] = ()
+    estimator: Kernel | None = None
 
     @property
     def functions(self) -> tuple[Function, ...]:

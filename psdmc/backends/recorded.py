@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -66,7 +67,7 @@ def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
         "lowering": options.get("lowering"),
         "real": options.get("real"),
         "target": options.get("target", NATIVE.name),
-        **({"trig": options["trig"]} if "trig" in options else {}),
+        **{key: options[key] for key in ("trig", "estimator") if key in options},
     }
     wrong = [key for key, value in texts.items() if not isinstance(value, str)]
     wrong += [] if texts["backend"] in BACK_ENDS else ["back end"]
@@ -75,9 +76,19 @@ def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
             f"{Path(directory) / MANIFEST}: does not say with which {(*wrong, 'functions')[0]} psdmc emitted the package",
             "emit the package again without --check",
         )
-    more = {option: path in files for option, path in MORE_SOURCES.items()}
+    more: dict[str, Any] = {option: path in files for option, path in MORE_SOURCES.items()}
+    if options.get("friction") == "in-dynamics":
+        more |= {"friction": "in-dynamics", "smoothing-speed": _number(options.get("smoothing-speed"))}
     adapters = tuple(name for name in ADAPTERS if any(path.startswith(f"{name}/") for path in files))
     return {**texts, "functions": tuple(named), **more, "with": adapters}
+
+
+def _number(text: object) -> float:
+    """A recorded number; NaN, which no option may be, where it is none."""
+    try:
+        return float(text) if isinstance(text, str) else math.nan
+    except ValueError:
+        return math.nan
 
 
 def differences(directory: str | os.PathLike[str], files: Mapping[str, str]) -> Differences:

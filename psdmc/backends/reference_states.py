@@ -7,13 +7,14 @@ separate from the generated code.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.backends.reference_load import ReferenceLoad
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
@@ -22,6 +23,7 @@ from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.recipes.torques import with_friction
 from psdmc.reproducible import times
 
 Array = NDArray[np.float64]
@@ -79,10 +81,13 @@ class ReferenceStates:
 
 
 def reference_states(
-    model: DynamicsModel, functions: Collection[str] = DEFAULT, count: int = COUNT
+    model: DynamicsModel,
+    functions: Collection[str] = DEFAULT,
+    count: int = COUNT,
+    friction: FrictionInDynamics | None = None,
 ) -> ReferenceStates:
     """Return states of a model, and the values of the given functions there. If the base parameters of the model are
-    unknown, function variants that contain these parameters are left out."""
+    unknown, function variants that contain these parameters are left out. Motor torques contain `friction`, if any."""
     given = _drawn(model)
     theta_b = _other_parameters(model)
     robots = {"_theta": RobotOnArrays.of(model, theta_b)}
@@ -92,10 +97,10 @@ def reference_states(
     best = np.sort(np.argsort(np.round(np.log10(conditions), 6), kind="stable")[:count])
     given = {name: array[best] for name, array in given.items()}
     solvable = bool(conditions[best].max() < WORST_CONDITION)
-    recipes = [recipe for name, recipe in RECIPES.items() if name in functions]
+    recipes = [with_friction(recipe, friction) for name, recipe in RECIPES.items() if name in functions]
     expected: dict[str, Array] = {}
     for suffix, robot in robots.items():
-        tau = robot.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)
+        tau = _motor_torques(robot, given, friction)
         given[f"{TAU.name}{suffix}"] = tau
         own = [recipe for recipe in recipes if recipe.signature.theta]
         expected |= _values(own, robot, given | {TAU.name: tau}, suffix, solvable)
@@ -103,21 +108,38 @@ def reference_states(
     expected |= _values(free, robots.get("", robots["_theta"]), given, "", solvable)
     if any(name in BY_ROWS for name in functions):
         thetas = theta_b * (1.0 + np.arange(len(given["q"])) / STEPS)[:, None]
-        own = [recipe for recipe in RECIPES.values() if f"{recipe.name}{THETA_ROWS}" in functions]
-        added, values = _by_rows(own, [RobotOnArrays.of(model, theta) for theta in thetas], given, solvable)
+        own = [
+            with_friction(recipe, friction)
+            for recipe in RECIPES.values()
+            if f"{recipe.name}{THETA_ROWS}" in functions
+        ]
+        robots_by_rows = [RobotOnArrays.of(model, theta) for theta in thetas]
+        added, values = _by_rows(own, robots_by_rows, given, solvable, friction)
         given |= {THETAS.name: thetas, **added}
         expected |= values
     return ReferenceStates(given, expected, theta_b)
 
 
+def _motor_torques(
+    robot: RobotOnArrays, given: Mapping[str, Array], friction: FrictionInDynamics | None
+) -> Array:
+    """(k, nv) torques of the motors at q, qd and qdd."""
+    resisted = replace(robot, friction=friction)
+    return resisted.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)
+
+
 def _by_rows(
-    recipes: Sequence[Recipe], robots: Sequence[RobotOnArrays], given: Mapping[str, Array], solvable: bool
+    recipes: Sequence[Recipe],
+    robots: Sequence[RobotOnArrays],
+    given: Mapping[str, Array],
+    solvable: bool,
+    friction: FrictionInDynamics | None,
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """The torques, and the outputs of the functions' variants by rows, one robot per state."""
     rows = []
     for k, robot in enumerate(robots):
         one = {name: array[k : k + 1] for name, array in given.items()}
-        one[TAU.name] = robot.torques(one["q"], one["qd"], one["qdd"], robot.base_acceleration)
+        one[TAU.name] = _motor_torques(robot, one, friction)
         values = _values(recipes, robot, one, THETA_ROWS, solvable)
         rows.append({f"{TAU.name}{THETA_ROWS}": one[TAU.name], **values})
     whole = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

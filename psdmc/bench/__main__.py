@@ -13,12 +13,11 @@ import numpy as np
 
 from psdmc.atomic import write_whole
 from psdmc.bench.case import Case, generic_chain
-from psdmc.bench.cases import bundled_chain, first_joints, standard_cases
+from psdmc.bench.cases import bundled_chain, derive_fresh, first_joints, standard_cases
 from psdmc.bench.defaults import ROUNDS
-from psdmc.bench.fresh import derive_fresh
+from psdmc.bench.results import as_text
 from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import Settings, run
-from psdmc.bench.table import as_text
 from psdmc.errors import exit_status_of
 from psdmc.progress import on_standard_error
 from psdmc.robot.joints import REVOLUTE

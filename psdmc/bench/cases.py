@@ -1,9 +1,12 @@
 """The robots of the benchmark: robots of publications, common arms, two generic arms, quadrupeds, a humanoid, a hand and
-a two-armed torso."""
+a two-armed torso. Their models are derived in a new process, to measure the time and memory of the derivation."""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
@@ -11,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
-from psdmc.bench.fresh import derive_fresh
-from psdmc.errors import InputError
+from psdmc.derivation.derive import derive_model
+from psdmc.errors import DerivationError, InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.processes import in_a_new_process
 from psdmc.reproducible import length
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.load import load_robot
@@ -181,3 +186,52 @@ def _rotation(rng: np.random.Generator) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+# Derived in a new process
+
+
+STATUS = Path("/proc/self/status")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Derivation:
+    """A model with the time and memory of its derivation. peak_bytes is for the whole process; None if the system does
+    not report it."""
+
+    model: DynamicsModel
+    seconds: float
+    peak_bytes: int | None
+
+
+def derive_fresh(chain: Mechanism) -> Derivation:
+    """Return the model of a robot, derived in a new process, with time and memory of the derivation. The matrices E and
+    P are left out if they do not fit into memory."""
+    return in_a_new_process(measured_derivation, chain)
+
+
+def measured_derivation(chain: Mechanism) -> Derivation:
+    """Derive a model twice in this process, and return it with the time of the second derivation and the peak memory of
+    the process."""
+    derive_model(chain, expand=False)  # imports and first calls are not measured
+    start = time.perf_counter()
+    try:
+        model = derive_model(chain)
+    except DerivationError:
+        start = time.perf_counter()
+        model = derive_model(chain, expand=False)
+    return Derivation(model, time.perf_counter() - start, _peak_bytes())
+
+
+def _peak_bytes() -> int | None:
+    if sys.platform == "win32":
+        return None
+    if STATUS.is_file():  # Linux inherits ru_maxrss from the parent, but not this
+        kibibytes = next(
+            line.split()[1] for line in STATUS.read_text().splitlines() if line.startswith("VmHWM")
+        )
+        return 1024 * int(kibibytes)
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak

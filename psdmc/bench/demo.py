@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from psdmc import compiler
-from psdmc.bench.agree import relative_error
 from psdmc.bench.case import Case
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
-from psdmc.bench.run import Settings, run
+from psdmc.bench.run import Settings, relative_error, run
 from psdmc.bench.states import sizes_of
 from psdmc.errors import exit_status_of
 from psdmc.functions import RECIPES

@@ -1,4 +1,5 @@
-"""A benchmark run from start to end: compile all libraries, compare their results, then time them."""
+"""A benchmark run from start to end: compile all libraries, compare their results with psdmc's Newton-Euler recursion in
+NumPy, then time them."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
-from psdmc.bench.agree import checked_states, disagreement, tolerance
+import numpy as np
+
 from psdmc.bench.build import counted_flags
 from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import Case
@@ -17,11 +19,14 @@ from psdmc.bench.machine import this_machine, versions
 from psdmc.bench.measure import Times, measure
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.rivals import EVERYONE, Entrant, psdmc_c
-from psdmc.bench.states import COUNT, States
+from psdmc.bench.states import COUNT, States, output_sizes
 from psdmc.bench.threads import measure_threads
 from psdmc.errors import ToolchainError
+from psdmc.functions import RECIPES
 from psdmc.processes import in_processes
 from psdmc.progress import Progress, silent, within
+from psdmc.recipes.recipe import Needs
+from psdmc.robot.mechanism import Array
 
 SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
@@ -213,3 +218,59 @@ def _sorted(
     contestants = [e for e in entries if isinstance(e, Contestant)]
     wanted = [c for c in contestants if functions is None or c.function in functions]
     return Assembled(case, tuple(wanted), tuple(e for e in entries if isinstance(e, Unavailable)))
+
+
+# Compared before anything is timed
+
+
+CHECKED = 1024
+"""States compared; enough to meet every term of a robot's dynamics."""
+
+CHECKED_REALS = 1 << 24
+"""Outputs compared, 128 MiB of them: a humanoid's regressor in standard parameters has 12,000 a state."""
+
+FEWEST = 64
+"""States compared of the largest of robots."""
+
+SOLVED = 1e-7
+STRICT = 1e-10
+"""Largest error of an output relative to its largest value; forward dynamics amplifies rounding by the mass matrix's
+condition number."""
+
+SMALL = 1e-3
+"""Outputs that stay below this share of the largest one are compared on its scale: they may be zero."""
+
+
+def checked_states(outputs: int) -> int:
+    """Return how many states of a function with this number of output values are compared. The number is a power of
+    two, so that the states fill whole batches."""
+    return min(CHECKED, 1 << int(np.log2(max(FEWEST, CHECKED_REALS // outputs))))
+
+
+def disagreement(runner: Runner, states: States) -> float:
+    """Return the largest error of a library's results for one function. The error of each output array is divided by
+    the largest value of this array."""
+    expected = states.expected(runner.contestant.function)
+    found = runner.outputs()
+    if runner.contestant.convention == "MuJoCo":
+        found = states.from_mujoco(found)
+    weights = runner.contestant.weights
+    if weights is not None:
+        found = found.reshape(states.count, -1, len(weights)) @ weights
+        return relative_error(found, expected)
+    ends = np.cumsum(output_sizes(runner.contestant.function, states.sizes))[:-1]
+    blocks = zip(np.split(found, ends, axis=1), np.split(expected, ends, axis=1), strict=True)
+    return max(relative_error(*block) for block in blocks)
+
+
+def relative_error(found: Array, expected: Array) -> float:
+    """Return the largest relative error of outputs: infinite if a value is NaN, absolute if all expected values are
+    zero."""
+    largest = np.max(np.abs(expected), axis=0)
+    error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest) or 1.0)
+    return float(np.max(error)) if np.isfinite(error).all() else float("inf")
+
+
+def tolerance(function: str) -> float:
+    """Largest relative error with which the outputs of a function still count as equal to the expected ones."""
+    return SOLVED if RECIPES[function].needs is Needs.POSITIVE_MASS else STRICT

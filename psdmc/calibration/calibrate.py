@@ -10,14 +10,19 @@ from psdmc.calibration.campaign_file import plain_logs, read_campaign, validatio
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.fitted_logs import LogFit
 from psdmc.calibration.identify.essential import EssentialOptions
-from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps, checked_runs
+from psdmc.calibration.identify.four_steps import (
+    FourSteps,
+    Runs,
+    calibrate_four_steps,
+    checked_runs,
+    physical_steps,
+)
 from psdmc.calibration.identify.knowledge import knowledge_of
 from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.motor_constants import motors_of_logs
+from psdmc.calibration.identify.motor_model import motors_of_logs
 from psdmc.calibration.identify.physical import NotPhysical
-from psdmc.calibration.identify.physical_steps import physical_steps
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Array

@@ -15,8 +15,16 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions, Load
 from psdmc.calibration.logs.formats import WRITTEN
-from psdmc.calibration.motions.allowed import Allowed, GivenLimits, bounded
-from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_allowed, smaller_boxes
+from psdmc.calibration.motions.allowed import (
+    SHARES,
+    TRIES,
+    Allowed,
+    GivenLimits,
+    Try,
+    bounded,
+    first_allowed,
+    smaller_boxes,
+)
 from psdmc.calibration.motions.criterion import all_columns, inertial_columns
 from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
 from psdmc.calibration.motions.excite_options import ExciteOptions

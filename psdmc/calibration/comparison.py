@@ -3,184 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from psdmc.calibration.columns.columns import Columns
-from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.quality import qualities
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.compared import Comparison, Difference
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.sources import LogNaming
-from psdmc.calibration.validation import opened_logs
-from psdmc.calibration.verdict.delivered import Delivered, delivered, linear_torque, predicted_rows
+from psdmc.calibration.torque_differences import Side, errors_on_logs, friction_curves, joint_differences
+from psdmc.calibration.verdict.delivered import delivered
 from psdmc.errors import InputError
-from psdmc.friction.law import At
-from psdmc.friction.state import STATE_LAW
-from psdmc.model import recursive
-from psdmc.model.calibrated import LINEAR, OrNaN, Prediction, Remark
-from psdmc.model.calibrated_json import plain
+from psdmc.model.calibrated import Remark
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.grounds import OrInf
 from psdmc.model.load import ROBOT_FILES, model_of
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes
 from psdmc.robot.load import load_robot
-from psdmc.robot.mechanism import Limits, Mechanism, Placement
-
-STATES, SEED = 2_000, 20_159
-"""States of the workspace at which torques are compared: the largest of them is then exceeded in one state of a thousand."""
-SPEED, ACCELERATION = 3.0, 5.0
-"""rad/s and rad/s^2 (m/s, m/s^2) of joints without limits."""
-CURVE = 81
-"""Speeds of a friction curve."""
-NOTICEABLE = 0.05
-"""Share of a joint's RMS torque from which a controller notices a difference: feed-forward by the model is rarely better."""
-SURE = 3.0
-"""Standard deviations from which two values differ."""
-SAME_PLACE = 1e-6
-"""m, and rad: farther apart, two joints are not the same."""
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """One value, such as a base parameter, in two models a and b. `std` is the standard deviation of b - a, infinite if
-    unknown."""
-
-    name: str
-    equation: str
-    unit: str
-    a: OrNaN
-    b: OrNaN
-    std: OrInf
-
-    @property
-    def sigmas(self) -> float:
-        """Return the difference b - a of the value, divided by its standard deviation; NaN if that is unknown."""
-        return (self.b - self.a) / self.std if 0.0 < self.std < np.inf else float("nan")
-
-
-@dataclass(frozen=True, slots=True)
-class JointDifference:
-    """How the torques of two models a and b differ for one joint over the workspace, N m (N).
-
-    rms, largest  RMS and largest magnitude of the difference, torque of b minus torque of a
-    typical       RMS of the torque of a
-    gravity       RMS of the difference of gravity torques
-    friction      RMS of the difference of friction torques
-    inertia       largest relative difference of the inertia about the joint's axis
-    """
-
-    joint: str
-    unit: str
-    rms: float
-    largest: float
-    typical: float
-    gravity: float
-    friction: float
-    inertia: float
-
-    @property
-    def share(self) -> float:
-        return self.rms / self.typical if self.typical else 0.0
-
-    @property
-    def words(self) -> str:
-        return (
-            f"{self.joint}: feed-forward torque differs by {self.rms:.3g} {self.unit} RMS, {self.share:.0%} of the torque, "
-            f"and by {self.largest:.3g} {self.unit} at most; gravity {self.gravity:.2g}, friction {self.friction:.2g} "
-            f"{self.unit} RMS; the joint's inertia by up to {self.inertia:.0%}"
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """Friction torque of two models against the speed of one joint, while the other joints rest."""
-
-    joint: str
-    unit: str
-    speed: tuple[float, ...]
-    a: tuple[float, ...]
-    b: tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class OnLog:
-    """The errors of two models on the logs for one joint: R^2, RMS and largest error of the predicted torque, N m (N).
-    Each is a pair, for model a and model b."""
-
-    joint: str
-    unit: str
-    r2: tuple[OrNaN, OrNaN]
-    rms: tuple[float, float]
-    largest: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """The result of comparing two models of one robot.
-
-    a, b        names of the models
-    doubts      warnings that a user should read first
-    parameters  base parameters of both models, with the numbering and equations of model a
-    friction    friction values of both models
-    chi2        statistic of a chi-squared test that all base parameters are equal; NaN without standard deviations
-    freedom     degrees of freedom of this test
-    chance      probability that equal robots would give a chi2 of at least this size; NaN without standard deviations
-    joints      differences of torques for each joint
-    curves      friction torque against speed for each joint
-    on_log      errors of both models on logs for each joint
-    """
-
-    robot: str
-    a: str
-    b: str
-    doubts: tuple[str, ...]
-    parameters: tuple[Difference, ...]
-    friction: tuple[Difference, ...]
-    chi2: OrNaN
-    freedom: int
-    chance: OrNaN
-    joints: tuple[JointDifference, ...]
-    curves: tuple[Curve, ...] = ()
-    on_log: tuple[OnLog, ...] = ()
-
-    @property
-    def surely(self) -> tuple[Difference, ...]:
-        """Return the values that differ by more than three standard deviations. The values with the largest difference,
-        in standard deviations, come first."""
-        own = [row for row in (*self.parameters, *self.friction) if abs(row.sigmas) > SURE]
-        return tuple(sorted(own, key=lambda row: -abs(row.sigmas)))
-
-    @property
-    def noticed(self) -> tuple[JointDifference, ...]:
-        """Return the joints whose torques differ by more than the share NOTICEABLE, which is large enough to matter for
-        a controller."""
-        return tuple(joint for joint in self.joints if joint.share > NOTICEABLE)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result as plain values; numbers that are not finite become null."""
-        values = asdict(self) | {"noticed": [joint.joint for joint in self.noticed]}
-        for name in ("parameters", "friction"):
-            for row, own in zip(values[name], getattr(self, name), strict=True):
-                row["sigmas"] = own.sigmas
-        values["codes"] = {"doubts": [getattr(text, "code", "") for text in self.doubts]}
-        found: dict[str, Any] = plain(values)
-        return found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Side:
-    """One of the two, with its (l, l) covariance if known; found: what its calibration found."""
-
-    name: str
-    model: DynamicsModel
-    covariance: Array | None
-    found: Delivered | None
+from psdmc.robot.mechanism import Mechanism, Placement
 
 
 def compare(
@@ -197,8 +38,11 @@ def compare(
     a                 a model, or the path of its file
     b                 another model of the robot, the path of its file, or the path of a robot file (URDF, MJCF, DH table)
     logs              logs on which psdmc tests both models; at least one of them must then be calibrated
-    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: the models'
-    naming            topic of the joint states in the logs, and joint names that differ from the model's
+    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the
+                      models
+    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
+                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
+                      differ
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if a file is missing, a model has no values, or the models are of different robots.
@@ -210,7 +54,7 @@ def compare(
         raise InputError("psdmc compares models without joints that follow others", "lock those that do")
     second = _like(first, b)
     require_same_robot(first.mechanism, second.mechanism)
-    _require_same_base_parameters(first, second)
+    require_same_base_parameters(first, second)
     own, other = _side(_name(a, first), first), _side(_name(b, second), second)
     parameters, chi2, freedom = _parameters(first, own, other)
     progress("torques over the workspace")
@@ -226,9 +70,11 @@ def compare(
         chi2=chi2,
         freedom=freedom,
         chance=float(stats.chi2.sf(chi2, freedom)) if freedom else float("nan"),
-        joints=_joints(own, other, both),
-        curves=_curves(own, other) if both else (),
-        on_log=_on_log(own, other, paths, torque_constants, naming or LogNaming(), progress) if paths else (),
+        joints=joint_differences(own, other, both),
+        curves=friction_curves(own, other) if both else (),
+        on_log=errors_on_logs(own, other, paths, torque_constants, naming or LogNaming(), progress)
+        if paths
+        else (),
     )
 
 
@@ -250,7 +96,7 @@ def _like(first: DynamicsModel, given: DynamicsModel | str | Path) -> DynamicsMo
     return replace(first, mechanism=chain, theta_b=theta_b, calibrated=None)
 
 
-def _side(name: str, model: DynamicsModel) -> _Side:
+def _side(name: str, model: DynamicsModel) -> Side:
     kept = model.calibrated
     if model.theta_b is None:
         raise InputError(
@@ -260,14 +106,14 @@ def _side(name: str, model: DynamicsModel) -> _Side:
     covariance = None if kept is None else kept.covariance
     if kept is not None and covariance is None:
         covariance = np.diag(np.where(np.isfinite(kept.std), kept.std, UNKNOWN) ** 2)
-    return _Side(name, model, covariance, found)
+    return Side(name, model, covariance, found)
 
 
 UNKNOWN = 1e6
 """SI, standard deviation of a value that an older file does not know: so large that no difference counts."""
 
 
-def _doubts(*sides: _Side) -> list[Remark]:
+def _doubts(*sides: Side) -> list[Remark]:
     kept = [(side.name, side.model.calibrated) for side in sides]
     old = [name for name, own in kept if own is not None and own.covariance is None]
     exact = [name for name, own in kept if own is None]
@@ -286,7 +132,62 @@ def _doubts(*sides: _Side) -> list[Remark]:
     return found
 
 
+# Values
+
+
+def _parameters(first: DynamicsModel, a: Side, b: Side) -> tuple[tuple[Difference, ...], float, int]:
+    """Base parameters of both, the chi-square of their differences, and its degrees of freedom."""
+    values = [side.model.known_theta_b() for side in (a, b)]
+    known = [side.covariance for side in (a, b) if side.covariance is not None]
+    together = sum(known[1:], start=known[0]) if known else np.full((first.l, first.l), np.nan)
+    std = np.sqrt(np.diag(together)) if known else np.full(first.l, np.inf)
+    rows = tuple(
+        Difference(
+            f"theta_b[{k}]", row.equation, row.unit, float(values[0][k]), float(values[1][k]), float(std[k])
+        )
+        for k, row in enumerate(first.base_parameters)
+    )
+    if not known:
+        return rows, float("nan"), 0
+    shown = np.flatnonzero(std > 0.0)
+    size = std[shown]
+    variances, axes = np.linalg.eigh(together[np.ix_(shown, shown)] / np.outer(size, size))
+    kept = variances > ROUNDING * variances.max(initial=0.0)
+    along = axes[:, kept].T @ ((values[1] - values[0])[shown] / size) / np.sqrt(variances[kept])
+    return rows, float(along @ along), int(kept.sum())
+
+
+ROUNDING = 1e-12
+"""Share of the largest variance below which one is rounding."""
+
+
+def _friction(a: Side, b: Side) -> tuple[Difference, ...]:
+    """Friction and springs that both models have by the same names."""
+    tables = []
+    for side in (a, b):
+        kept = side.model.calibrated
+        assert kept is not None
+        tables.append({(row.joint, row.name): row for row in (*kept.friction, *kept.springs, *kept.motors)})
+    one, two = tables
+    return tuple(
+        Difference(
+            f"{key[1]} of {key[0]}",
+            "",
+            row.unit,
+            row.value,
+            two[key].value,
+            float(np.hypot(row.std, two[key].std)),
+        )
+        for key, row in one.items()
+        if key in two
+    )
+
+
 # The same robot
+
+
+SAME_PLACE = 1e-6
+"""m, and rad: farther apart, two joints are not the same."""
 
 
 def require_same_robot(a: Mechanism, b: Mechanism) -> None:
@@ -328,191 +229,11 @@ def _places(chain: Mechanism) -> list[tuple[Placement, Placement]]:
     return [(place, place @ joint.link_frame) for place, joint in zip(found, chain.joints, strict=True)]
 
 
-def _require_same_base_parameters(a: DynamicsModel, b: DynamicsModel) -> None:
-    """InputError unless both number the same base parameters: B in echelon form is the same for the same assumptions."""
+def require_same_base_parameters(a: DynamicsModel, b: DynamicsModel) -> None:
+    """Raise InputError unless two models number the same base parameters. The matrix B in echelon form is the same for
+    the same assumptions."""
     if a.B.shape != b.B.shape or not np.allclose(a.B, b.B, rtol=SAME_PLACE, atol=SAME_PLACE):
         raise InputError(
             f"the models have other base parameters: {a.l} and {b.l}",
             "derive both with the same --drive-inertia, --assume-zero and --unknown",
         )
-
-
-# Values
-
-
-def _parameters(first: DynamicsModel, a: _Side, b: _Side) -> tuple[tuple[Difference, ...], float, int]:
-    """Base parameters of both, the chi-square of their differences, and its degrees of freedom."""
-    values = [side.model.known_theta_b() for side in (a, b)]
-    known = [side.covariance for side in (a, b) if side.covariance is not None]
-    together = sum(known[1:], start=known[0]) if known else np.full((first.l, first.l), np.nan)
-    std = np.sqrt(np.diag(together)) if known else np.full(first.l, np.inf)
-    rows = tuple(
-        Difference(
-            f"theta_b[{k}]", row.equation, row.unit, float(values[0][k]), float(values[1][k]), float(std[k])
-        )
-        for k, row in enumerate(first.base_parameters)
-    )
-    if not known:
-        return rows, float("nan"), 0
-    shown = np.flatnonzero(std > 0.0)
-    size = std[shown]
-    variances, axes = np.linalg.eigh(together[np.ix_(shown, shown)] / np.outer(size, size))
-    kept = variances > ROUNDING * variances.max(initial=0.0)
-    along = axes[:, kept].T @ ((values[1] - values[0])[shown] / size) / np.sqrt(variances[kept])
-    return rows, float(along @ along), int(kept.sum())
-
-
-ROUNDING = 1e-12
-"""Share of the largest variance below which one is rounding."""
-
-
-def _friction(a: _Side, b: _Side) -> tuple[Difference, ...]:
-    """Friction and springs that both models have by the same names."""
-    tables = []
-    for side in (a, b):
-        kept = side.model.calibrated
-        assert kept is not None
-        tables.append({(row.joint, row.name): row for row in (*kept.friction, *kept.springs, *kept.motors)})
-    one, two = tables
-    return tuple(
-        Difference(
-            f"{key[1]} of {key[0]}",
-            "",
-            row.unit,
-            row.value,
-            two[key].value,
-            float(np.hypot(row.std, two[key].std)),
-        )
-        for key, row in one.items()
-        if key in two
-    )
-
-
-# Torques
-
-
-def _range(limits: Limits, turns: bool) -> tuple[float, float]:
-    full = np.pi if turns else 1.0
-    low = limits.lower if np.isfinite(limits.lower) else -full
-    return low, limits.upper if np.isfinite(limits.upper) else full
-
-
-def _states(chain: Mechanism) -> tuple[Array, Array, Array]:
-    """q, qd, qdd (STATES, n) within the joints' limits: the same for the same robot."""
-    draw = np.random.default_rng(SEED).uniform(-1.0, 1.0, (3, STATES, len(chain)))
-    low, high = np.array([_range(j.limits, j.type.effort_unit == "N m") for j in chain.joints]).T
-    speed = np.array([j.limits.speed if np.isfinite(j.limits.speed) else SPEED for j in chain.joints])
-    hard = [
-        j.limits.acceleration if np.isfinite(j.limits.acceleration) else ACCELERATION for j in chain.joints
-    ]
-    return low + (high - low) * 0.5 * (draw[0] + 1.0), speed * draw[1], np.array(hard) * draw[2]
-
-
-def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
-    """Return the friction torque (N samples, n joints) without springs. For LuGre friction, whose state is the
-    deflection of bristles, return the torque in steady sliding."""
-    names = found.model.joint_names
-    if found.prediction.is_linear:
-        still = np.zeros_like(q)
-        plain_ones = replace(found, extra=np.where(found.columns.of_springs, 0.0, found.extra))
-        x = found.model.equivalent_parameters()
-        return linear_torque(plain_ones, q, qd, still) - recursive.torques(
-            found.model.mechanism, x, [q, qd, still]
-        )
-    torque, state = np.zeros_like(qd), STATE_LAW.state
-    assert state is not None
-    for k, name in enumerate(names):
-        if name in found.prediction.runs:
-            p = [found.friction[name, value] for value in STATE_LAW.parameters]
-            v = qd[:, k]
-            fall = state.rate(p, v, 0.0) - state.rate(p, v, 1.0)  # dz/dt is linear in z
-            z = np.divide(state.rate(p, v, 0.0), fall, out=np.zeros_like(v), where=fall != 0.0)
-            torque[:, k] = STATE_LAW.torque(p, At(v=v, z=z))
-    return torque
-
-
-def _joints(a: _Side, b: _Side, both: bool) -> tuple[JointDifference, ...]:
-    chain = a.model.mechanism
-    q, qd, qdd = _states(chain)
-    still = np.zeros_like(q)
-    whole, weight, rubbed, inertia = [], [], [], []
-    for side in (a, b):
-        x = side.model.equivalent_parameters()
-        rubbed.append(friction_of(side.found, q, qd) if both and side.found is not None else still)
-        whole.append(recursive.torques(side.model.mechanism, x, [q, qd, qdd]) + rubbed[-1])
-        weight.append(recursive.torques(side.model.mechanism, x, [q, still, still]))
-        masses = recursive.mass_matrix(side.model.mechanism, x, q)
-        inertia.append(np.diagonal(masses, axis1=1, axis2=2))
-    rms, typical, gravity, friction = (
-        np.sqrt(np.mean(values**2, axis=0))
-        for values in (whole[1] - whole[0], whole[0], weight[1] - weight[0], rubbed[1] - rubbed[0])
-    )
-    heavier = np.max(np.abs(inertia[1] - inertia[0]) / np.abs(inertia[0]).max(axis=0), axis=0)
-    largest = np.abs(whole[1] - whole[0]).max(axis=0)
-    return tuple(
-        JointDifference(
-            joint.name,
-            joint.type.effort_unit,
-            *(float(x[k]) for x in (rms, largest, typical, gravity, friction, heavier)),
-        )
-        for k, joint in enumerate(chain.joints)
-    )
-
-
-def _curves(a: _Side, b: _Side) -> tuple[Curve, ...]:
-    assert a.found is not None
-    assert b.found is not None
-    chain = a.model.mechanism
-    middle = np.array([0.5 * sum(_range(j.limits, j.type.effort_unit == "N m")) for j in chain.joints])
-    q = np.tile(middle, (CURVE, 1))
-    found = []
-    for k, joint in enumerate(chain.joints):
-        top = joint.limits.speed if np.isfinite(joint.limits.speed) else SPEED
-        qd = np.zeros_like(q)
-        qd[:, k] = np.linspace(-top, top, CURVE)
-        curves = [tuple(friction_of(side, q, qd)[:, k].tolist()) for side in (a.found, b.found)]
-        found.append(Curve(joint.name, joint.type.effort_unit, tuple(qd[:, k].tolist()), *curves))
-    return tuple(found)
-
-
-def _on_log(
-    a: _Side,
-    b: _Side,
-    paths: Sequence[str | Path],
-    torque_constants: Mapping[str, float] | None,
-    naming: LogNaming,
-    progress: Progress,
-) -> tuple[OnLog, ...]:
-    known = a.found or b.found
-    if known is None:
-        raise InputError(
-            "neither model is calibrated, so psdmc knows no filter for the log", "calibrate one of them"
-        )
-    logs, constants = opened_logs(known, paths, naming, progress)
-    given = torque_constants or constants or known.constants or None
-    names = a.model.joint_names
-    motors = motors_of_logs(names, logs, given if one_quantity(logs) == "current" else None)
-    measured, errors = [], []
-    for side in (a, b):
-        found = side.found or _without_friction(known, side.model)
-        found = replace(found, prediction=replace(found.prediction, steps={"all": known.step.used}))
-        parts = [predicted_rows(found, log, known.linear.check, motors) for log in logs]
-        measured.append(np.concatenate([part.measured for part in parts]))
-        errors.append(measured[-1] - np.concatenate([part.predicted for part in parts]))
-    r2 = [[x.r2 for x in qualities(m, m - e)] for m, e in zip(measured, errors, strict=True)]
-    rms, largest = [np.sqrt(np.mean(e**2, axis=0)) for e in errors], [np.abs(e).max(axis=0) for e in errors]
-    return tuple(
-        OnLog(
-            joint.name,
-            joint.type.effort_unit,
-            *((float(x[0][k]), float(x[1][k])) for x in (r2, rms, largest)),
-        )
-        for k, joint in enumerate(a.model.mechanism.joints)
-    )
-
-
-def _without_friction(known: Delivered, model: DynamicsModel) -> Delivered:
-    """A model that was not calibrated, with the filter of one that was."""
-    law = Prediction(LINEAR, {"all": known.step.used}, sign_speed=1.0)
-    none = {(joint, name): 0.0 for joint in model.joint_names for term in law.terms for name in term.names}
-    return Delivered(model, law, none, {}, {}, Columns())

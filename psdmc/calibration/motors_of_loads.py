@@ -11,9 +11,8 @@ import numpy as np
 from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.motor import MotorResult
-from psdmc.calibration.identify.motor_constants import one_quantity, require_constants
 from psdmc.calibration.identify.motor_logs import motors_by_load
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Motors, one_quantity, require_constants
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import judged
 from psdmc.calibration.logs.log_checks import checked

@@ -14,11 +14,17 @@ from psdmc.calibration.columns.columns import Columns
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import names_of
-from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load
-from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.physical_load import about_centre, nearest_load
+from psdmc.calibration.identify.load_fit import (
+    LOAD,
+    LOAD_NAMES,
+    LoadFit,
+    about_centre,
+    fit_load,
+    nearest_load,
+)
+from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
-from psdmc.calibration.identify.quality import qualities
+from psdmc.calibration.identify.residuals import qualities
 from psdmc.calibration.identify.visibility import Visibility, visibility
 from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array

@@ -1,9 +1,10 @@
-"""An identified load: its values with standard deviations, its verdict, and its file."""
+"""An identified load: its values with standard deviations, its verdict, and its file. A known load is also read
+from four numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,41 +12,34 @@ from typing import Any
 import numpy as np
 
 from psdmc.atomic import write_whole
+from psdmc.calibration.campaign_file import LARGEST_ARM, LARGEST_MASS, SMALLEST_MASS
+from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import read_toml
 from psdmc.errors import InputError
 from psdmc.model.calibrated import Verdict
-from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.inertia import INERTIA_NAMES, inertia_matrix, six_of
 
 WHAT = "a load's file (.toml), as psdmc payload writes one"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PayloadFound:
-    """A load on a frame of a robot. A standard deviation is infinite if the logs do not determine the number by
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PayloadFound(KnownLoad):
+    """A load that was identified from logs. A standard deviation is infinite if the logs do not determine the number by
     itself.
 
-    mass, com, inertia   kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz)
-    visible              what the logs show of each of the ten linear parameters, in words
-    notes                notes for the user, one sentence each
+    visible  what the logs show of each of the ten linear parameters, in words
+    notes    notes for the user, one sentence each
     """
 
     robot: str
     frame: str
-    mass: float
-    com: Array
-    inertia: Array
     mass_std: float
     com_std: Array
     inertia_std: Array
     visible: Mapping[str, str]
     verdict: Verdict
     notes: tuple[str, ...]
-
-    def added_to(self, model: DynamicsModel) -> DynamicsModel:
-        """Return the model with this load attached."""
-        return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
 
     def lines(self) -> list[str]:
         """Return the load as lines of text: the arguments of R_add_payload with standard deviations."""
@@ -86,22 +80,7 @@ class PayloadFound:
         write_whole(path, self.as_toml())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LoadFile:
-    """The content of a load file; its fields are those of PayloadFound."""
-
-    frame: str
-    mass: float
-    com: Array
-    inertia: Array
-
-    def added_to(self, model: DynamicsModel) -> DynamicsModel:
-        """Return the model with this load attached. Raises InputError if no real body has these values, or if the
-        model has no such frame."""
-        return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
-
-
-def read_load(path: str | Path) -> LoadFile:
+def read_load(path: str | Path) -> KnownLoad:
     """Return a load from its file. Raises InputError with what is wrong in the file."""
     content = read_toml(Path(path), WHAT)
     numbers = {
@@ -113,7 +92,7 @@ def read_load(path: str | Path) -> LoadFile:
         wrong = ", ".join([*missing, *([] if isinstance(frame, str) else ["frame"])])
         raise InputError(f"{path}: {wrong}: missing or no such numbers", f"expected {WHAT}")
     mass, com, inertia = (np.asarray(value) for value in numbers.values())
-    return LoadFile(frame, float(mass[0]), com, inertia)
+    return KnownLoad(float(mass[0]), com, inertia, frame)
 
 
 def _numbers(value: Any, count: int) -> Array | None:
@@ -151,3 +130,28 @@ def _text(text: str) -> str:
         f"\\u{ord(c):04x}" if ord(c) < 0x20 or ord(c) == 0x7F else f"\\{c}" if c in '"\\' else c for c in text
     )
     return f'"{escaped}"'
+
+
+HINT = "write MASS,X,Y,Z: kg, and m to the centre of mass in the tip's frame; or a load's file (.toml) with its inertia"
+
+
+def given_load(source: str | Path | Sequence[float]) -> KnownLoad:
+    """Return the known load from text 'MASS,X,Y,Z', from four numbers, or from a file that `psdmc payload` wrote. The
+    numbers are the mass (kg) and the centre of mass (m, in the tip frame) of a point mass. Raises InputError if the
+    load is wrong."""
+    if isinstance(source, Path) or (isinstance(source, str) and source.lower().endswith(".toml")):
+        return read_load(source)
+    words = source.split(",") if isinstance(source, str) else source
+    try:
+        numbers = [float(word) for word in words]
+    except (TypeError, ValueError):
+        raise InputError(f"load: {source!r} is no four numbers", HINT) from None
+    if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
+        raise InputError(f"load: {source!r} is no four numbers", HINT)
+    mass, *com = numbers
+    if not SMALLEST_MASS <= mass <= LARGEST_MASS or max(map(abs, com)) > LARGEST_ARM:
+        raise InputError(
+            f"load: {mass:g} kg at {com}: expected {SMALLEST_MASS:g} to {LARGEST_MASS:g} kg within {LARGEST_ARM:g} m",
+            HINT,
+        )
+    return KnownLoad(mass, np.array(com), np.zeros(6))

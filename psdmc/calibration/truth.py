@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -41,13 +41,7 @@ class Comparison:
         ]
 
     def as_json(self) -> dict[str, Any]:
-        return {
-            "torque_constant": self.torque_constant,
-            "gravity": self.gravity,
-            "inertial": self.inertial,
-            "friction": self.friction,
-            "within_three_std": self.within_three_std,
-        }
+        return asdict(self)
 
 
 def compare(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> Comparison:

@@ -18,10 +18,9 @@ from scipy import stats
 from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
-from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_quantity
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
-from psdmc.calibration.identify.quality import qualities
+from psdmc.calibration.identify.residuals import qualities
 from psdmc.calibration.identify.steps import judged
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
@@ -185,11 +184,14 @@ def validate(
     `named` lists the changed parameters.
 
     model             a calibrated model, or the path of its file
-    logs              paths of logs, of a log description (TOML), or of a campaign folder. Of a campaign, psdmc uses the
-                      exciting motions without a load. psdmc judges all logs together
+    logs              paths of logs, the path of a log description (TOML), or a campaign folder that `psdmc excite` wrote.
+                      Of a campaign, psdmc uses the logs of the validation runs. If there are none, psdmc uses those of
+                      the exciting motions (runs of the step "inertial") without a load. There is one verdict on all logs
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the log
                       description or of the model
-    naming            topic of the joint states in the logs, and joint names that differ from the model's
+    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
+                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
+                      differ
     regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
 
@@ -216,7 +218,8 @@ def opened_logs(
 ) -> tuple[list[AnyLog], Mapping[str, float]]:
     """Return the logs of the given paths, and the torque constants (N m/A by joint name) of their log description.
 
-    A path is a log, a log description, or a campaign folder, of which the exciting motions without a load are used.
+    A path is a log, a log description, or a campaign folder. Of a campaign, the logs of the validation runs are used, or
+    if there are none, those of the exciting motions without a load.
     """
     names = found.model.joint_names
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from psdmc.bench.defaults import ROUNDS
-from psdmc.cli.next_step import say_next
-from psdmc.cli.output import check_output
+from psdmc.cli.output import check_output, say_next
 from psdmc.cli.progress import steps
 
 WRONG_STATUS = 5
@@ -30,8 +29,8 @@ def bench(
     """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
     from psdmc.atomic import write_whole
     from psdmc.bench.case import Case
+    from psdmc.bench.results import as_text
     from psdmc.bench.run import Settings, run
-    from psdmc.bench.table import as_text
     from psdmc.model.load import load
     from psdmc.report.bench_page import write_page
 

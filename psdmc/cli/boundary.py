@@ -10,7 +10,7 @@ import sys
 from psdmc.cli import interrupt
 from psdmc.cli.commands import app
 from psdmc.cli.lists import with_numbers_joined
-from psdmc.cli.next_step import one_line
+from psdmc.cli.output import one_line
 from psdmc.errors import CLOSED_STATUS, INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
 
 INTERNAL_STATUS = 70

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psdmc.cli.lists import assignments, names, numbers, parsed_torque_constants
-from psdmc.cli.next_step import one_line, say_next
-from psdmc.cli.output import check_output, check_report
+from psdmc.cli.output import check_output, check_report, one_line, say_next
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 

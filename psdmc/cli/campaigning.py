@@ -18,7 +18,7 @@ from psdmc.calibration.motions.excite_options import (
     chosen_objective,
 )
 from psdmc.cli.lists import assignments, names
-from psdmc.cli.next_step import quoted, say_next_line
+from psdmc.cli.output import quoted, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 
@@ -116,8 +116,7 @@ def excite(
     ] = False,
 ) -> None:
     """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
-    from psdmc.calibration.campaign import CampaignOptions
-    from psdmc.calibration.campaign_summary import summary
+    from psdmc.calibration.campaign import CampaignOptions, summary
     from psdmc.calibration.identify.steps import Load
     from psdmc.calibration.motions.allowed import GivenLimits
     from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions

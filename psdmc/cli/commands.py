@@ -11,7 +11,7 @@ from psdmc.cli.calibrating import calibrate
 from psdmc.cli.campaigning import excite, simulate
 from psdmc.cli.exporting import export_urdf
 from psdmc.cli.loads import payload
-from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
+from psdmc.cli.pipeline import EmitCommand, build, cache, check, derive, emit, emit_c
 from psdmc.cli.sampling import sample
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
@@ -69,4 +69,5 @@ COMMANDS = (
 """Each command with its line in the help."""
 
 for command, line in COMMANDS:
-    app.command(command.__name__.replace("_", "-"), short_help=line)(command)
+    kind = EmitCommand if command in (emit, emit_c) else None
+    app.command(command.__name__.replace("_", "-"), cls=kind, short_help=line)(command)

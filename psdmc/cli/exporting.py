@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.next_step import say_next
-from psdmc.cli.output import check_output
+from psdmc.cli.output import check_output, say_next
 from psdmc.cli.progress import steps
 
 if TYPE_CHECKING:

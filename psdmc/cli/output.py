@@ -1,8 +1,11 @@
-"""Check whether a command may write to its output path, before its work."""
+"""Check whether a command may write to its output path, before its work; and name the next command after it."""
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shlex
+import sys
 from pathlib import Path
 
 from psdmc.atomic import check_place
@@ -40,3 +43,26 @@ def _is_same(one: Path, other: Path) -> bool:
         return os.path.samefile(one, other)
     except OSError:
         return os.path.abspath(one) == os.path.abspath(other)
+
+
+def say_next(*words: object) -> None:
+    """Print `next: psdmc WORDS`, quoted for a shell, to standard error, because standard output has only results."""
+    say_next_line(shlex.join(["psdmc", *map(str, words)]))
+
+
+def quoted(word: object) -> str:
+    """A word as a shell takes it."""
+    return shlex.quote(str(word))
+
+
+def say_next_line(line: str) -> None:
+    """Print `next: LINE` to standard error, after the results. Print nothing if the results cannot be written."""
+    sys.stdout.flush()
+    with contextlib.suppress(OSError):  # whoever closed it does not want to know
+        if sys.stderr is not None:
+            print(f"next: {one_line(line)}", file=sys.stderr)
+
+
+def one_line(text: str) -> str:
+    """Return untrusted text without control characters, which are escaped, so that it fits on one line of a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

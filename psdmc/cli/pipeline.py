@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from psdmc.cli.lists import assignments, names, numbers
-from psdmc.cli.next_step import quoted, say_next, say_next_line
-from psdmc.cli.output import check_output
+from psdmc.cli.output import check_output, quoted, say_next, say_next_line
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 from psdmc.robot.load_options import DEFAULT_SNAP
@@ -255,6 +255,21 @@ def check(
     say_what_a_model_is_for(model, found)
 
 
+class EmitCommand(TyperCommand):
+    """A command whose option --friction has a value or none: `--friction MODEL` is no value MODEL."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line."""
+        return super().parse_args(ctx, [f"{word}=" if word == "--friction" else word for word in args])
+
+
+def _chosen_friction(value: str | None) -> Any:
+    """What the compiler takes: True for --friction alone, else its word."""
+    if value not in (None, "", "in-dynamics"):
+        raise InputError(f"--friction={value}", "type --friction or --friction=in-dynamics")
+    return True if value == "" else value
+
+
 def emit(
     context: typer.Context,
     model: ModelFile,
@@ -312,9 +327,30 @@ def emit(
         typer.Option("--bodies", help="also write R_theta_from_bodies: theta_b from masses and inertias"),
     ] = False,
     friction: Annotated[
-        bool,
-        typer.Option("--friction", help="also write R_friction, for a model calibrated from logs"),
-    ] = False,
+        str | None,
+        typer.Option(
+            "--friction",
+            metavar="[=in-dynamics]",
+            help="also write R_friction, for a model calibrated from logs; =in-dynamics: instead, torques contain friction",
+            callback=_chosen_friction,
+            show_default=False,
+        ),
+    ] = None,
+    smoothing_speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="V",
+            help="rad/s (m/s), with --friction=in-dynamics: the sign of a speed v is tanh(v / V); default: as calibrated",
+        ),
+    ] = None,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="also write R_estimate_step, which estimates a load; mass: its mass and centre, inertia: all of it",
+            autocompletion=lambda: ["mass", "inertia"],
+        ),
+    ] = None,
     adapters: Annotated[
         list[str] | None,
         typer.Option(
@@ -346,7 +382,7 @@ def emit(
     from psdmc.backends.c.adapters import remarks
     from psdmc.backends.protocol import back_end
     from psdmc.backends.write import require_own_folder
-    from psdmc.cli.next_step import one_line
+    from psdmc.cli.output import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
@@ -370,7 +406,9 @@ def emit(
             progress,
             trig,  # type: ignore[arg-type]
             target,
-            **{"payload": payload, "with": names(adapters), "friction": friction, "bodies": bodies},
+            **{"payload": payload, "with": names(adapters), "friction": friction or False, "bodies": bodies},
+            **{"smoothing-speed": smoothing_speed},
+            estimator=estimator,
         )
     written = len(changed) - len(changed.removed)
     print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")
@@ -402,7 +440,7 @@ def emit(
 def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
     """Say in which files a package differs from what the options that it records give; exit status 5 if it does."""
     from psdmc import compiler
-    from psdmc.cli.next_step import one_line
+    from psdmc.cli.output import one_line
 
     typed = {key for key in context.params if str(context.get_parameter_source(key)).endswith("COMMANDLINE")}
     given = {key: context.params[key] for key in sorted(typed - {"model", "output", "check"})}
@@ -411,6 +449,8 @@ def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
         raise InputError(
             "--check writes nothing, and --force is about what is overwritten", "leave out --force"
         )
+    if "smoothing_speed" in given:
+        given["smoothing-speed"] = given.pop("smoothing_speed")
     lists = {"adapters": "with", "functions": "functions"}
     given |= {word: names(given.pop(key)) for key, word in lists.items() if key in given}
     with steps() as progress:

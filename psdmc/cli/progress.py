@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from psdmc.cli.next_step import one_line
+from psdmc.cli.output import one_line
 from psdmc.progress import Progress, Step
 
 PATIENCE = 2.0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from psdmc.cli.next_step import one_line
+from psdmc.cli.output import one_line
 from psdmc.cli.tables import TERMS, Table, print_line, print_note, print_table
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.next_step import say_next
+from psdmc.cli.output import say_next
 from psdmc.cli.pipeline import (
     Packages,
     RootBody,

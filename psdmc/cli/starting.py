@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from psdmc.cli.next_step import say_next, say_next_line
+from psdmc.cli.output import say_next, say_next_line
 
 MISSING_STATUS = 4
 """Something that psdmc cannot do without is missing: change the machine."""

@@ -11,12 +11,11 @@ import typer
 
 from psdmc.cli.calibrating import parsed_joint_map
 from psdmc.cli.lists import parsed_torque_constants
-from psdmc.cli.next_step import say_next
-from psdmc.cli.output import check_report
+from psdmc.cli.output import check_report, say_next
 from psdmc.cli.progress import steps
 
 if TYPE_CHECKING:
-    from psdmc.calibration.comparison import Comparison
+    from psdmc.calibration.compared import Comparison
     from psdmc.calibration.validation import Validation
 
 Report = Annotated[

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from psdmc.cli.next_step import one_line
-from psdmc.cli.output import check_output
+from psdmc.cli.output import check_output, one_line
 from psdmc.cli.pipeline import Packages, RootBody, XacroOption, package_folders, xacro_arguments
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError

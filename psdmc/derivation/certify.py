@@ -24,9 +24,8 @@ from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, Placement
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, Placement
 
-Array = NDArray[np.float64]
 Long = NDArray[Any]
 
 States = Sequence[Sequence[Long]]

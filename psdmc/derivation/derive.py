@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.derivation.certify import judged, measured
 from psdmc.derivation.closed_loops import require_closable
@@ -31,9 +30,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.reproducible import times
 from psdmc.robot.derivable import require_derivable
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
 
 EQUATION_NOISE = 3e-14
 """Relative uncertainty of a coefficient of B: rounding, magnified by the back substitution."""

@@ -26,7 +26,7 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.slices import first_rates, neutral, normalized
 from psdmc.dynamics.torque_rows import echelon_rows
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array
 
 STATES = 32
 """Sampled motions: three for each of the eleven columns that a joint's own link has to tell apart."""
@@ -66,8 +66,6 @@ def _flat(rows: Long) -> Long:
     """All coordinates' rows at one state after those at the one before."""
     return np.ascontiguousarray(rows.swapaxes(0, 1)).reshape(-1, rows.shape[-1])
 
-
-Array = NDArray[np.float64]
 
 # The free tree: the echelon form of the regressor at sampled states, or link by link for long chains.
 SEED = 20_210_156

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.derivation.interpolate import (
     along_axes,
@@ -32,9 +31,7 @@ from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
 from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.joints import JointType
 from psdmc.robot.joints.basis import Basis
-from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

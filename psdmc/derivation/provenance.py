@@ -6,7 +6,6 @@ import hashlib
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
@@ -14,7 +13,7 @@ from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.slices import first_rates, neutral, normalized
 from psdmc.model.random_states import RANGES
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import Array, Mechanism
 
 
 def provenance(loaded: LoadedRobot) -> dict[str, Any]:
@@ -30,8 +29,6 @@ def provenance(loaded: LoadedRobot) -> dict[str, Any]:
         "snap_torque_change": None if effect is None else effect.tolist(),
     }
 
-
-Array = NDArray[np.float64]
 
 SEED = 31_416
 SAMPLES = 256

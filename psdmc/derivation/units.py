@@ -18,10 +18,8 @@ from psdmc.dynamics.scalar import Vector
 from psdmc.reproducible import length
 from psdmc.robot.inertia import LENGTH_ORDER
 from psdmc.robot.joints import JointType
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, Placement
 from psdmc.robot.zeros import leading_rows
-
-Array = NDArray[np.float64]
 
 
 def length_unit(chain: Mechanism) -> float:

@@ -20,7 +20,7 @@ from psdmc.dynamics.twist import momentum as unit_momentum
 def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Twist]:
     """Return, for every joint frame, the velocity of its origin and its angular velocity, along the frame's axes."""
     found: list[Twist] = []
-    for frame, state, rate in zip(frames, _states(frames, q), rates(frames, qd), strict=True):
+    for frame, state, rate in zip(frames, joint_states(frames, q), rates(frames, qd), strict=True):
         before = (ZERO, ZERO) if frame.parent == BASE else found[frame.parent]
         linear, angular = carried(frame, state, before)
         own_linear, own_angular = combined(frame.joint, own_rates(frame.joint, rate))
@@ -55,7 +55,7 @@ def total_momentum(
     momentum.
     """
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
-    return _at_base(frames, _states(frames, q), moving)
+    return _at_base(frames, joint_states(frames, q), moving)
 
 
 @on_coordinates()
@@ -100,7 +100,7 @@ def momentum_matrix(
     robot's real ones, not bodies made from base parameters.
     """
     found: list[list[tuple[Vector, Vector]]] = [[] for _ in frames]
-    placed, states, composites = forward_kinematics(frames, q), _states(frames, q), list(bodies)
+    placed, states, composites = forward_kinematics(frames, q), joint_states(frames, q), list(bodies)
     for i in reversed(range(len(frames))):
         frame, (rotation, origin) = frames[i], placed[i]
         for twist in frame.joint.twists:
@@ -113,7 +113,8 @@ def momentum_matrix(
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-def _states(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[JointState]:
+def joint_states(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[JointState]:
+    """Return every joint's rotation and the origin of its frame, at q."""
     return [
         JointState(joint_turn(frame, value), joint_offset(frame, value))
         for frame, value in zip(frames, positions(frames, q), strict=True)

@@ -3,7 +3,7 @@ the velocities."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.following import matrices_summed, on_coordinates
@@ -103,15 +103,40 @@ def frame_accelerations(
     """Compute six values per named frame: acceleration of its origin, without gravity, then angular acceleration, along
     the base's axes."""
     joints = joints_in_base(frames, q, root)
+    return [
+        (*transform(joints[each.joint][0], linear), *transform(joints[each.joint][0], angular))
+        for each, (linear, angular) in zip(named, _on_joints(frames, named, q, qd, qdd), strict=True)
+    ]
+
+
+@on_coordinates()
+def local_accelerations(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+) -> list[tuple[Scalar, ...]]:
+    """Compute the vectors that `frame_accelerations` computes along the axes of each named frame."""
+    return [
+        (*transform(transpose(_rotation(each)), linear), *transform(transpose(_rotation(each)), angular))
+        for each, (linear, angular) in zip(named, _on_joints(frames, named, q, qd, qdd), strict=True)
+    ]
+
+
+def _on_joints(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+) -> Iterator[tuple[Vector, Vector]]:
+    """Yield the linear and the angular acceleration of each named frame, along the axes of the joint frame that carries
+    it."""
     forward = sweep_outward(frames, q, qd, None, qdd, ZERO)
-    found = []
     for each in named:
-        rotation, motion = joints[each.joint][0], forward.motions[each.joint]
-        arm = as_vector(each.placement.translation.tolist())
-        linear = add(motion.acceleration, transform(motion.spin.field, arm))
-        angular = forward.rates[each.joint].dw_r
-        found.append((*transform(rotation, linear), *transform(rotation, angular)))
-    return found
+        motion, arm = forward.motions[each.joint], as_vector(each.placement.translation.tolist())
+        yield add(motion.acceleration, transform(motion.spin.field, arm)), forward.rates[each.joint].dw_r
 
 
 @on_coordinates(matrices_summed)

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, Placement
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, Placement
 
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Places of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in the matrix, in the order of x."""

@@ -193,23 +193,37 @@ def _blocks(name: str) -> Rule:
 
 
 def _step(name: str) -> Rule:
-    """Of a step in time, from the matrices A by (q, qd) and B by tau."""
-    jacobians = f"{name}_derivatives"
+    """Of a step in time, from the matrices A by (q, qd) and B by tau; with contacts, from B_error and the derivatives of the
+    forces, too."""
+    jacobians, names = f"{name}_derivatives", [each.name for each in SIGNATURES[name].inputs]
+    _, _, *others = (output.name for output in _outputs(name))
+    known = [output.name for output in _outputs(jacobians)]
+
+    def blocks(f: Framework, inputs: Arrays) -> dict[str, Arrays]:
+        """By each input, the derivatives of the state and those of the other outputs."""
+        found, nv = dict(zip(known, f.call(jacobians, *inputs), strict=True)), inputs[1].shape[-1]
+        own = {"q": found["A"][..., :nv], "qd": found["A"][..., nv:], "tau": found["B"]}
+        own |= {each.removeprefix("B_"): found[each] for each in known if each.startswith("B_")}
+        return {by: (block, *(found[f"d{each}_d{by}"] for each in others)) for by, block in own.items()}
 
     def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
-        *_, a, b = f.call(jacobians, *inputs)
-        dq, dqd, dtau, _ = tangents
-        moved = _times(f, a, f.arrays.concatenate((dq, dqd), -1)) + _times(f, b, dtau)
-        nv = dqd.shape[-1]
-        return moved[..., :nv], moved[..., nv:]
+        given = dict(zip(names, tangents, strict=True))
+        by_input = blocks(f, inputs).items()
+        moved = [[_times(f, block, given[by]) for block in own] for by, own in by_input]
+        state, *rest = (sum(others, start=first) for first, *others in zip(*moved, strict=True))
+        nv = inputs[1].shape[-1]
+        return state[..., :nv], state[..., nv:], *rest
 
     def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
-        *_, a, b = f.call(jacobians, *inputs)
-        weights, nv = f.arrays.concatenate(cotangents, -1), cotangents[1].shape[-1]
-        by_state = _weighted(f, weights, a)
-        return (by_state[..., :nv], by_state[..., nv:], _weighted(f, weights, b), None), None
+        weights = (f.arrays.concatenate(cotangents[:2], -1), *cotangents[2:])
+        found = {}
+        for by, own in blocks(f, inputs).items():
+            first, *rest = (_weighted(f, *pair) for pair in zip(weights, own, strict=True))
+            found[by] = sum(rest, start=first)
+        return tuple(found.get(each) for each in names), None
 
-    return Rule(along, back, constant=("dt",))
+    moving = {"q", "qd", "tau", *(each.removeprefix("B_") for each in known if each.startswith("B_"))}
+    return Rule(along, back, constant=tuple(each for each in names if each not in moving))
 
 
 INVERSE, FORWARD = _gradient("inverse_dynamics"), _gradient("forward_dynamics")

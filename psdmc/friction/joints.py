@@ -42,6 +42,13 @@ class Friction:
         """Return whether the friction torque depends on the joints' positions."""
         return any("q" in term.reads for term in self.terms)
 
+    @property
+    def formula(self) -> str:
+        """Return the friction torque of a joint as a formula for people; s is the smooth sign of the speed."""
+        against = " + ".join(term.formula for term in self.terms if term.law.against)
+        others = (term.formula for term in self.terms if not term.law.against)
+        return " + ".join((*((f"s ({against})",) if against else ()), *others))
+
     def by_speed(self, qd: Array) -> Array:
         """Return the friction torque (..., n) at speeds qd (..., n), N m (N for a sliding joint), from the terms that
         do not depend on positions."""

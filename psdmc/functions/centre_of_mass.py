@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,8 @@ from psdmc.dynamics.energy import first_moment
 from psdmc.dynamics.scalar import add, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -27,12 +23,12 @@ def trace(g: Ingredients) -> Outputs:
     return {"c": add(origin, scale(transform(axes, moment), 1.0 / mass))}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, mass = given["q"], sum(body.mass for body in robot.solids)
     return {"c": entries(first_moment(robot.frames, robot.solids, list(q.T)), len(q)) / mass}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def centre(model: Any, data: Any, q: Array) -> Array:

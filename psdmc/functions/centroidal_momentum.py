@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,8 @@ from psdmc.dynamics.momentum import total_momentum
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 INPUTS = (Q, QD)
 MOMENTUM = Quantity(
@@ -35,7 +31,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
     return {"h": [x for part in parts for x in robot.in_base(part)]}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def momentum(model: Any, data: Any, q: Array, qd: Array) -> Array:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +12,8 @@ from psdmc.functions import centroidal_momentum_matrix
 from psdmc.functions.centroidal_momentum import INPUTS, MOMENTUM
 from psdmc.program.signature import Signature, derivative_of
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
@@ -26,7 +22,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
     return {"dh_dq": robot.rows_in_base(found.by_q), "dh_dqd": robot.rows_in_base(found.by_qdd)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:

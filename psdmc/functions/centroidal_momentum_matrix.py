@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from psdmc.dynamics.momentum import momentum_matrix
 from psdmc.dynamics.scalar import Matrix, Scalar, cross, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -42,12 +39,12 @@ def _rows(
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q = given["q"]
     return {"A": entries(_rows(robot.frames, robot.solids, list(q.T), None), len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def matrix(model: Any, data: Any, q: Array) -> Array:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,8 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions.centroidal_momentum_rate import INPUTS, RATE
 from psdmc.program.signature import Signature, derivative_of
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 OUTPUTS = tuple(derivative_of(RATE, quantity) for quantity in INPUTS)
 
@@ -26,7 +22,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
     return {output.name: robot.rows_in_base(rows) for output, rows in zip(OUTPUTS, found, strict=True)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def slopes(model: Any, data: Any, *state: Array) -> Array:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,8 @@ from psdmc.dynamics.momentum import total_momentum_rate
 from psdmc.dynamics.scalar import Scalar, scale
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 INPUTS = (Q, QD, QDD)
 ACCELERATION = Quantity(
@@ -31,7 +27,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
     return {"a": scale(robot.in_base(force), 1.0 / robot.mass)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def acceleration(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:

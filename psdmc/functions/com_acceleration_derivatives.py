@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.centroidal import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_rate_derivatives
 from psdmc.functions.com_acceleration import ACCELERATION, INPUTS
 from psdmc.program.signature import Signature, derivative_of
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
 
 OUTPUTS = tuple(derivative_of(ACCELERATION, quantity) for quantity in INPUTS)
 
@@ -26,7 +19,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
     return {output.name: rows for output, rows in zip(OUTPUTS, blocks, strict=True)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Divide Pinocchio's derivatives of the force by the mass."""
     found = centroidal_momentum_rate_derivatives.RECIPE.pinocchio(robot, given)
     mass = sum(inertia.mass for inertia in list(robot.model.inertias)[1:])

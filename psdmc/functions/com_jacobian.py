@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,8 @@ from psdmc.dynamics.momentum import momentum_matrix
 from psdmc.dynamics.scalar import scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -28,12 +24,12 @@ def trace(g: Ingredients) -> Outputs:
     return {"J": list(zip(*columns, strict=True))}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, mass = given["q"], sum(body.mass for body in robot.solids)
     return {"J": entries(momentum_matrix(robot.frames, robot.solids, list(q.T))[:3], len(q)) / mass}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def jacobian(model: Any, data: Any, q: Array) -> Array:
@@ -58,8 +54,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of the centre of mass of all links: J qd is its velocity along the axes of "
-        "the base frame.",
+        summary="Compute the Jacobian J of the centre of mass of all links: J qd is this point's velocity along "
+        "the axes of the base frame.",
     ),
     "Jacobian of the centre of mass",
     trace,

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.centroidal import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_derivatives
 from psdmc.functions.com_velocity import INPUTS, VELOCITY
 from psdmc.program.signature import Signature, derivative_of
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Needs, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
 
 
 def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
@@ -25,7 +18,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
     return {"dv_dq": by_q, "dv_dqd": by_qd}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Divide Pinocchio's derivatives of the momentum by the mass. Its getCenterOfMassVelocityDerivatives divides by the
     masses of subtrees, and returns NaN if a last link has none."""
     found = centroidal_momentum_derivatives.RECIPE.pinocchio(robot, given)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.dynamics import closed_loops, contacts
@@ -27,13 +24,9 @@ from psdmc.recipes.contacts import (
     held_on_arrays,
 )
 from psdmc.recipes.directions import along
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 KP = Quantity(
     "kp",
@@ -137,7 +130,7 @@ def solved(g: Ingredients) -> Solved:
     return *mask.solved(factors, rows, load, wanted), factors, rows
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     """Return accelerations, contact forces and pivots for tests, from the given state and the accelerations without
     contacts.
 
@@ -157,7 +150,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return {"qdd": free + change, "forces": forces, PIVOTS: pivots}
 
 
-def _stabilised(given: Mapping[str, Array], errors: Array, own: Array, velocity: Array) -> Array:
+def _stabilised(given: Given, errors: Array, own: Array, velocity: Array) -> Array:
     kp, kd = (np.reshape(given[each.name], (-1, 1)) for each in (KP, KD))
     return np.asarray(own + kd * velocity + kp * errors)
 
@@ -166,7 +159,7 @@ def _joined(of_contacts: Array, of_loops: Array) -> Array:
     return np.concatenate([of_contacts, of_loops], axis=1)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from psdmc.dynamics.arrow import any_limbs
 from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
 from psdmc.dynamics.contacts import contact_jacobian as contact_jacobian_of
-from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
-from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product, inverse
 from psdmc.functions import (
     constrained_forward_dynamics,
@@ -42,12 +39,9 @@ from psdmc.recipes.contact_derivatives import (
 )
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, copied
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import torque_derivatives
+from psdmc.robot.mechanism import NamedFrame
 
 WITHOUT = constrained_forward_dynamics.RECIPE
 FREE = forward_dynamics_derivatives.RECIPE.signature
@@ -63,7 +57,7 @@ def trace(g: Ingredients) -> Outputs:
     found, signs, factors, jacobian = constrained_forward_dynamics.solved(g)
     q, qd = g.inputs["q"], g.inputs["qd"]
     (kp,), (kd,), (mu,) = (g.inputs[each.name] for each in (KP, KD, MU))
-    slopes = _torque_derivatives(g, found.motion)
+    slopes = torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
     by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
@@ -94,7 +88,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     of the limbs."""
     q, qd, nv = g.inputs["q"], g.inputs["qd"], len(g.still)
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
-    at_rest = _torque_derivatives(g, g.still)
+    at_rest = torque_derivatives(g, g.still)
     rows = contact_jacobian_of(g.frames, g.named, q, g.root)
     mask, arrow, margins, wanted = constrained_forward_dynamics.of_limbs(g, at_rest.by_qdd, rows, None)
     on, count = mask.rows[0], len(rows)
@@ -102,7 +96,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     by_qd = [*([*row, *[0.0] * count] for row in at_rest.by_qd), *([0.0] * (nv + count) for _ in rows)]
     found = arrow.solved([*load, *wanted], by_qd, [*(0.5 * rate for rate in qd), *[0.0] * count])
     motion, forces = found[:nv], [-value for value in found[nv:]]
-    moving = _torque_derivatives(g, motion)
+    moving = torque_derivatives(g, motion)
     turn = pushed_slopes_of_limbs(g.frames, g.named, q, forces, g.root)
     damped = [x + kd * rate for x, rate in zip(motion, qd, strict=True)]
     slopes = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
@@ -124,13 +118,6 @@ def _in_limbs(g: Ingredients) -> Outputs:
         **thin_outputs(arrow, nv, found_by, "qdd", "forces"),
         PIVOTS: [*arrow.pivots[:nv], *mask.signs(margins)],
     }
-
-
-def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
-    q, qd = g.inputs["q"], g.inputs["qd"]
-    return inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
-    )
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
@@ -197,7 +184,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     return Regions(counts.arrays | arrays, body, MINUS)
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = WITHOUT.reference(robot, given)
     kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
     q, qd = given["q"], given["qd"]
@@ -211,7 +198,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return found | dict(zip(NAMES, (*motions, *forces), strict=True))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = WITHOUT.pinocchio(robot, given)
     kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
     q, qd, qdd = given["q"], given["qd"], found["qdd"]

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.functions import constrained_forward_dynamics_vjp
 from psdmc.program.signature import PIVOTS
 from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted, with_parameter_gradient
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
 from psdmc.recipes.regressor_rows import rows_on_arrays
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STATE = constrained_forward_dynamics_vjp.RECIPE
 """The function without the gradient by theta_b."""
@@ -27,13 +19,13 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, GRADIENT_THETA.name: [-value for value in by_theta], PIVOTS: pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = STATE.reference(robot, given)
     rows = rows_on_arrays(robot, given["q"], given["qd"], found["qdd"])
     return found | {GRADIENT_THETA.name: -weighted(found["grad_tau"], rows)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return the gradient's product with theta_b in its place, from Pinocchio's torques of the computed motion."""
     found = STATE.pinocchio(robot, given)
     tau = robot.inverse_dynamics(given["q"], given["qd"], found["qdd"])

@@ -2,43 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.contacts import contact_drift
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q, QD)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"drift": contact_drift(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    return {"drift": contact_drift(robot.frames, robot.named, q, qd, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    return {"drift": columns(contact_drift(robot.frames, robot.chain.frames, list(q.T), list(qd.T)), len(q))}
+def pinocchio(robot: Reference, given: Given) -> Arrays:
+    return {"drift": accelerations(robot, given, "LOCAL_WORLD_ALIGNED")}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def accelerations(robot: Reference, given: Given, axes: str) -> Array:
+    """Return Pinocchio's accelerations of the contacts at constant joint rates, (k, rows), along `axes`, a name of
+    pinocchio.ReferenceFrame."""
     import pinocchio as pin
 
-    def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
+    along = getattr(pin, axes)
+
+    def of_contacts(model: Any, data: Any, q: Array, qd: Array) -> Array:
         pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
         found = [
-            pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector[:rows]
+            pin.getFrameClassicalAcceleration(model, data, frame, along).vector[:rows]
             for frame, rows in robot.contacts
         ]
         return np.concatenate(found)
 
-    return {"drift": robot.each(accelerations, given["q"], given["qd"])}
+    return robot.each(of_contacts, given["q"], given["qd"])
 
 
 RECIPE = Recipe(
@@ -46,12 +48,12 @@ RECIPE = Recipe(
         "contact_drift",
         320,
         "accelerations of all contacts at constant qd (dJ/dt qd), base frame",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "drift",
                 ("contact_rows",),
-                means=f"accelerations of the contacts (m/s^2, rad/s^2): {ROW_WORDS}",
+                means=f"accelerations (m/s^2, rad/s^2) in the order of the contacts: {ROW_WORDS}",
                 unit="1/s^2",
                 powers=(1,),
             ),
@@ -61,8 +63,7 @@ RECIPE = Recipe(
         "They are (dJ/dt) qd, with the Jacobian J of the contacts.",
     ),
     "contact drift",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameClassicalAcceleration",
     pinocchio,
     beside="contact_jacobian",

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
-from psdmc.recipes.on_arrays import RobotOnArrays, matrix
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q,)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"J": contact_jacobian(g.frames, g.named, g.inputs["q"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    return {"J": contact_jacobian(robot.frames, robot.named, q, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q = given["q"]
-    return {"J": matrix(contact_jacobian(robot.frames, robot.chain.frames, list(q.T)), len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def jacobian(model: Any, data: Any, q: Array) -> Array:
@@ -44,12 +38,12 @@ RECIPE = Recipe(
         "contact_jacobian",
         310,
         "velocities of all contacts per unit joint rate, base frame",
-        (Q,),
+        INPUTS,
         (
             Quantity(
                 "J",
                 ("contact_rows", "nv"),
-                means=f"Jacobian. Its column j is for qd[j], and its rows are those of the contacts: {ROW_WORDS}",
+                means=f"Jacobian. Column j is for qd[j], and the rows are in the order of the contacts: {ROW_WORDS}",
                 unit="1",
                 powers=(1, -1),
             ),
@@ -59,8 +53,7 @@ RECIPE = Recipe(
         "frame.",
     ),
     "contact Jacobian",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "computeFrameJacobian",
     pinocchio,
 )

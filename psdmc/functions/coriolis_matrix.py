@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import moved_by, torques
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -37,7 +29,7 @@ def trace(g: Ingredients) -> Outputs:
     return {"C": list(zip(*columns, strict=True))}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     """Compute column j of the Coriolis matrix as the Slotine-Li torques at the rates qd, with a unit reference rate of
     joint j. All columns are computed in one call, as additional states."""
     nv, count = robot.nv, len(given["q"])
@@ -47,7 +39,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return {"C": np.moveaxis(columns.reshape(nv, count, nv), 0, -1)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"C": robot.coriolis_matrix(given["q"], given["qd"])}
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.dynamics import contacts
@@ -14,13 +11,8 @@ from psdmc.functions import contact_jacobian
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import ROW_WORDS
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.reproducible import solved, times
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -30,14 +22,14 @@ def trace(g: Ingredients) -> Outputs:
     return {"D": projected(factors, rows), "pivot": list(factors.pivots)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q = given["q"]
     rows = contact_jacobian.RECIPE.reference(robot, given)["J"]
     found = times(rows, solved(robot.mass_matrix(q), np.swapaxes(rows, -1, -2)))
     return {"D": (found + np.swapaxes(found, -1, -2)) / 2}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     rows = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     return {"D": rows @ np.linalg.solve(robot.mass_matrix(given["q"]), np.swapaxes(rows, -1, -2))}
 
@@ -52,7 +44,7 @@ RECIPE = Recipe(
             Quantity(
                 "D",
                 ("contact_rows", "contact_rows"),
-                means=f"symmetric matrix. Its rows, and likewise its columns, are those of the contacts: {ROW_WORDS}",
+                means=f"symmetric matrix. Its rows, and likewise its columns, are in the order of the contacts: {ROW_WORDS}",
                 unit="1/(J s^2)",
                 powers=(1, 1),
             ),

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.dynamics.manifold import difference
 from psdmc.program.signature import Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 FROM, TO = (
     Quantity(
@@ -48,12 +42,12 @@ def trace(g: Ingredients) -> Outputs:
     return {"v": difference(g.frames, g.inputs[FROM.name], g.inputs[TO.name])}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     start, end = given[FROM.name], given[TO.name]
     return {"v": columns(difference(robot.frames, list(start.T), list(end.T)), len(start))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def between(model: pin.Model, data: pin.Data, start: Array, end: Array) -> Array:

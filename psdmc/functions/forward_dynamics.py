@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import (
+    Arrays,
+    Given,
+    Ingredients,
+    Outputs,
+    Polynomials,
+    Recipe,
+    Reference,
+    RobotOnArrays,
+)
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -20,13 +21,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"qdd": list(qdd), "pivot": list(pivots)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     """Return the accelerations from which the tests computed the torques. They are exact, whereas a solution with the
     mass matrix loses digits if the matrix is badly conditioned."""
     return {"qdd": given["qdd"]}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"qdd": robot.forward_dynamics(given["q"], given["qd"], given["tau"])}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.arrow import Matrix, any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
@@ -15,14 +14,10 @@ from psdmc.program.products import Product
 from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_of
 from psdmc.program.thin_products import Thin
 from psdmc.recipes.accelerations import MASS_MATRIX
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import less_friction, with_friction_slopes
 from psdmc.reproducible import inverse as inverted
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -46,9 +41,10 @@ def traced(
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
     bias = [0.5 * inner_product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
-    load = [tau - h for tau, h in zip(torques, bias, strict=True)]
+    load = [tau - h for tau, h in zip(less_friction(g, torques), bias, strict=True)]
     accelerations = solve(factors, load)
-    moving = _torque_derivatives(g, accelerations, external)
+    at_rest = with_friction_slopes(g, at_rest)
+    moving = with_friction_slopes(g, _torque_derivatives(g, accelerations, external))
     by_tau = inverse(factors)
     return {
         "dtau_dqd": list(zip(*at_rest.by_qd, strict=True)),
@@ -119,7 +115,7 @@ def _torque_derivatives(
     )
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
     by_tau = inverted(by_qdd)
     return {
@@ -130,7 +126,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     }
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     qdd, by_q, by_qd, by_tau = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
     return {"qdd": qdd, "dqdd_dq": by_q, "dqdd_dqd": by_qd, "dqdd_dtau": by_tau}
 

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
-from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along, solved, torque_slopes
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.directions import DQ, DQD, DTAU, along, along_direction, solved, torque_slopes
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -25,13 +16,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"qdd": qdd, "dqdd": factors.solved(load), "pivot": factors.pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
     load = given[DTAU.name] - along(by_q, given[DQ.name]) - along(by_qd, given[DQD.name])
     return {"qdd": given["qdd"], "dqdd": solved(by_qdd, load)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     qdd, *blocks = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
     by_q, by_qd, by_tau = (along(b, given[d.name]) for b, d in zip(blocks, (DQ, DQD, DTAU), strict=True))
     return {"qdd": qdd, "dqdd": by_q + by_qd + by_tau}
@@ -43,7 +34,7 @@ RECIPE = Recipe(
         190,
         "qdd, and its derivative along (dq, dqd, dtau)",
         (Q, QD, TAU, DQ, DQD, DTAU),
-        (QDD, replace(DQDD, means="derivative of qdd along the direction")),
+        (QDD, along_direction(QDD)),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics, and their derivative dqdd along the direction "
         "(dq, dqd, dtau).",

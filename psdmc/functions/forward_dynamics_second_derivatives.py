@@ -11,10 +11,9 @@ lambda; H_xa is zero unless x is q.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,13 +36,9 @@ from psdmc.program.regions import (
 )
 from psdmc.program.signature import QD, TAU, Q, Signature
 from psdmc.recipes.directions import COTANGENT, COTANGENT_OF_QDD, hessian_of, weighted
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 ACCELERATIONS, TORQUES = accelerations.RECIPE, torques.RECIPE
 
@@ -207,7 +202,7 @@ def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
     return sum(products[1:], products[0])
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = ACCELERATIONS.reference(robot, given)
     slopes = [found[f"dqdd_d{by}"] for by in ("q", "qd", "tau")]
     weights = weighted(given[COTANGENT_OF_QDD.name], slopes[2])
@@ -215,7 +210,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return {"hessian": _solved(hessian, slopes)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """From Pinocchio's derivatives, and differences of its gradient of inverse dynamics. Differences of the gradient of
     forward dynamics would be less exact if the mass matrix is nearly singular."""
     qdd, *slopes = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import (
@@ -17,12 +14,7 @@ from psdmc.recipes.directions import (
     torque_gradients,
     weighted,
 )
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -44,7 +36,7 @@ def trace(g: Ingredients) -> Outputs:
     }
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
     weights = solved(by_qdd, given[COTANGENT.name])
     return {
@@ -55,7 +47,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     }
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     qdd, *blocks = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
     by_q, by_qd, by_tau = (weighted(given[COTANGENT.name], block) for block in blocks)
     return {"qdd": qdd, "grad_q": by_q, "grad_qd": by_qd, "grad_tau": by_tau}

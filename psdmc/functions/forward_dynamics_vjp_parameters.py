@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.functions import forward_dynamics_vjp
 from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted, with_parameter_gradient
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
 from psdmc.recipes.regressor_rows import rows_on_arrays
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STATE = forward_dynamics_vjp.RECIPE
 """The function without the gradient by theta_b."""
@@ -26,13 +18,13 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, GRADIENT_THETA.name: [-value for value in by_theta], "pivot": pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = STATE.reference(robot, given)
     rows = rows_on_arrays(robot, given["q"], given["qd"], given["qdd"])
     return found | {GRADIENT_THETA.name: -weighted(found["grad_tau"], rows)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return what Pinocchio computes for this function, for tests. Pinocchio has no gradient by theta_b. The result
     therefore has its product with theta_b, which is -(grad_tau . tau)."""
     found = STATE.pinocchio(robot, given)

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.directions import solved
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import (
     WRENCHES,
     jacobians_on_arrays,
     times_wrenches,
     wrenches_on_links,
 )
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -27,13 +19,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"qdd": list(qdd), "pivot": list(pivots)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     """Add M^-1 J^T wrenches to the accelerations from which the torques were computed, which are exact."""
     load = times_wrenches(jacobians_on_arrays(robot, given), given[WRENCHES.name])
     return {"qdd": given["qdd"] + solved(robot.mass_matrix(given["q"]), load)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     states = (given[name] for name in ("q", "qd", "tau", WRENCHES.name))
     return {"qdd": robot.forward_dynamics(*states)}
 

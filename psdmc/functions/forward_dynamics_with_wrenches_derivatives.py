@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
@@ -20,8 +19,7 @@ from psdmc.functions import (
 from psdmc.program.regions import Call, Column, For, Reader, Regions, straight
 from psdmc.program.signature import QDD, Signature, derivative_of
 from psdmc.recipes.loops import Block, Product, nonzero
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import (
     WRENCHES,
     acceleration_derivatives,
@@ -31,10 +29,7 @@ from psdmc.recipes.wrenches import (
     wrenches_on_links,
 )
 from psdmc.reproducible import inverse, times
-from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.robot.mechanism import NamedFrame
 
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE
 TORQUES = inverse_dynamics_with_wrenches_derivatives.RECIPE
@@ -118,7 +113,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     )
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     accelerations = ACCELERATIONS.reference(robot, given)
     by_q, by_qd, by_qdd, by_wrenches = TORQUES.reference(robot, {**given, **accelerations}).values()
     by_tau = inverse(by_qdd)
@@ -128,7 +123,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return accelerations | {output.name: block for output, block in zip(BLOCKS, blocks, strict=True)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = acceleration_derivatives(robot, given)
     return {output.name: block for output, block in zip((QDD, *BLOCKS), found, strict=True)}
 

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
 from psdmc.functions import forward_dynamics_with_wrenches, forward_dynamics_with_wrenches_derivatives
-from psdmc.program.signature import Signature
+from psdmc.program.signature import QDD, Signature
 from psdmc.recipes.accelerations import accelerations
-from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, torque_slopes
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.directions import DQ, DQD, DTAU, along_direction, torque_slopes
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import DWRENCHES, WRENCHES, along_all, wrenches_on_links
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE
 BLOCKS = forward_dynamics_with_wrenches_derivatives.RECIPE
@@ -32,15 +23,15 @@ def trace(g: Ingredients) -> Outputs:
     return {"qdd": qdd, "dqdd": factors.solved(load), "pivot": factors.pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return _along(BLOCKS.reference(robot, given), given)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return _along(BLOCKS.pinocchio(robot, given), given)
 
 
-def _along(found: Arrays, given: Mapping[str, Array]) -> Arrays:
+def _along(found: Arrays, given: Given) -> Arrays:
     qdd = found.pop("qdd")
     return {"qdd": qdd, "dqdd": along_all(found, DIRECTIONS, given)}
 
@@ -51,7 +42,7 @@ RECIPE = Recipe(
         436,
         "qdd under external wrenches, and its derivative along (dq, dqd, dtau, dwrenches)",
         (*ACCELERATIONS.signature.inputs, *DIRECTIONS),
-        (*ACCELERATIONS.signature.outputs, replace(DQDD, means="derivative of qdd along the direction")),
+        (*ACCELERATIONS.signature.outputs, along_direction(QDD)),
         theta=True,
         summary="Compute the accelerations qdd that torques cause under external wrenches, and their derivative "
         "dqdd along the direction (dq, dqd, dtau, dwrenches).",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.functions import forward_dynamics_with_wrenches, forward_dynamics_with_wrenches_derivatives
 from psdmc.program.signature import Signature
 from psdmc.recipes.accelerations import accelerations
@@ -17,13 +14,8 @@ from psdmc.recipes.directions import (
     torque_gradients,
     weighted,
 )
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import GRADIENT_WRENCHES, WRENCHES, wrenches_on_links
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE
 BLOCKS = forward_dynamics_with_wrenches_derivatives.RECIPE
@@ -43,15 +35,15 @@ def trace(g: Ingredients) -> Outputs:
     return {"qdd": qdd, **{output.name: block for output, block in blocks}, "pivot": factors.pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return _weighted(BLOCKS.reference(robot, given), given)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return _weighted(BLOCKS.pinocchio(robot, given), given)
 
 
-def _weighted(found: Arrays, given: Mapping[str, Array]) -> Arrays:
+def _weighted(found: Arrays, given: Given) -> Arrays:
     qdd, *blocks = found.values()
     gradients = (weighted(given[COTANGENT.name], block) for block in blocks)
     return {"qdd": qdd, **{output.name: block for output, block in zip(GRADIENTS, gradients, strict=True)}}

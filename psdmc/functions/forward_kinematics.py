@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.named_frames import placed_frames
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q,)
 
 
-def trace(g: Ingredients) -> Outputs:
-    points, rotations = zip(*placed_frames(g.frames, g.named, g.inputs["q"], g.root), strict=True)
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    points, rotations = zip(*placed_frames(robot.frames, robot.named, q, robot.root), strict=True)
     return {"position": points, "rotation": rotations}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q = given["q"]
-    placed = placed_frames(robot.frames, robot.chain.frames, list(q.T))
-    points, rotations = zip(*placed, strict=True)
-    return {"position": entries(points, len(q)), "rotation": entries(rotations, len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def poses(model: Any, data: Any, q: Array) -> Array:
@@ -45,7 +37,7 @@ RECIPE = Recipe(
         "forward_kinematics",
         100,
         "origin (m) and rotation matrix of every named frame in the base frame",
-        (Q,),
+        INPUTS,
         (
             Quantity("position", ("frames", "3"), means="origins of the named frames, m", unit="m"),
             Quantity(
@@ -59,8 +51,7 @@ RECIPE = Recipe(
         summary="Compute the position and the rotation matrix of each named frame in the base frame.",
     ),
     "forward kinematics",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "framesForwardKinematics",
     pinocchio,
 )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,8 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions.frame_acceleration import ACCELERATION, INPUTS
 from psdmc.program.signature import Signature, derivative_of
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 OUTPUTS = tuple(derivative_of(ACCELERATION, quantity) for quantity in INPUTS)
 
@@ -26,7 +22,7 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
     return {"da_dq": found.by_q, "da_dqd": found.by_qd, "da_dqdd": found.by_qdd}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Convert Pinocchio's derivatives of the spatial acceleration along the frame's own axes to those of the acceleration
     of the frame's origin along the base's axes."""
     import pinocchio as pin

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.named_frames import frame_jacobians
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q,)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"J": frame_jacobians(g.frames, g.named, g.inputs["q"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    return {"J": frame_jacobians(robot.frames, robot.named, q, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q = given["q"]
-    return {"J": entries(frame_jacobians(robot.frames, robot.chain.frames, list(q.T)), len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def jacobians(model: Any, data: Any, q: Array) -> Array:
@@ -42,7 +36,7 @@ RECIPE = Recipe(
         "frame_jacobian",
         110,
         "linear then angular velocity of every named frame per unit joint rate, base frame",
-        (Q,),
+        INPUTS,
         (
             Quantity(
                 "J",
@@ -57,8 +51,7 @@ RECIPE = Recipe(
         summary="Compute the Jacobian J of each named frame: J qd is the frame's velocity along the axes of the base frame.",
     ),
     "frame Jacobian",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "computeFrameJacobian",
     pinocchio,
 )

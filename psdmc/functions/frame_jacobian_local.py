@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.named_frames import local_jacobians
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
-
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 
 INPUTS = (Q,)
 
@@ -23,7 +15,7 @@ def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
     return {"J": local_jacobians(robot.frames, robot.named, q)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"J": robot.local_frame_jacobians(given["q"])}
 
 

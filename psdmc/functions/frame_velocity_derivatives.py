@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.named_frames import frame_velocity_slopes
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import OF_Q, QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q, QD)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"dv_dq": frame_velocity_slopes(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    return {"dv_dq": frame_velocity_slopes(robot.frames, robot.named, q, qd, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    slopes = frame_velocity_slopes(robot.frames, robot.chain.frames, list(q.T), list(qd.T))
-    return {"dv_dq": entries(slopes, len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return Pinocchio's derivatives of the frames' velocities, along the base's axes. Pinocchio's derivatives along
     the frame's axes are rotated. The derivative of this rotation, times the velocity, is added."""
     import pinocchio as pin
@@ -51,7 +44,7 @@ RECIPE = Recipe(
         "frame_velocity_derivatives",
         196,
         "d (J qd) / d q: derivatives of every named frame's linear then angular velocity, base frame; those by qd are J",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "dv_dq",
@@ -66,8 +59,7 @@ RECIPE = Recipe(
         "then three angular ones, along the axes of the base frame.",
     ),
     "derivatives of frame velocities",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameVelocityDerivatives",
     pinocchio,
     beside="frame_jacobian",

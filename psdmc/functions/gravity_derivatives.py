@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.functions.gravity import G
 from psdmc.program.signature import Q, Signature, jacobian_of
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -33,13 +25,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"g": found.gravity, "dg_dq": slopes}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     rest = np.zeros_like(given["qd"])
     by_q, _, _ = robot.torque_derivatives(given["q"], rest, rest)
     return {"g": robot.torques(given["q"], rest, rest, robot.base_acceleration), "dg_dq": by_q}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     slopes = robot.each(pin.computeGeneralizedGravityDerivatives, given["q"])

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,12 +28,7 @@ from psdmc.recipes.contacts import (
     held_on_arrays,
 )
 from psdmc.recipes.directions import along
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 
 BEFORE = replace(QD, name="qd_before", means="joint rates before the impact, rad/s or m/s")
 AFTER = replace(QD, name="qd_after", means="joint rates after the impact, rad/s or m/s")
@@ -119,7 +113,7 @@ def _within(restitution: Any, sign: Any) -> Any:
     return Op.SELECT(restitution, 0.0, -1.0, Op.SELECT(1.0, restitution, -1.0, sign))
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
     change, impulses, pivots = held_on_arrays(
         robot, given, lambda jacobian: -(1.0 + restitution) * along(jacobian, before)
@@ -128,7 +122,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return {"qd_after": before + change, "impulses": impulses, PIVOTS: pivots}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     wanted = -(1.0 + restitution) * along(jacobian, before)

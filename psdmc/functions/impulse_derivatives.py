@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -43,12 +42,8 @@ from psdmc.recipes.contact_derivatives import (
 )
 from psdmc.recipes.contacts import ACTIVE, MU, Held
 from psdmc.recipes.loops import Block, Product, added, filled, one_more
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 WITHOUT = impulse.RECIPE
 TORQUES, GRAVITY, INVERSE = (
@@ -173,7 +168,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     return Regions(counts.arrays | arrays, body, MINUS | {"still": (0.0,) * nv})
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = WITHOUT.reference(robot, given)
     q, before, after = given["q"], given[BEFORE.name], found["qd_after"]
     restitution, still = np.reshape(given[RESTITUTION.name], (-1, 1)), np.zeros_like(before)
@@ -187,7 +182,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return found | _named(motions, forces)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = WITHOUT.pinocchio(robot, given)
     q, before, after = given["q"], given[BEFORE.name], found["qd_after"]
     restitution, still = np.reshape(given[RESTITUTION.name], (-1, 1)), np.zeros_like(before)

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.manifold import integrated
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import Q_NEXT, turned
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 WAY = Quantity(
     "v",
@@ -31,11 +23,11 @@ def trace(g: Ingredients) -> Outputs:
     return {"q_next": integrated(g.frames, g.inputs["q"], g.inputs[WAY.name])}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"q_next": turned(robot.frames, given["q"], given[WAY.name])}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"q_next": robot.integrated(given["q"], given[WAY.name])}
 
 

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.recipe import (
+    Arrays,
+    Given,
+    Ingredients,
+    Outputs,
+    Polynomials,
+    Recipe,
+    Reference,
+    RobotOnArrays,
+)
 from psdmc.recipes.torques import torques
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base_acceleration)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"tau": robot.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"tau": robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
 
 

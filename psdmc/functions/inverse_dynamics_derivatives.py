@@ -2,39 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.program.signature import QD, QDD, Q, Signature, jacobian_of
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import torque_derivatives
 
 
 def trace(g: Ingredients) -> Outputs:
-    found = inverse_dynamics_derivatives(
-        g.frames,
-        g.bodies,
-        g.drives,
-        g.inputs["q"],
-        g.inputs["qd"],
-        g.inputs["qdd"],
-        g.base_acceleration,
-        g.choices,
-    )
+    found = torque_derivatives(g, g.inputs["qdd"])
     return {"dtau_dq": found.by_q, "dtau_dqd": found.by_qd, "dtau_dqdd": found.by_qdd}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
     return {"dtau_dq": by_q, "dtau_dqd": by_qd, "dtau_dqdd": by_qdd}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     by_q, by_qd, by_qdd = robot.inverse_dynamics_derivatives(given["q"], given["qd"], given["qdd"])
     return {"dtau_dq": by_q, "dtau_dqd": by_qd, "dtau_dqdd": by_qdd}
 

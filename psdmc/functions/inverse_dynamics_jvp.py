@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.manifold import coordinate_rates
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import slopes
-from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.directions import DQ, DQD, DQDD, along, along_direction
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 DIRECTIONS = (DQ, DQD, DQDD)
 
@@ -29,7 +21,7 @@ def trace(g: Ingredients) -> Outputs:
     return {"tau": tau, "dtau": slopes(tau, [*q, *qd, *qdd], tangent)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     return {
         "tau": robot.torques(q, qd, qdd, robot.base_acceleration),
@@ -37,13 +29,13 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     }
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     states = [given[name] for name in ("q", "qd", "qdd")]
     blocks = robot.inverse_dynamics_derivatives(*states)
     return {"tau": robot.inverse_dynamics(*states), "dtau": _along(blocks, given)}
 
 
-def _along(blocks: tuple[Array, ...], given: Mapping[str, Array]) -> Array:
+def _along(blocks: tuple[Array, ...], given: Given) -> Array:
     by_q, by_qd, by_qdd = (along(block, given[d.name]) for block, d in zip(blocks, DIRECTIONS, strict=True))
     return by_q + by_qd + by_qdd
 
@@ -54,7 +46,7 @@ RECIPE = Recipe(
         188,
         "tau, and its derivative along (dq, dqd, dqdd)",
         (Q, QD, QDD, *DIRECTIONS),
-        (TAU, replace(DTAU, means="derivative of tau along the direction")),
+        (TAU, along_direction(TAU)),
         theta=True,
         summary="Compute the torques tau of inverse dynamics, and their derivative dtau along the direction "
         "(dq, dqd, dqdd).",

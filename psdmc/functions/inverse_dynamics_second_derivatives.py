@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivatives
 from psdmc.program.signature import QD, QDD, Q, Signature
 from psdmc.recipes.directions import COTANGENT, hessian_of, weighted
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques import on_diagonal
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -21,15 +15,22 @@ def trace(g: Ingredients) -> Outputs:
     found = inverse_dynamics_second_derivatives(
         g.frames, g.bodies, q, qd, qdd, weights, g.base_acceleration, g.choices
     )
+    if g.friction is not None:
+        bends = ([w * x for w, x in zip(weights, each, strict=True)] for each in g.friction.bends(q, qd))
+        found = found._replace(
+            by_q_q=on_diagonal(found.by_q_q, next(bends)),
+            by_q_qd=on_diagonal(found.by_q_qd, next(bends)),
+            by_qd_qd=on_diagonal(found.by_qd_qd, next(bends)),
+        )
     return {"hessian": found.hessian}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     states = [given[name] for name in ("q", "qd", "qdd", COTANGENT.name)]
     return {"hessian": robot.torque_hessian(*states)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Differences of the gradient."""
 
     def gradient(*states: Array) -> list[Array]:

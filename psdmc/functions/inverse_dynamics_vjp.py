@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.manifold import pulled_back
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import gradients
 from psdmc.recipes.directions import COTANGENT, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, weighted
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -25,7 +18,7 @@ def trace(g: Ingredients) -> Outputs:
     return {"tau": tau, "grad_q": pulled_back(g.frames, q, by_q), "grad_qd": by_qd, "grad_qdd": by_qdd}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     return _weighted(
         robot.torques(q, qd, qdd, robot.base_acceleration),
@@ -34,7 +27,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     )
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     states = [given[name] for name in ("q", "qd", "qdd")]
     blocks = robot.inverse_dynamics_derivatives(*states)
     return _weighted(robot.inverse_dynamics(*states), blocks, given[COTANGENT.name])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.functions import inverse_dynamics_vjp
 from psdmc.recipes.directions import (
     COTANGENT,
@@ -13,13 +10,8 @@ from psdmc.recipes.directions import (
     weighted,
     with_parameter_gradient,
 )
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
 from psdmc.recipes.regressor_rows import rows_on_arrays
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STATE = inverse_dynamics_vjp.RECIPE
 """The function without the gradient by theta_b."""
@@ -30,12 +22,12 @@ def trace(g: Ingredients) -> Outputs:
     return {**STATE.trace(g), GRADIENT_THETA.name: by_theta}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     rows = rows_on_arrays(robot, given["q"], given["qd"], given["qdd"])
     return STATE.reference(robot, given) | {GRADIENT_THETA.name: weighted(given[COTANGENT.name], rows)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return what Pinocchio computes for this function, for tests. Pinocchio has no gradient by theta_b. The result
     therefore has its product with theta_b, which is the weighted sum of the torques."""
     found = STATE.pinocchio(robot, given)

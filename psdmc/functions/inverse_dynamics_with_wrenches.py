@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
 from psdmc.recipes.wrenches import (
     WRENCHES,
     wrenches_on_arrays,
     wrenches_on_links,
 )
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -25,13 +17,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base_acceleration, external=external)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     external = wrenches_on_arrays(robot, given)
     return {"tau": robot.torques(q, qd, qdd, robot.base_acceleration, external=external)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     states = (given[name] for name in ("q", "qd", "qdd", WRENCHES.name))
     return {"tau": robot.inverse_dynamics(*states)}
 

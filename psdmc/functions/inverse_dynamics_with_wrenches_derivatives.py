@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.functions import inverse_dynamics_with_wrenches
 from psdmc.program.signature import TAU, Signature, derivative_of
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes import torques
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import (
     jacobians_on_arrays,
     jacobians_transposed,
@@ -17,21 +15,13 @@ from psdmc.recipes.wrenches import (
     wrenches_on_arrays,
     wrenches_on_links,
 )
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 TORQUES = inverse_dynamics_with_wrenches.RECIPE.signature
 OUTPUTS = tuple(derivative_of(TAU, quantity) for quantity in TORQUES.inputs)
 
 
 def trace(g: Ingredients) -> Outputs:
-    q, qd, qdd, _ = (g.inputs[quantity.name] for quantity in TORQUES.inputs)
-    external = wrenches_on_links(g)
-    by_q, by_qd, by_qdd, _ = inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices, external
-    )
+    by_q, by_qd, by_qdd, _ = torques.torque_derivatives(g, g.inputs["qdd"], wrenches_on_links(g))
     by_wrenches = [[[-x for x in row] for row in rows] for rows in jacobians_transposed(g)]
     return _named(by_q, by_qd, by_qdd, by_wrenches)
 
@@ -40,13 +30,13 @@ def _named(*blocks: Any) -> dict[str, Any]:
     return {output.name: block for output, block in zip(OUTPUTS, blocks, strict=True)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     external = wrenches_on_arrays(robot, given)
     blocks = robot.torque_derivatives(given["q"], given["qd"], given["qdd"], external)
     return _named(*blocks, -jacobians_on_arrays(robot, given))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return _named(*torque_derivatives(robot, given))
 
 

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.manifold import coordinate_rates
 from psdmc.functions import inverse_dynamics_with_wrenches, inverse_dynamics_with_wrenches_derivatives
-from psdmc.program.signature import Signature
+from psdmc.program.signature import TAU, Signature
 from psdmc.program.slopes import slopes
-from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.directions import DQ, DQD, DQDD, along_direction
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import DWRENCHES, along_all
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 TORQUES = inverse_dynamics_with_wrenches.RECIPE
 BLOCKS = inverse_dynamics_with_wrenches_derivatives.RECIPE
@@ -35,12 +26,12 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, "dtau": slopes(found["tau"], by, tangent)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     blocks = BLOCKS.reference(robot, given)
     return TORQUES.reference(robot, given) | {"dtau": along_all(blocks, DIRECTIONS, given)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     blocks = BLOCKS.pinocchio(robot, given)
     return TORQUES.pinocchio(robot, given) | {"dtau": along_all(blocks, DIRECTIONS, given)}
 
@@ -51,7 +42,7 @@ RECIPE = Recipe(
         444,
         "tau under external wrenches, and its derivative along (dq, dqd, dqdd, dwrenches)",
         (*TORQUES.signature.inputs, *DIRECTIONS),
-        (*TORQUES.signature.outputs, replace(DTAU, means="derivative of tau along the direction")),
+        (*TORQUES.signature.outputs, along_direction(TAU)),
         theta=True,
         summary="Compute the joint torques tau of a motion under external wrenches, and their derivative dtau along "
         "the direction (dq, dqd, dqdd, dwrenches).",

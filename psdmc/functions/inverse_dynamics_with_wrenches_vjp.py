@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.manifold import pulled_back
 from psdmc.functions import inverse_dynamics_with_wrenches, inverse_dynamics_with_wrenches_derivatives
 from psdmc.program.signature import Signature
 from psdmc.program.slopes import gradients
 from psdmc.recipes.directions import COTANGENT, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, weighted
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import GRADIENT_WRENCHES
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 TORQUES = inverse_dynamics_with_wrenches.RECIPE
 BLOCKS = inverse_dynamics_with_wrenches_derivatives.RECIPE
@@ -30,15 +22,15 @@ def trace(g: Ingredients) -> Outputs:
     return {**found, **{output.name: block for output, block in zip(GRADIENTS, blocks, strict=True)}}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return TORQUES.reference(robot, given) | _weighted(BLOCKS.reference(robot, given), given)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return TORQUES.pinocchio(robot, given) | _weighted(BLOCKS.pinocchio(robot, given), given)
 
 
-def _weighted(blocks: Arrays, given: Mapping[str, Array]) -> Arrays:
+def _weighted(blocks: Arrays, given: Given) -> Arrays:
     found = zip(GRADIENTS, blocks.values(), strict=True)
     return {output.name: weighted(given[COTANGENT.name], block) for output, block in found}
 

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.scalar import dot
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -26,12 +19,12 @@ def trace(g: Ingredients) -> Outputs:
     return {"J": turned}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q = given["q"]
     return {"J": matrix(jacobian(robot.frames, robot.chain.tip_body, robot.chain.tip, list(q.T)), len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"J": robot.jacobian(given["q"])}
 
 

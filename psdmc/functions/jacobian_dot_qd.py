@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.named_frames import frame_drifts
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q, QD)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"drift": frame_drifts(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    return {"drift": frame_drifts(robot.frames, robot.named, q, qd, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    drifts = frame_drifts(robot.frames, robot.chain.frames, list(q.T), list(qd.T))
-    return {"drift": entries(drifts, len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
@@ -44,7 +37,7 @@ RECIPE = Recipe(
         "jacobian_dot_qd",
         120,
         "linear then angular acceleration of every named frame at constant qd (dJ/dt qd), base frame",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "drift",
@@ -59,8 +52,7 @@ RECIPE = Recipe(
         "It is (dJ/dt) qd, with the Jacobian J of the frame.",
     ),
     "frame drift",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameClassicalAcceleration",
     pinocchio,
     beside="frame_jacobian",

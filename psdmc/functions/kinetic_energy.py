@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.energy import kinetic_energy
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"T": kinetic_energy(g.frames, g.bodies, g.drives, g.inputs["q"], g.inputs["qd"])}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     return {
         "T": entries(kinetic_energy(robot.frames, robot.bodies, robot.drives, list(q.T), list(qd.T)), len(q))
     }
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return Pinocchio's kinetic energy of the links plus that of the drives. Pinocchio 4.1 leaves out the armature of
     joints about oblique axes in the energy, but not in the mass matrix."""
     import pinocchio as pin

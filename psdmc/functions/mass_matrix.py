@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import (
+    Arrays,
+    Given,
+    Ingredients,
+    Outputs,
+    Polynomials,
+    Recipe,
+    Reference,
+    RobotOnArrays,
+)
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"M": mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"M": robot.mass_matrix(given["q"])}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"M": robot.mass_matrix(given["q"])}
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc import reproducible
@@ -14,12 +11,7 @@ from psdmc.dynamics.solve import inverse
 from psdmc.program.signature import THIN, Q, Quantity, Signature
 from psdmc.program.thin_products import Thin
 from psdmc.recipes.accelerations import MASS_MATRIX
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -29,11 +21,11 @@ def trace(g: Ingredients) -> Outputs:
     return {"Minv": inverse(arrow.factors), "pivot": arrow.pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"Minv": reproducible.inverse(robot.mass_matrix(given["q"]))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     upper = np.triu(robot.each(pin.computeMinverse, given["q"]))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,8 @@ from psdmc.dynamics.momentum import total_momentum
 from psdmc.dynamics.scalar import add, cross, transform
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -28,13 +24,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"h": (*turned, *add(transform(axes, angular), cross(origin, turned)))}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     linear, angular = total_momentum(robot.frames, robot.solids, list(q.T), list(qd.T))
     return {"h": entries((*linear, *angular), len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return Pinocchio's momentum about the centre of mass c, moved to the base's origin: L_O = L_C + c x p."""
     import pinocchio as pin
 

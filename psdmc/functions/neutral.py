@@ -3,31 +3,25 @@ rotation."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from psdmc.dynamics.slices import neutral
 from psdmc.program.signature import Q, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"q": neutral(g.frames)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"q": columns(neutral(robot.frames), len(given["q"]))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     return {"q": robot.each(lambda model, data, q: np.asarray(pin.neutral(model)), given["q"])}

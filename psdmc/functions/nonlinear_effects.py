@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.recipe import (
+    Arrays,
+    Given,
+    Ingredients,
+    Outputs,
+    Polynomials,
+    Recipe,
+    Reference,
+    RobotOnArrays,
+)
 from psdmc.recipes.torques import torques
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"h": torques(g, g.inputs["qd"], g.still, g.base_acceleration)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"h": robot.torques(given["q"], given["qd"], np.zeros_like(given["qd"]), robot.base_acceleration)}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"h": robot.nonlinear_effects(given["q"], given["qd"])}
 
 

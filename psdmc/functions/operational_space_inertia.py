@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,11 +20,8 @@ from psdmc.recipes import contacts
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.pivots import inverse_and_sign
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 MU = replace(contacts.MU, default=None)
 
@@ -70,7 +67,7 @@ def _inverse_and_sign(rows: Rows, mu: Scalar) -> tuple[Rows, Scalar]:
     return found, Op.SELECT(mu, 0.0, -1.0, sign)
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     """Compute the operational-space inertia matrices Lambda of the frames, for tests. Also return the pivots and signs
     that must be positive, or Lambda does not exist."""
     q, mu = list(given["q"].T), np.reshape(given[MU.name], -1)
@@ -87,7 +84,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     }
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def inertias(model: Any, data: Any, q: Array, mu: Array) -> Array:

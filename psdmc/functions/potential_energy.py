@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.energy import potential_energy
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"U": potential_energy(g.frames, g.bodies, g.inputs["q"], g.base_acceleration)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q = given["q"]
     return {
         "U": entries(potential_energy(robot.frames, robot.bodies, list(q.T), robot.base_acceleration), len(q))
     }
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return Pinocchio's potential energy minus its value at q = 0."""
     import pinocchio as pin
 
@@ -45,7 +41,7 @@ RECIPE = Recipe(
         140,
         "potential energy U(q) (J), zero at q = 0; dU/dq = g(q)",
         (Q,),
-        (Quantity("U", means="potential energy, J; zero if no joint has moved (q = 0)", unit="J"),),
+        (Quantity("U", means="potential energy, J; zero at q = neutral()", unit="J"),),
         theta=True,
         summary="Compute the potential energy U(q) of the links, whose derivative by q is the gravity torques g(q).",
     ),

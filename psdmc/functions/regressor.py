@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.recipe import (
+    Arrays,
+    Given,
+    Ingredients,
+    Outputs,
+    Polynomials,
+    Recipe,
+    Reference,
+    RobotOnArrays,
+)
 from psdmc.recipes.regressor_rows import rows_on_arrays, traced_rows
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"Y": traced_rows(g, g.inputs["qdd"])}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"Y": rows_on_arrays(robot, given["q"], given["qd"], given["qdd"])}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"Y": robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
 
 

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.regressor_rows import rows_on_arrays, traced_rows
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
     return {"Y": traced_rows(g, g.inputs["qdd_r"], g.inputs["qd_r"])}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return {"Y": rows_on_arrays(robot, given["q"], given["qd"], given["qdd_r"], given["qd_r"])}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     turned = np.einsum("...ij,...j->...i", robot.mass_matrix(given["q"]), given["qdd_r"])
     coriolis = robot.coriolis_matrix(given["q"], given["qd"])
     carried = np.einsum("...ij,...j->...i", coriolis, given["qd_r"])

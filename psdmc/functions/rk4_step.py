@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.manifold import coordinate_rates, restored
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 MASS_MATRICES = MASS_MATRIX.in_blocks(
     "4",
@@ -37,17 +33,19 @@ def trace(g: Ingredients) -> Outputs:
         pivots.append(found)
         return coordinate_rates(g.frames, q, qd), qdd
 
-    q_next, qd_next = _step((g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt)
+    q_next, qd_next = runge_kutta_step(
+        (g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt
+    )
     return {"q_next": q_next, "qd_next": qd_next, "pivot": pivots}
 
 
-def _step(
+def runge_kutta_step(
     start: State,
     rates: Callable[[Sequence[Scalar], Sequence[Scalar]], State],
     unit: Callable[[Sequence[Scalar]], Sequence[Scalar]],
     dt: Scalar,
 ) -> State:
-    """The state after dt: the slopes at the start, twice in the middle and at the end have the weights 1/6, 2/6, 2/6, 1/6.
+    """Return the state after dt. Slopes at the start, twice in the middle and at the end: weights 1/6, 2/6, 2/6, 1/6.
 
     `rates` are those of q's coordinates and of qd, `unit` makes quaternions of length one. The slopes are of the
     coordinates, and quaternions leave their sphere by the second order of dt between stages: taken back to it at each,
@@ -61,34 +59,36 @@ def _step(
         slopes.append(rates(unit(stepped(q, moved, part)), stepped(qd, pushed, part)))
     sixth = (1.0 / 6.0) * dt
     ways, kicks = zip(*slopes, strict=True)
-    return unit(stepped(q, _total(ways), sixth)), stepped(qd, _total(kicks), sixth)
+    return unit(stepped(q, total_of(ways), sixth)), stepped(qd, total_of(kicks), sixth)
 
 
-def _total(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+def total_of(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+    """Return six times the mean of the slopes at the four stages of a step, entry by entry."""
     return [(a + d) + 2.0 * (b + c) for a, b, c, d in zip(*slopes, strict=True)]
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     def rates(q: Array, qd: Array) -> tuple[Array, Array]:
         moved = coordinate_rates(robot.frames, list(q.T), list(qd.T))
         return columns(moved, len(q)), robot.accelerations(q, qd, given["tau"])
 
-    return _on_arrays(given, rates, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
+    return step_of_arrays(given, rates, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     def rates(q: Array, qd: Array) -> tuple[Array, Array]:
         return robot.coordinate_rates(q, qd), robot.forward_dynamics(q, qd, given["tau"])
 
-    return _on_arrays(given, rates, robot.restored)
+    return step_of_arrays(given, rates, robot.restored)
 
 
-def _on_arrays(
-    given: Mapping[str, Array],
+def step_of_arrays(
+    given: Given,
     rates: Callable[[Array, Array], tuple[Array, Array]],
     unit: Callable[[Array], Array],
 ) -> Arrays:
-    """Take the step on arrays of joints, (k, nq) and (k, nv), instead of lists of numbers."""
+    """Return the state after dt from arrays (k, nq) and (k, nv), in NumPy. Entries of q and qd have rates of their own;
+    those of q are coordinates of joints."""
     dt = step_on_arrays(given)
     q, qd = given["q"], given["qd"]
     first = rates(q, qd)

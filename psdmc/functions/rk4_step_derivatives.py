@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,14 +29,10 @@ from psdmc.program.regions import (
 from psdmc.program.signature import Signature
 from psdmc.recipes.coordinate_maps import CoordinateMaps
 from psdmc.recipes.loops import Block, added, copied, diagonal, filled
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import A, B, step_on_arrays, stepped
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STEP = rk4_step.RECIPE
 ACCELERATIONS = accelerations.RECIPE
@@ -210,7 +206,7 @@ def _moved(
     )
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     def at(q: Array, qd: Array) -> Stage:
         qdd = robot.accelerations(q, qd, given["tau"])
         there = {"q": q, "qd": qd, "qdd": qdd, "tau": given["tau"]}
@@ -220,16 +216,14 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return _on_arrays(given, CoordinateMaps([frame.joint for frame in leading(robot.frames)]), at)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return the step and its Jacobians from Pinocchio's accelerations and their derivatives at the four stages, for
     tests. Pinocchio has no Runge-Kutta step."""
     maps = CoordinateMaps(robot.joint_types)
     return _on_arrays(given, maps, lambda q, qd: robot.forward_dynamics_derivatives(q, qd, given["tau"]))
 
 
-def _on_arrays(
-    given: Mapping[str, Array], maps: CoordinateMaps, at: Callable[[Array, Array], Stage]
-) -> Arrays:
+def _on_arrays(given: Given, maps: CoordinateMaps, at: Callable[[Array, Array], Stage]) -> Arrays:
     """Take the step on (k, nq) and (k, n) arrays. Each stage is one matrix: derivatives of the coordinates' and the
     rates' slopes by (q, qd, tau)."""
     dt, q0, n = step_on_arrays(given), given["q"], given["qd"].shape[-1]

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from psdmc.dynamics.manifold import integrated
 from psdmc.program.signature import QD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped, turned
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -25,15 +20,15 @@ def trace(g: Ingredients) -> Outputs:
     return {"q_next": q_next, "qd_next": rates, "pivot": pivots}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     return _next(given, given["qdd"], lambda q, way: turned(robot.frames, q, way))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return _next(given, robot.forward_dynamics(given["q"], given["qd"], given["tau"]), robot.integrated)
 
 
-def _next(given: Mapping[str, Array], qdd: Array, moved: Callable[[Array, Array], Array]) -> Arrays:
+def _next(given: Given, qdd: Array, moved: Callable[[Array, Array], Array]) -> Arrays:
     dt = step_on_arrays(given)
     rates = given["qd"] + dt * qdd
     return {"q_next": moved(given["q"], dt * rates), "qd_next": rates}

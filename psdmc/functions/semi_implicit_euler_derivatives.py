@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
@@ -14,8 +13,7 @@ from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.regions import Call, Column, For, Reader, Region, Regions, Slice, straight
 from psdmc.program.signature import Signature
 from psdmc.recipes.loops import Block, added, copied, one_more
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import (
     DT,
     A,
@@ -27,9 +25,6 @@ from psdmc.recipes.steps import (
     stepped,
 )
 from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STEP = semi_implicit_euler.RECIPE
 ACCELERATIONS = forward_dynamics_derivatives.RECIPE
@@ -51,12 +46,30 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Regions:
-    """Return the function's body as a call of forward dynamics' derivatives and loops. The arrays are:
+    """Return the function's body as a call of forward dynamics' derivatives and loops. The internal arrays have the call's
+    results (by_q, by_qd and by_tau: derivatives of the accelerations), and those of `state_and_jacobians`."""
+    nv = first_rates(frames)[-1]
+    names = ("by_q", "by_qd", "by_tau")
+    found = (("qdd", 0), *((name, 0) for name in names))
+    call = Call(ACCELERATIONS.name, (("q", 0), ("qd", 0), ("tau", 0)), found, nv)
+    arrays, body = state_and_jacobians(frames, (*names,), (("B", nv),))
+    return Regions({"qdd": nv, "step": 1, **dict.fromkeys(names, nv * nv), **arrays}, (call, *body))
 
-    by_q, by_qd, by_tau  nv x nv, derivatives of the accelerations
-    step                 dt
+
+def state_and_jacobians(
+    frames: Sequence[Frame], blocks: Sequence[str], others: Sequence[tuple[str, int]]
+) -> tuple[dict[str, int], tuple[Region, ...]]:
+    """Return the arrays and the regions that compute the new state, A, and derivatives by other quantities.
+
+    blocks  arrays of the derivatives of the accelerations, by q, by qd and by the other quantities
+    others  name of the output of each other quantity, such as B, and its number of columns
+
+    The arrays are:
+
     start_J, way_J       of joint J of n rates, n x n: derivatives of the new position by the old one, and by the new
                          rates
+
+    The caller has the array qdd of accelerations, and the array step, which gets dt.
     """
     first = first_rates(frames)
     nv = first[-1]
@@ -74,31 +87,28 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
                 found[f"way_{i}"] = [dt * x for row in own.by_way for x in row]
         return {name: Column(values) for name, values in found.items()}
 
-    blocks = (("by_q", "A", 0, 2 * nv), ("by_qd", "A", nv, 2 * nv), ("by_tau", "B", 0, nv))
-    arrays = {"qdd": nv, "step": 1, **{name: nv * nv for name, *_ in blocks}}
-    arrays |= {f"{name}_{i}": n * n for i, n in wide.items() for name in ("start", "way")}
-    body: tuple[Region, ...] = (
-        Call(
-            ACCELERATIONS.name,
-            (("q", 0), ("qd", 0), ("tau", 0)),
-            (("qdd", 0), *((name, 0) for name, *_ in blocks)),
-            nv,
-        ),
+    places = [
+        ("A", 0, nv, 2 * nv),
+        ("A", nv, nv, 2 * nv),
+        *((name, 0, width, width) for name, width in others),
+    ]
+    arrays = {f"{name}_{i}": n * n for i, n in wide.items() for name in ("start", "way")}
+    return arrays, (
         straight(stepped_state),
         *(
-            copied(nv, nv, Block(name, nv), Block(into, width).moved(nv, column), "step")
-            for name, into, column, width in blocks
+            copied(nv, columns, Block(block, columns), Block(into, width).moved(nv, column), "step")
+            for block, (into, column, columns, width) in zip(blocks, places, strict=True)
         ),
         one_more(nv, Slice("entry", "A", nv * 2 * nv + nv, 2 * nv + 1)),
-        *_positions(first, wide, nv),
+        *_positions(first, wide, nv, (("A", 2 * nv), *others)),
     )
-    return Regions(arrays, body)
 
 
-def _positions(first: Sequence[int], wide: Mapping[int, int], nv: int) -> Iterator[For]:
+def _positions(
+    first: Sequence[int], wide: Mapping[int, int], nv: int, matrices: Sequence[tuple[str, int]]
+) -> Iterator[For]:
     """Rows of the new positions: what rates' rows move them by, and one by the old position. Neighbouring joints of one
-    rate share a loop. `wide` has the number of rates of the other joints."""
-    matrices = ("A", 2 * nv), ("B", nv)
+    rate share a loop. `wide` has the number of rates of the other joints, `matrices` the number of columns of each."""
     starts, ends = [0, *(first[i + 1] for i in wide)], [*(first[i] for i in wide), nv]
     for start, end in zip(starts, ends, strict=True):
         if end > start:
@@ -124,19 +134,19 @@ def _turned(i: int, n: int, first: int, matrix: str, width: int, nv: int) -> For
     return For(width, columns, (straight(turned),))
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = STEP.reference(robot, given)
     slopes = slopes_on_arrays(robot.frames, step_on_arrays(given) * found["qd_next"])
     return found | _jacobians(ACCELERATIONS.reference(robot, given), given, slopes)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = STEP.pinocchio(robot, given)
     slopes = robot.integrated_slopes(given["q"], step_on_arrays(given) * found["qd_next"])
     return found | _jacobians(ACCELERATIONS.pinocchio(robot, given), given, slopes)
 
 
-def _jacobians(found: Arrays, given: Mapping[str, Array], slopes: tuple[Array, Array]) -> Arrays:
+def _jacobians(found: Arrays, given: Given, slopes: tuple[Array, Array]) -> Arrays:
     by_q, by_qd, by_tau = (found[name] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))
     by_state, by_torque = semi_implicit_on_arrays(by_q, by_qd, by_tau, step_on_arrays(given), slopes)
     return {"A": by_state, "B": by_torque}

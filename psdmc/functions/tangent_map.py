@@ -3,19 +3,12 @@ derivatives along the tangent to derivatives by the entries of q."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from psdmc.dynamics.manifold import tangent
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -24,13 +17,13 @@ def trace(g: Ingredients) -> Outputs:
     return {"T": list(zip(*columns, strict=True))}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q = given["q"]
     columns = [tangent(robot.frames, list(q.T), list(unit)) for unit in np.eye(q.shape[-1])]
     return {"T": entries(list(zip(*columns, strict=True)), len(q))}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Return the tangent map for tests: the pseudo-inverse of the matrix whose columns are the rates of q's entries at
     unit joint rates."""
     rates = [robot.coordinate_rates(given["q"], unit) for unit in np.eye(robot.model.nv)]

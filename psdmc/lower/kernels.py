@@ -10,6 +10,7 @@ from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
@@ -33,7 +34,9 @@ from psdmc.program.program import Program
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import kernel_by_rows
 from psdmc.progress import Step
+from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
+from psdmc.recipes.torques import with_friction
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.costs import Costs
@@ -63,6 +66,7 @@ def lower(
     progress: Callable[[str], None] = lambda message: None,
     theta_variants: bool = True,
     costs: Costs = COSTS,
+    friction: FrictionInDynamics | None = None,
 ) -> dict[str, Kernel]:
     """Return the kernel (operations) of each function by name, in the order of psdmc.functions.
 
@@ -70,17 +74,19 @@ def lower(
                     is unknown, only functions and variants that do not need its value are made
     theta_variants  whether to make also the variants NAME_theta, with theta_b as an argument
     costs           costs of operations on the target processor
+    friction        joint friction that motor torques contain; None: they have none
 
     Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
-    lowered = _Lowered(model, lowering, costs)
+    lowered = _Lowered(model, lowering, costs, friction)
     kernels: dict[str, Kernel] = {}
     names = wanted(functions, model.mechanism)
     for number, name in enumerate(names):
         recipe, is_by_rows = recipe_of(name), name in BY_ROWS
         takes_theta = recipe.signature.theta
         lowered.check(recipe)
+        recipe = lowered.recipe(recipe)
         variants = (False, True) if takes_theta and theta_variants else (False,)
         for theta in (True,) if is_by_rows else variants:
             if not theta and model.theta_b is None and takes_theta:
@@ -94,6 +100,31 @@ def lower(
             kernel = kernel_by_rows(kernel) if is_by_rows else kernel
             kernels[kernel.name] = kernel
     return kernels
+
+
+def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Kernel:
+    """Return the kernel (operations) of the momenta that a load estimator calls, with the model's theta_b compiled in.
+
+    kind  "mass" or "inertia": which parameters of a load the estimator finds
+
+    Raises InputError for another kind, for unknown base parameters, and for joints of several coordinates.
+    """
+    robot = model.mechanism
+    if kind not in LOADS:
+        raise InputError(f"estimator {kind!r} is not known", f"choose one of {', '.join(LOADS)}")
+    if model.theta_b is None:
+        raise InputError(
+            f"{robot.name}: no estimator: the base parameters are unknown", "calibrate the model first"
+        )
+    if robot.nq > robot.nv or not all(kind.about_z for kind in robot.types):
+        raise InputError(
+            f"{robot.name}: no estimator: a joint of the robot has several coordinates",
+            "derive the model without --floating, or lock the joint with --lock",
+        )
+    require_derivable(robot)
+    lowered, recipe = _Lowered(model, "factored", costs, None), load_recipe(kind)
+    lowered.check(recipe)
+    return lowered.kernel(recipe, False)
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
@@ -147,8 +178,10 @@ def _is_worth_two_bodies(shared: float, own: float, theta: bool, costs: Costs) -
 class _Lowered:
     """One model's programs. Functions that run the same recursion share one search."""
 
-    def __init__(self, model: DynamicsModel, lowering: Lowering, costs: Costs) -> None:
-        self.model, self.lowering, self.costs = model, lowering, costs
+    def __init__(
+        self, model: DynamicsModel, lowering: Lowering, costs: Costs, friction: FrictionInDynamics | None
+    ) -> None:
+        self.model, self.lowering, self.costs, self.friction = model, lowering, costs, friction
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         self.geometry = Geometry(model.mechanism, model.representative)
         self._searches: dict[bool, Search] = {}
@@ -167,6 +200,20 @@ class _Lowered:
                 self.geometry.reframed(self.geometry.feet[0]),
                 self._search(self.model.theta_b is None).robot,
             )
+
+    def recipe(self, recipe: Recipe) -> Recipe:
+        """Return the recipe of a function with the joint friction of this lowering. Raises InputError for a function whose
+        list of entries has no place for friction."""
+        whole = RECIPES[recipe.packs.function] if recipe.packs else recipe
+        if self.friction is not None and recipe.packs and whole.signature.has_motor_torques:
+            raise InputError(
+                f"{recipe.name}: the entries that it stores are those of rigid bodies, without friction",
+                f"emit {whole.name}, or leave friction out of the dynamics",
+            )
+        calls = any(RECIPES[name].signature.has_motor_torques for name in recipe.signature.calls)
+        if self.friction is not None and calls and not recipe.signature.has_motor_torques:
+            return replace(recipe, regions=None)  # its loops would call a function with friction
+        return with_friction(recipe, self.friction)
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
         """Return the kernel (operations) of one function. The kernel is stored at the first call, because the kernel of

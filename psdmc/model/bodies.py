@@ -7,16 +7,14 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from psdmc.errors import InputError
 from psdmc.real_arrays import real_array
 from psdmc.robot import limits
 from psdmc.robot.inertia import physical_fault, six_of, standard_parameters
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, parameter_names
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, parameter_names
 from psdmc.robot.zeros import outside
-
-Array = NDArray[np.float64]
 
 SPAN_TOLERANCE = 1e-9
 """Largest share of a body's parameters outside those that the model admits: rounding only."""

@@ -23,6 +23,7 @@ from psdmc.reproducible import times
 from psdmc.robot.mechanism import (
     PARAMETERS_PER_LINK,
     ROW_NAMES,
+    Array,
     Mechanism,
     Placement,
     frozen_array,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     import sympy
     from scipy import sparse
 
-Array = NDArray[np.float64]
 
 RENAMED = (
     "standard_parameters() has been renamed equivalent_parameters(); the old name still works for now. "
@@ -197,10 +197,11 @@ class DynamicsModel(Answers):
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Return, for each of the l base parameters, the index of its pivot among the 11n standard parameters of the links.
+        """Return, for each of the l base parameters, the index of its pivot in the vector of standard parameters, (11n,).
 
-        Each base parameter is a sum of standard parameters with factors. Its pivot is the first standard parameter that
-        has the factor one in this sum and is in no other base parameter.
+        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. Each base
+        parameter is a sum of standard parameters with factors. Its pivot is the first standard parameter that has the
+        factor one in this sum and is in no other base parameter.
         """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
@@ -223,12 +224,12 @@ class DynamicsModel(Answers):
     def representative(self) -> Array:
         """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
-        Many vectors of standard parameters have the same theta_b, and R gives one of them. Each base parameter has a
-        pivot, one of the standard parameters (see `pivots`). In x, each pivot has the value of its base parameter, and
-        all other standard parameters are zero. B @ R is the identity, with the model's matrix B, (l, 11n).
+        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. Many x
+        have the same theta_b = B @ x, with the matrix B of the model. R gives one of them: l entries of x, the pivots
+        (see `pivots`), have the values of the base parameters, and all other entries are zero.
 
-        There is one exception. If the model was derived with an assumption such as `assume_zero`, a standard parameter
-        can be a fixed multiple of a pivot. In x, this standard parameter is then the same multiple of the pivot's value.
+        There is one exception: `assume_zero` can tie an entry to a pivot. For example, if a link is a point mass on its z
+        axis, its inertias Ixx and Iyy about the link frame are equal. If Ixx is a pivot, Iyy then has the same value in x.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}

@@ -10,16 +10,66 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psdmc.model.terms import Power, Symbol, Term, equation
 from psdmc.reproducible import times
 from psdmc.robot.inertia import LENGTH_ORDER
-from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, Mechanism
+from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array, Joint, Mechanism
 
-Array = NDArray[np.float64]
+
+class Symbol(NamedTuple):
+    """A quantity of one joint in an equation, such as mx2: letters, and the joint's number from 1."""
+
+    letters: str
+    number: int
+
+    def __str__(self) -> str:
+        return f"{self.letters}{self.number}"
+
+
+class Power(NamedTuple):
+    """A symbol and its exponent, 1 or more."""
+
+    symbol: Symbol
+    exponent: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.symbol}" if self.exponent == 1 else f"{self.symbol}^{self.exponent}"
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One term of an equation of a base parameter: number * times * of / over, to be added or subtracted.
+
+    of        the standard parameter
+    is_minus  whether the term is subtracted
+    number    decimal digits; None: one
+    times     lengths in the numerator
+    over      lengths in the denominator
+    """
+
+    of: Symbol
+    is_minus: bool = False
+    number: str | None = None
+    times: tuple[Power, ...] = ()
+    over: tuple[Power, ...] = ()
+
+    def __str__(self) -> str:
+        """The term without its sign."""
+        product = " ".join([*([self.number] if self.number else []), *map(str, self.times), str(self.of)])
+        if not self.over:
+            return product
+        divisor = " ".join(map(str, self.over))
+        return f"{product}/({divisor})" if len(self.over) > 1 else f"{product}/{divisor}"
+
+
+def equation(terms: Sequence[Term]) -> str:
+    """Return the sum of the terms as one line of text, without a plus before the first term."""
+    first, *others = terms
+    return str(first) + "".join(f" {'-' if term.is_minus else '+'} {term}" for term in others)
+
 
 RECOGNITION = 1e-9
 """Relative difference up to which a coefficient is written by a name. For display only: the numbers stay."""

@@ -12,13 +12,12 @@ from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import cosine, length, sine
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
 
 if TYPE_CHECKING:
     from scipy import sparse
 
-Array = NDArray[np.float64]
 
 CHUNK_BYTES = 64 * 2**20
 """Bytes of monomials' values held at once."""

@@ -6,8 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from psdmc.model.equations import BaseParameter
-from psdmc.model.terms import Power, Symbol, Term
+from psdmc.model.equations import BaseParameter, Power, Symbol, Term
 
 UNKNOWN = r"\text{unknown}"
 

@@ -3,9 +3,12 @@ that have an internal state."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from psdmc.errors import InputError
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.friction.joints import Friction, found_friction
 from psdmc.friction.laws import LAWS
 from psdmc.friction.terms import named
@@ -33,6 +36,48 @@ def linear_friction(model: DynamicsModel) -> Friction:
     """Return the friction that the model's calibration found, as a sum of terms. Raises InputError if the model was not
     calibrated, or if its friction has an internal state. Raises InputError also for coupled motors, for mimic joints,
     and for damaged friction data in the file."""
+    if model.calibrated is not None and model.mechanism.has_followers:
+        name = shown(model.mechanism.name)
+        raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
+    return _friction_of(model, model.joint_names)
+
+
+def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = None) -> FrictionInDynamics:
+    """Return the friction that the model's calibration found, as a part of the dynamics. Joints of several coordinates,
+    such as a floating base, and mimic joints have no friction of their own.
+
+    smoothing_speed  rad/s (m/s), the speed near which the sign of the motion changes smoothly; None: that of the
+                     calibration
+
+    Raises InputError as `linear_friction` does, and if the smoothing speed is not a positive number.
+    """
+    if smoothing_speed is not None and not 0.0 < smoothing_speed < math.inf:
+        raise InputError(
+            f"the smoothing speed is {smoothing_speed}, expected a positive number of rad/s", "such as 0.03"
+        )
+    chain, name = model.mechanism, shown(model.mechanism.name)
+    places: dict[str, tuple[int, int]] = {}
+    nq, nv, is_turned = 0, 0, False
+    for joint in (chain.joints[i] for i in chain.own_joints):
+        if joint.type.nv == 1:
+            places[joint.name] = nq, nv
+            is_turned |= joint.type.nq > 1
+        nq, nv = nq + joint.type.nq, nv + joint.type.nv
+    friction = _friction_of(model, list(places))
+    if model.calibrated is not None and not {row.joint for row in model.calibrated.friction} <= set(places):
+        raise InputError(f"{name}: friction is of joints of one rate that follow no other", "lock the others")
+    if friction.by_position and is_turned:
+        raise InputError(
+            f"{name}: its friction depends on positions, and a joint's position is a cosine and a sine",
+            "calibrate with laws of speed",
+        )
+    if smoothing_speed is not None:
+        friction = replace(friction, sign_speed=float(smoothing_speed))
+    return FrictionInDynamics.of(friction, list(places.values()), nv)
+
+
+def _friction_of(model: DynamicsModel, joints: Sequence[str]) -> Friction:
+    """The friction of these joints."""
     name = shown(model.mechanism.name)
     found = model.calibrated
     if found is None:
@@ -49,12 +94,10 @@ def linear_friction(model: DynamicsModel) -> Friction:
             "does not have",
             "leave --friction out; `psdmc show` has its numbers",
         )
-    if model.mechanism.has_followers:
-        raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
     try:
         friction = found_friction(
             by_joint(found.friction),
-            model.joint_names,
+            joints,
             replace(law, offset=False).terms,
             law.laws,
             law.sign_speed,

@@ -20,9 +20,7 @@ from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.robot.coordinates import Coordinate
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism
 
 POSES = 2000
 """Number of poses, each joint drawn evenly within its limits."""

@@ -15,10 +15,15 @@ from psdmc.model.bodies import SPAN_TOLERANCE
 from psdmc.reproducible import times
 from psdmc.robot import limits
 from psdmc.robot.inertia import physical_fault, six_of
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
+from psdmc.robot.mechanism import (
+    BODY_PARAMETERS,
+    PARAMETERS_PER_LINK,
+    Array,
+    Mechanism,
+    NamedFrame,
+    Placement,
+)
 from psdmc.robot.zeros import outside
-
-Array = NDArray[np.float64]
 
 ROTATION_SLACK = 1e-6
 """Largest error of the products of a rotation's rows: that of a matrix written with seven digits."""

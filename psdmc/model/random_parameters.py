@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism
 from psdmc.robot.zeros import leading_rows
-
-Array = NDArray[np.float64]
 
 SEED = 14_630
 

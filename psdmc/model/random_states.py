@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.slices import normalized
-from psdmc.robot.mechanism import Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import Array, Mechanism
 
 RANGES = (np.pi, 3.0, 5.0)
 """q (rad or m), qd and qdd are drawn from plus or minus these."""

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.dynamics.composite_body import mass_matrix as composite_bodies
 from psdmc.dynamics.frames import base_acceleration, frames_of
@@ -14,9 +13,7 @@ from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor as standard_regressor
 from psdmc.dynamics.scalar import Scalar
-from psdmc.robot.mechanism import Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import Array, Mechanism
 
 
 def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:

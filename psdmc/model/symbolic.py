@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.reproducible import length
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import Array, Mechanism
 
 if TYPE_CHECKING:
     import sympy
 
-Array = NDArray[np.float64]
 
 MOST_MONOMIALS = 2000
 """Of one torque. SymPy takes about a millisecond for each."""

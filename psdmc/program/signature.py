@@ -191,6 +191,7 @@ class Signature:
     theta     whether a variant exists that takes the base parameters (theta_b, length l) at run time
     factorises  symmetric matrices that the function factorises, in order. The divisors (pivots) must be positive. If
                 one is not, the outputs are NaN and the function returns its number; none: the function cannot fail
+    stages    how often the code factorises these matrices, one time after the other
     products  matrix products that compute outputs after the traced arithmetic, in C loops
     thin      outputs (nv, nv) that are computed as factors if a robot has equal limbs, such as legs, and multiplied
               last (thin_products.py)
@@ -207,6 +208,7 @@ class Signature:
     outputs: tuple[Quantity, ...]
     theta: bool
     factorises: tuple[SymmetricMatrix, ...] = ()
+    stages: int = 1
     products: tuple[Product, ...] = ()
     thin: tuple[Thin, ...] = ()
     calls: tuple[str, ...] = ()
@@ -222,6 +224,13 @@ class Signature:
             raise ValueError(f"{self.name}: a function has outputs")
 
     @property
+    def has_motor_torques(self) -> bool:
+        """Return whether the function depends on motor torques at rates qd, or on the motion from which they follow. Then
+        joint friction can be a part of the function."""
+        names = {quantity.name for quantity in self.inputs}
+        return self.theta and QD.name in names and bool({TAU.name, QDD.name} & names)
+
+    @property
     def stored(self) -> tuple[Quantity, ...]:
         """Return all quantities that the function's PROGRAMs (lists of operations to generate) store: outputs, then
         pivots."""
@@ -231,7 +240,8 @@ class Signature:
     def pivots(self) -> Quantity | None:
         """Return the description of the pivots, the divisors in matrix factorisations, which must be positive. Return
         None if the function factorises no matrix."""
-        parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in self.factorises]
+        matrices = self.factorises * self.stages
+        parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in matrices]
         if len(parts) < 2:
             return parts[0] if parts else None
         whole = "+".join("*".join(part.axes) for part in parts)
@@ -247,8 +257,13 @@ class Signature:
     def pivot_numbers(self) -> tuple[str, ...]:
         """Return for each factorised matrix a phrase that says which pivot (divisor of the factorisation) is not
         positive. Pivots are numbered from 0 over all matrices."""
-        lengths = [f"{' '.join(matrix.axes)} + " for matrix in self.factorises]
-        return tuple("".join(lengths[:k]) + matrix.number for k, matrix in enumerate(self.factorises))
+        lengths = [" ".join(matrix.axes) for matrix in self.factorises]
+        later = f", + ({' + '.join(lengths)}) times the stage of the step" if self.stages > 1 else ""
+        later = later.replace("constraints", "contacts")  # no such function has closed loops
+        return tuple(
+            "".join(f"{length} + " for length in lengths[:k]) + matrix.number + later
+            for k, matrix in enumerate(self.factorises)
+        )
 
     @property
     def traced(self) -> frozenset[str]:
@@ -312,8 +327,8 @@ TAU = Quantity(
 """Those of q, qd and qdd if states are drawn."""
 
 OF_Q = (
-    "q[j]. If the robot has a ball joint or a floating base, q[j] here stands for entry x[j] of a small displacement x, "
-    "which moves q to integrate(q, x)"
+    "q[j]. If the robot has a ball joint or a floating base, q is replaced by integrate(q, x), and the derivative is by "
+    "x[j] at x = 0"
 )
 """What an entry of a derivative by q belongs to."""
 

@@ -11,7 +11,7 @@ from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.recipes.recipe import Ingredients
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques import less_friction, torques
 
 MASS_MATRIX = SymmetricMatrix(
     "the mass matrix",
@@ -50,6 +50,7 @@ def accelerations_and_pivots(
         found, factors = accelerations(g, tau, external)
         return found, factors.pivots
     q, qd = g.inputs["q"], g.inputs["qd"]
+    moving = less_friction(g, tau)
     return forward_dynamics(
-        g.frames, g.bodies, g.drives, q, qd, tau, g.base_acceleration, g.choices, external
+        g.frames, g.bodies, g.drives, q, qd, moving, g.base_acceleration, g.choices, external
     )

@@ -7,11 +7,11 @@ gradients and derivatives along directions solve the same equations again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,12 +24,8 @@ from psdmc.program.replay import substituted
 from psdmc.program.signature import PIVOTS, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.contacts import ACTIVE, MU, Held, Solved
-from psdmc.recipes.directions import along, direction_of, gradient_by, weighted
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    pass
+from psdmc.recipes.directions import along, along_direction, direction_of, gradient_by, weighted
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +76,7 @@ class ContactFunction:
 
     def along(self, order: int, meaning: str, summary: str) -> Recipe:
         """Return the recipe of the derivatives of the outputs along a direction."""
-        found = tuple(
-            replace(each, name=f"d{each.name}", means=f"derivative of {each.name} along the direction")
-            for each in self.outputs
-        )
+        found = tuple(map(along_direction, self.outputs))
         return self._recipe("jvp", order, meaning, summary, self.directions, found, "along a direction")
 
     def _recipe(
@@ -170,7 +163,7 @@ class ContactFunction:
         nv = len(found.motion)
         return free, self.residuals(g, free[:nv], free[nv:])
 
-    def _weighted(self, found: Arrays, given: Mapping[str, Array]) -> Arrays:
+    def _weighted(self, found: Arrays, given: Given) -> Arrays:
         """The outputs, and the gradients of their weighted sum, from the Jacobians."""
         values = self._plain(found)
         for by in self.by:
@@ -181,7 +174,7 @@ class ContactFunction:
             values[gradient_by(by).name] = reduce(np.add, parts)
         return values
 
-    def _moved(self, found: Arrays, given: Mapping[str, Array]) -> Arrays:
+    def _moved(self, found: Arrays, given: Given) -> Arrays:
         values = self._plain(found)
         for output in self.outputs:
             parts = (

@@ -22,7 +22,9 @@ from psdmc.robot.mechanism import Array, Loop, NamedFrame
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "three linear ones for a point; three linear, then three angular ones for a surface; along the base frame's axes"
+_ROWS = "three linear for each point; three linear, then three angular for each surface; along"
+ROW_WORDS = f"{_ROWS} the base frame's axes"
+LOCAL_ROW_WORDS = f"{_ROWS} the contact's own axes"
 
 ACTIVE = Quantity(
     "active",
@@ -39,7 +41,7 @@ MU = Quantity(
     largest=1.0,
     least=0.1,
     means="regularisation, 0 or more: added to the diagonal of J M^-1 J^T, with the Jacobian J and the mass matrix M; "
-    "1/kg in linear rows, 1/(kg m^2) in angular rows",
+    "unit 1/kg in linear rows, 1/(kg m^2) in angular rows",
     unit="1/kg",
     default=0.0,
 )
@@ -126,29 +128,35 @@ class Held(NamedTuple):
         """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact, and
         for each loop, too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
         found = constrained(factors, jacobian, load, wanted, *self.rows)
-        signs, first, inverse = [], 0, inverse_diagonal(found.factors)
-        for number, (untested, count) in enumerate(zip(self._signs_of_inputs(), self.counts, strict=True)):
+        return found, self.independent(found.matrix, found.factors, inverse_diagonal(found.factors))
+
+    def independent(self, matrix: Rows, factors: Factors, inverse: Sequence[Scalar]) -> list[Scalar]:
+        """Return a sign for each contact: -1 if `matrix` is not positive definite there, or if active or mu is not
+        allowed, else 1. `inverse` is the diagonal of the inverse matrix."""
+        signs, first = [], 0
+        for number, (untested, count) in enumerate(zip(self.allowed(), self.counts, strict=True)):
             sign = untested
             for k in range(first, first + count):
-                sign = regular(sign, found.factors.pivots[k], found.matrix[k][k], inverse[k])
+                sign = regular(sign, factors.pivots[k], matrix[k][k], inverse[k])
             if self.loops and number < len(self.active):
                 # Where loops have no solution, contacts that are not active are not at fault.
                 sign = Op.SELECT(self.active[number], 0.5, untested, sign)
             signs.append(sign)
             first += count
-        return found, signs
+        return signs
 
     def signs(self, positive: Sequence[Scalar]) -> list[Scalar]:
         """Return a sign for each contact: -1 if a number of one of its rows is not positive, or if active or mu is not
         allowed, else 1."""
         signs, left = [], iter(positive)
-        for sign, count in zip(self._signs_of_inputs(), self.counts, strict=True):
+        for sign, count in zip(self.allowed(), self.counts, strict=True):
             for value in islice(left, count):
                 sign = Op.SELECT(0.0, value, sign, -1.0)
             signs.append(sign)
         return signs
 
-    def _signs_of_inputs(self) -> Iterator[Scalar]:
+    def allowed(self) -> Iterator[Scalar]:
+        """Yield a sign for each contact: -1 if active or mu is not allowed, else 1."""
         for on in self.active:
             off = on - on * on
             sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +16,10 @@ from psdmc.program import dimensions
 from psdmc.program.replay import substituted
 from psdmc.program.signature import OF_Q, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 COTANGENT = Quantity(
     "cotangent", ("nv",), means="weights of the sum: cotangent[i] multiplies tau[i]", unit="1", powers=(1,)
@@ -35,25 +31,31 @@ COTANGENT_OF_QDD = replace(COTANGENT, means=COTANGENT.means.replace("tau", "qdd"
 
 def direction_of(quantity: Quantity) -> Quantity:
     """A change of this input: a vector that is its direction."""
-    axes = ("nv",) if quantity is Q else quantity.axes
-    means = f"entry j is the change of {_entry(quantity)}"
-    return replace(quantity, name=f"d{quantity.name}", axes=axes, largest=1.0, means=means, default=None)
+    name, axes = quantity.name, ("nv",) if quantity is Q else quantity.axes
+    which = name if quantity.default is None else f"the input {name} (see below)"
+    means = f"direction of the change of {which}: for a small number e, the new value is {name} + e d{name}"
+    if quantity is Q:
+        means += "; with a ball joint or a floating base, it is integrate(q, e dq)"
+    return replace(quantity, name=f"d{name}", axes=axes, largest=1.0, means=means, default=None)
+
+
+def along_direction(quantity: Quantity) -> Quantity:
+    """The derivative of this output along a direction of the inputs."""
+    name = quantity.name
+    means = f"derivative of {name} along the direction: for a small number e, the change of {name} is about e d{name}"
+    return replace(quantity, name=f"d{name}", means=means)
 
 
 def gradient_by(quantity: Quantity) -> Quantity:
     """The gradient of a weighted sum, which has the unit of energy, by this input."""
+    entry = OF_Q if quantity is Q else f"{quantity.name}[j]"
     return Quantity(
         f"grad_{quantity.name}",
         ("nv",) if quantity is Q else quantity.axes,
-        means=f"gradient of the weighted sum by {quantity.name}: entry j is the derivative by {_entry(quantity)}",
+        means=f"gradient of the weighted sum by {quantity.name}: entry j is the derivative by {entry}",
         unit=str(dimensions.times(dimensions.dimension_of("J"), quantity.dimension, -1)),
         powers=(-quantity.powers[0],),
     )
-
-
-def _entry(quantity: Quantity) -> str:
-    """What an entry of a derivative by this input belongs to."""
-    return OF_Q if quantity is Q else f"{quantity.name}[j]"
 
 
 DQ, DQD, DQDD, DTAU = map(direction_of, (Q, QD, QDD, TAU))
@@ -70,7 +72,8 @@ def hessian_of(last: Quantity, axis: str) -> Quantity:
     """The symmetric matrix of second derivatives of a weighted sum by q, qd and a third quantity."""
     means = (
         "symmetric matrix of the second derivatives of the weighted sum. The first nv rows and columns are for q, the next "
-        f"nv for qd, the last nv for {last.name}. Of the first nv, row j and column j are for {OF_Q}"
+        f"nv for qd, the last nv for {last.name}. If the robot has a ball joint or a floating base, q is replaced by "
+        "integrate(q, x), and the first nv are for x at x = 0"
     )
     return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
 
@@ -152,8 +155,8 @@ def with_parameter_gradient(
     meaning: str,
     summary: str,
     trace: Callable[[Ingredients], Outputs],
-    reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
-    pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
+    reference: Callable[[RobotOnArrays, Given], Arrays],
+    pinocchio: Callable[[Reference, Given], Arrays],
 ) -> Recipe:
     """Return the recipe of a function NAME_parameters. It has the outputs of the function NAME (recipe `state`), and
     the gradient by theta_b as an additional output."""

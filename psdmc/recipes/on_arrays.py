@@ -18,6 +18,7 @@ from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivatives
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.reproducible import solved, times
 from psdmc.robot.mechanism import Array, Mechanism
 
@@ -30,13 +31,15 @@ class RobotOnArrays:
     """A robot whose links have standard parameters x that give the torques of the base parameters theta_b. Dynamics are
     computed in NumPy for many states at once.
 
-    x      (11 n,) standard parameters about the link frames, 11 for each of n links
-    lift   (11 n, l) matrix that gives x from the l base parameters
+    x         (11 n,) standard parameters about the link frames, 11 for each of n links
+    lift      (11 n, l) matrix that gives x from the l base parameters
+    friction  joint friction, which all torques with `qd` contain; None: they have none
     """
 
     chain: Mechanism
     x: Array
     lift: Array
+    friction: FrictionInDynamics | None = None
 
     @classmethod
     def of(cls, model: DynamicsModel, theta_b: Array) -> Self:
@@ -92,7 +95,8 @@ class RobotOnArrays:
         torques = inverse_dynamics(
             self.frames, self.bodies, self.drives, *given, base_acceleration, qd_r=rates, external=external
         )
-        return columns(torques, len(q))
+        found = columns(torques, len(q))
+        return found if self.friction is None else found + columns(self.friction.torques(*given[:2]), len(q))
 
     def torque_derivatives(
         self, q: Array, qd: Array, qdd: Array, external: Mapping[int, Wrench] = NO_WRENCHES
@@ -104,13 +108,28 @@ class RobotOnArrays:
             self.frames, self.bodies, self.drives, *given, self.base_acceleration, external=external
         )
         by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
+        if self.friction is not None:
+            own = np.arange(self.nv)
+            for block, slopes in zip((by_q, by_qd), self.friction.slopes(*given[:2]), strict=True):
+                block[:, own, own] += columns(slopes, len(q))
         return by_q, by_qd, by_qdd
 
     def torque_hessian(self, q: Array, qd: Array, qdd: Array, weights: Array) -> Array:
         """(k, 3 nv, 3 nv) second derivatives of the weighted torques by (q, qd, qdd)."""
         given = (list(q.T), list(qd.T), list(qdd.T), list(weights.T))
         found = inverse_dynamics_second_derivatives(self.frames, self.bodies, *given, self.base_acceleration)
-        return matrix(found.hessian, len(q))
+        hessian = matrix(found.hessian, len(q))
+        if self.friction is not None:
+            q_q, q_qd, qd_qd = (weights * columns(each, len(q)) for each in self.friction.bends(*given[:2]))
+            own, rate = np.arange(self.nv), np.arange(self.nv) + self.nv
+            for rows, others, block in (
+                (own, own, q_q),
+                (own, rate, q_qd),
+                (rate, own, q_qd),
+                (rate, rate, qd_qd),
+            ):
+                hessian[:, rows, others] += block
+        return hessian
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """(k, n) joint accelerations."""

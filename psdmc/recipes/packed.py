@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.program.signature import Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Packing, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Packing, Recipe, RobotOnArrays
 from psdmc.robot.mechanism import Array
 
 VALUES = Quantity(
@@ -25,7 +23,7 @@ def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packi
     computes the whole matrix."""
     function, (matrix,) = dense.signature, dense.signature.outputs
 
-    def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    def reference(robot: RobotOnArrays, given: Given) -> Arrays:
         rows, columns = _indices(packing, robot)
         return {VALUES.name: dense.reference(robot, given)[matrix.name][:, rows, columns]}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from psdmc.dynamics.body import Body
@@ -11,8 +11,8 @@ from psdmc.dynamics.kinematics import AT_BASE
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector, scale, transform
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs
+from psdmc.robot.mechanism import NamedFrame
 
 Rows = Sequence[Sequence[Scalar]]
 
@@ -49,7 +49,7 @@ class PlacedRobot:
 
 def on_both(
     values: Callable[..., Outputs], inputs: Sequence[Quantity]
-) -> tuple[Callable[[Ingredients], Outputs], Callable[[RobotOnArrays, Mapping[str, Array]], Arrays]]:
+) -> tuple[Callable[[Ingredients], Outputs], Callable[[RobotOnArrays, Given], Arrays]]:
     """Return the trace and the reference of a function with these inputs. `values` computes its outputs from a PlacedRobot
     and each input as a list."""
 
@@ -58,7 +58,7 @@ def on_both(
             PlacedRobot(g.frames, g.named, g.root, g.link_bodies), *(g.inputs[q.name] for q in inputs)
         )
 
-    def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    def reference(robot: RobotOnArrays, given: Given) -> Arrays:
         placed = PlacedRobot(robot.frames, robot.chain.frames, AT_BASE, lambda: robot.solids)
         found = values(placed, *(list(given[quantity.name].T) for quantity in inputs))
         return {name: entries(value, len(given["q"])) for name, value in found.items()}

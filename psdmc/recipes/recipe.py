@@ -14,19 +14,25 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.structure import Places
+from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.program.regions import Regions
-from psdmc.program.signature import Signature
+from psdmc.program.signature import OF_ROWS, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays as RobotOnArrays
 from psdmc.robot.mechanism import Array, Loop, Mechanism, NamedFrame, Placement
 
 if TYPE_CHECKING:
-    from psdmc.recipes.on_arrays import RobotOnArrays
-    from psdmc.robot.reference import Reference
+    from psdmc.robot.reference import Reference as Reference
+else:
+    Reference = object  # for annotations alone: its module imports Pinocchio, which takes half a second
 
 Outputs = Mapping[str, Any]
 """A scalar, or nested sequences of them, for each quantity of a signature that is stored, in the signature's order."""
 
 Arrays = dict[str, Array]
 """Quantity's name -> (k, ...) values at k states, trailing axes as in the signature."""
+
+Given = Mapping[str, Array]
+"""The inputs at k states, as Arrays has the outputs."""
 
 
 class ByTheta(NamedTuple):
@@ -68,6 +74,7 @@ class Ingredients:
     by_theta           returns theta_b as symbols, for derivatives by theta_b. The function can be called even if the
                        code contains fixed values of theta_b: torques are linear in theta_b, so derivatives do not
                        depend on the values
+    friction           joint friction, which the torques of motors contain; None: they have none
     """
 
     frames: tuple[Frame, ...]
@@ -87,6 +94,7 @@ class Ingredients:
     si: Callable[[float, str], Scalar]
     inputs: Mapping[str, list[Any]]
     by_theta: Callable[[], ByTheta]
+    friction: FrictionInDynamics | None = None
 
     @property
     def root(self) -> tuple[Matrix, Vector]:
@@ -178,9 +186,9 @@ class Recipe:
     signature: Signature
     title: str
     trace: Callable[[Ingredients], Outputs]
-    reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays]
+    reference: Callable[[RobotOnArrays, Given], Arrays]
     against: str
-    pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays]
+    pinocchio: Callable[[Reference, Given], Arrays]
     starts: str | None = None
     shares: str | None = None
     matters: tuple[str, ...] = Choices.__slots__
@@ -200,7 +208,7 @@ class Recipe:
     closes: bool = False
 
     def __post_init__(self) -> None:
-        if self.needs is None and self.signature.factorises:
+        if self.needs is None and any("nv" in matrix.axes for matrix in self.signature.factorises):
             object.__setattr__(self, "needs", Needs.POSITIVE_MASS)
 
     @property
@@ -212,7 +220,8 @@ class Recipe:
         if not robot.loops:
             return "the robot has no closed loops" if self.needs is Needs.LOOPS else None
         signature = self.signature
-        touches = any("contact_rows" in q.axes for q in (*signature.inputs, *signature.outputs))
+        touching = {"contacts", *OF_ROWS}
+        touches = any(touching & {*q.axes} for q in (*signature.inputs, *signature.outputs))
         if touches and signature.theta and not self.closes:
             return "for robots with closed loops, psdmc does not generate it yet"
         return None

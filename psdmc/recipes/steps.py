@@ -131,7 +131,7 @@ def semi_implicit_on_arrays(
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
     kick = np.block([[unit, none], [h * by_q, unit + h * by_qd]])
     drift = np.block([[by_start, h * by_way], [none, unit]])
-    push = np.concatenate([none, h * by_tau], axis=-2)
+    push = np.concatenate([np.zeros_like(by_tau), h * by_tau], axis=-2)
     return times(drift, kick), times(drift, push)
 
 

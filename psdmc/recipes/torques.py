@@ -1,15 +1,19 @@
-"""Records the Newton-Euler algorithm (joint torques) as code, for all generated functions that need it."""
+"""Records the Newton-Euler algorithm (joint torques) and its derivatives as code, for all generated functions that need
+it. The torques contain joint friction if a package is generated with friction in the dynamics."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from operator import add, sub
 
+from psdmc.dynamics.derivatives import Derivatives, Rows, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import part_of, with_carriers
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.slices import flat, joints_of_rates, positions
-from psdmc.recipes.recipe import Ingredients
+from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.recipes.recipe import Ingredients, Recipe
 
 
 def torques(
@@ -24,11 +28,65 @@ def torques(
     qd_r, it multiplies qd.
 
     `base_acceleration` is the acceleration of the base, which includes gravity. The torques that `external` wrenches on
-    the links exert are subtracted.
+    the links exert are subtracted. The friction `g.friction`, if any, is added.
     """
     q = g.inputs["q"]
-    return inverse_dynamics(
+    tau = inverse_dynamics(
         g.frames, g.bodies, g.drives, q, qd, qdd, base_acceleration, g.choices, qd_r, external
+    )
+    return tau if g.friction is None else tuple(map(add, tau, g.friction.torques(q, qd)))
+
+
+def torque_derivatives(
+    g: Ingredients, qdd: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> Derivatives:
+    """Return the derivatives of the joint torques by q, qd and qdd, recorded as code, with those of friction."""
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    return with_friction_slopes(
+        g,
+        inverse_dynamics_derivatives(
+            g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices, external
+        ),
+    )
+
+
+def with_friction_slopes(g: Ingredients, found: Derivatives) -> Derivatives:
+    """Return the derivatives of the joint torques with those of the friction `g.friction`, if any."""
+    if g.friction is None:
+        return found
+    by_q, by_qd = g.friction.slopes(g.inputs["q"], g.inputs["qd"])
+    return found._replace(by_q=on_diagonal(found.by_q, by_q), by_qd=on_diagonal(found.by_qd, by_qd))
+
+
+def less_friction(g: Ingredients, tau: Sequence[Scalar]) -> Sequence[Scalar]:
+    """Return motor torques less the friction `g.friction`, if any: the torques that move the rigid bodies."""
+    return (
+        tau if g.friction is None else list(map(sub, tau, g.friction.torques(g.inputs["q"], g.inputs["qd"])))
+    )
+
+
+def on_diagonal(rows: Sequence[Sequence[Scalar]], added: Sequence[Scalar]) -> Rows:
+    """Return a square matrix with `added` added to its diagonal."""
+    found = [list(row) for row in rows]
+    for i, x in enumerate(added):
+        found[i][i] = found[i][i] + x
+    return tuple(map(tuple, found))
+
+
+def with_friction(recipe: Recipe, friction: FrictionInDynamics | None) -> Recipe:
+    """Return the recipe of a function whose motor torques contain joint friction. Functions without motor torques, such
+    as the mass matrix, are returned unchanged.
+
+    Code with friction has no expanded form and no SIMD lanes for limbs, because friction differs from limb to limb.
+    """
+    if friction is None or not recipe.signature.has_motor_torques:
+        return recipe
+    return replace(
+        recipe,
+        trace=lambda g: recipe.trace(replace(g, friction=friction)),
+        reference=lambda robot, given: recipe.reference(replace(robot, friction=friction), given),
+        polynomials=None,
+        in_limbs=False,
     )
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,14 +11,11 @@ from psdmc.dynamics.newton_euler import Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.program.signature import Quantity
-from psdmc.recipes.directions import along
+from psdmc.recipes.directions import along, direction_of
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Reference
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 WRENCHES = Quantity(
     "wrenches",
@@ -32,7 +27,7 @@ WRENCHES = Quantity(
     powers=(0, -1),
 )
 
-DWRENCHES = replace(WRENCHES, name="dwrenches", largest=1.0, means="change of wrenches along the direction")
+DWRENCHES = direction_of(WRENCHES)
 
 GRADIENT_WRENCHES = Quantity(
     "grad_wrenches",
@@ -48,7 +43,7 @@ def wrenches_on_links(g: Ingredients) -> dict[int, Wrench]:
     return on_joint_frames(g.named, g.inputs[WRENCHES.name])
 
 
-def wrenches_on_arrays(robot: RobotOnArrays, given: Mapping[str, Array]) -> dict[int, Wrench]:
+def wrenches_on_arrays(robot: RobotOnArrays, given: Given) -> dict[int, Wrench]:
     """Convert given arrays likewise."""
     values = given[WRENCHES.name]
     return on_joint_frames(robot.chain.frames, list(values.reshape(len(values), -1).T))
@@ -59,7 +54,7 @@ def on_joint_frames(named: Sequence[NamedFrame], values: Sequence[Scalar]) -> di
     return link_wrenches(named, [values[6 * k : 6 * k + 6] for k in range(len(named))])
 
 
-def jacobians_on_arrays(robot: RobotOnArrays, given: Mapping[str, Array]) -> Array:
+def jacobians_on_arrays(robot: RobotOnArrays, given: Given) -> Array:
     """Compute the torques (k, nv, frames, 6) of unit wrenches: the transposed Jacobians along the named frames' axes."""
     q = given["q"]
     found = entries(local_jacobians(robot.frames, robot.chain.frames, list(q.T)), len(q))
@@ -84,7 +79,7 @@ def times_wrenches(matrices: Array, wrenches: Array) -> Array:
     return along(matrices.reshape(count, nv, -1), wrenches.reshape(count, -1))
 
 
-def along_all(blocks: Arrays, directions: Sequence[Quantity], given: Mapping[str, Array]) -> Array:
+def along_all(blocks: Arrays, directions: Sequence[Quantity], given: Given) -> Array:
     """Sum the derivatives by all inputs times their directions, (k, nv). The wrenches are the last input."""
     *others, last = zip(blocks.values(), (given[direction.name] for direction in directions), strict=True)
     total = times_wrenches(*last)
@@ -93,14 +88,14 @@ def along_all(blocks: Arrays, directions: Sequence[Quantity], given: Mapping[str
     return total
 
 
-def torque_derivatives(robot: Reference, given: Mapping[str, Array]) -> list[Array]:
+def torque_derivatives(robot: Reference, given: Given) -> list[Array]:
     """Return Pinocchio's derivatives of torques under wrenches by q, qd, qdd and wrenches."""
     states = (given[name] for name in ("q", "qd", "qdd", WRENCHES.name))
     jacobians = robot.local_frame_jacobians(given["q"])
     return [*robot.inverse_dynamics_derivatives(*states), -np.moveaxis(jacobians, -1, 1)]
 
 
-def acceleration_derivatives(robot: Reference, given: Mapping[str, Array]) -> list[Array]:
+def acceleration_derivatives(robot: Reference, given: Given) -> list[Array]:
     """Return Pinocchio's accelerations under wrenches and their derivatives by q, qd, tau and wrenches."""
     states = (given[name] for name in ("q", "qd", "tau", WRENCHES.name))
     *blocks, by_tau = robot.forward_dynamics_derivatives(*states)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -11,12 +12,14 @@ from pathlib import Path
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from psdmc.atomic import write_whole
-from psdmc.bench.results import BenchResult
+from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import SCALED
 from psdmc.errors import InputError, exit_status_of
 from psdmc.reading import read_file
-from psdmc.report import bench_plots
 from psdmc.report.bench_view import (
+    FUNCTION_TITLES,
+    OURS,
+    PINOCCHIO,
     FunctionTable,
     function_tables,
     headlines,
@@ -26,6 +29,7 @@ from psdmc.report.bench_view import (
     scaling_rows,
     thread_rows,
 )
+from psdmc.report.drawing import Figure, legend_below, svg
 
 LARGEST_RESULT = 64 << 20
 """Bytes of a result: the bench of all robots has 0.3 MB."""
@@ -62,7 +66,7 @@ def page(result: BenchResult, command: str = COMMAND) -> str:
         "scaling": scaling_rows(result),
         "scaling_plots": _scaling_plots(result),
         "threads": thread_rows(result),
-        "colours": bench_plots.COLOURS,
+        "colours": COLOURS,
         "busy": [case.name for case in (*result.cases, *result.scaling) if not case.idle],
     }
     return _environment().get_template("report/bench.html.jinja").render(**view)
@@ -76,7 +80,7 @@ def _section(result: BenchResult, index: int) -> RobotSection:
         case.name,
         f"robot{index}",
         f"{case.n} joints, {p}, {case.l} base parameters; {case.note}; {case.rounds} trials",
-        bench_plots.case_plots(case),
+        case_plots(case),
         function_tables(case),
         missing,
     )
@@ -85,7 +89,7 @@ def _section(result: BenchResult, index: int) -> RobotSection:
 def _scaling_plots(result: BenchResult) -> tuple[str, ...]:
     if not result.scaling:
         return ()
-    return tuple(bench_plots.scaling(result, f) for f in SCALED)
+    return tuple(scaling(result, f) for f in SCALED)
 
 
 def _environment() -> Environment:
@@ -111,6 +115,68 @@ def read_result(path: Path) -> BenchResult:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}", "make it with: psdmc bench --json") from error
     return BenchResult.from_json(text)
+
+
+# Plots
+
+
+WIDTH = 5.2
+"""inches: narrow, so that labels stay readable on a phone."""
+
+COLOURS = {"psdmc": "#2a9d8f", "Pinocchio": "#e07a3f", "CasADi": "#5b7db1", "MuJoCo": "#9a78b0"}
+
+
+def bars(case: CaseResult, function: str) -> str:
+    """Draw the time per state of each library for one function and robot, for calls with one state."""
+    shown = sorted(case.of(function), key=lambda m: m.ns)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        places = range(len(shown))
+        axes.barh(places, [m.ns for m in shown], color=[_colour(m) for m in shown], height=0.7)
+        axes.set_yticks(places, [m.label for m in shown])
+        axes.invert_yaxis()
+        longest = max(m.ns for m in shown)
+        axes.set_xlim(right=longest * 1.22)
+        for place, m in zip(places, shown, strict=True):
+            axes.text(m.ns + 0.015 * longest, place, f"{m.ns:.0f} ns", va="center")
+        axes.set_title(f"{FUNCTION_TITLES[function]}, {case.name}", loc="left", fontsize=11)
+        axes.set_xlabel("time of one call, ns (median)")
+
+    return svg(draw, (WIDTH, 0.8 + 0.3 * len(shown)), f"times of {FUNCTION_TITLES[function]}, {case.name}")
+
+
+def scaling(result: BenchResult, function: str) -> str:
+    """Draw times against the number of joints, for Pinocchio and for psdmc's two forms of code (factored and
+    expanded)."""
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for rival, line in ((OURS, "-o"), ("psdmc expanded", "--s"), (PINOCCHIO, "-^")):
+            points = [(case.n, best.ns) for case in result.scaling if (best := case.best(rival, function))]
+            if points:
+                colour = COLOURS["psdmc" if rival.startswith("psdmc") else rival]
+                axes.plot(*zip(*points, strict=True), line, color=colour, label=rival)
+        axes.set_yscale("log")
+        axes.set_xlabel("number of joints")
+        axes.set_ylabel("time of one call, ns")
+        axes.set_title(f"{FUNCTION_TITLES[function]} of the LBR7, cut to n joints", loc="left", fontsize=11)
+        axes.set_xticks(sorted({case.n for case in result.scaling}))
+        legend_below(axes, 3)
+
+    return svg(draw, (WIDTH, 3.2), f"times of {FUNCTION_TITLES[function]} by number of joints")
+
+
+def _colour(measurement: Measurement) -> str:
+    return next((c for name, c in COLOURS.items() if measurement.rival.startswith(name)), "#888888")
+
+
+def case_plots(case: CaseResult, functions: Sequence[str] = SCALED) -> tuple[str, ...]:
+    """Draw a bar plot for each of the functions that was measured on a robot."""
+    return tuple(bars(case, function) for function in functions if any(case.of(function)))
+
+
+# The command
 
 
 def main() -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from psdmc.bench.published import DENSO_TABLE_5, PUBLISHED
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import SCALED
 from psdmc.functions import RECIPES
@@ -15,6 +14,9 @@ PINOCCHIO = "Pinocchio"
 CASADI = "CasADi"
 
 FUNCTION_TITLES = {name: recipe.title[0].upper() + recipe.title[1:] for name, recipe in RECIPES.items()}
+
+Cells = tuple[str, ...]
+"""Texts of one row of a table; the template names them."""
 
 LAYOUT_TITLES = {"state": "one state per call", "rows": "batch, rows", "lanes": "batch, lane by lane"}
 
@@ -47,45 +49,20 @@ class FunctionTable:
     rows: tuple[Row, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Headline:
-    """A robot's row in the first table of the benchmark page: how many times faster psdmc is than Pinocchio, and than C
-    code of CasADi."""
-
-    robot: str
-    inverse_ns: str
-    inverse: str
-    inverse_casadi: str
-    inverse_rows: str
-    inverse_lanes: str
-    forward_ns: str
-    forward: str
-    forward_casadi: str
-    forward_rows: str
-    forward_lanes: str
+def headlines(result: BenchResult) -> tuple[tuple[str, tuple[Cells, ...]], ...]:
+    """Return a row for every robot: its name, then cells for inverse and for forward dynamics. The cells are psdmc's time
+    in ns, and how many times faster it is than Pinocchio and than C code of CasADi. Two more cells are for batch calls,
+    by rows and lane by lane, over Pinocchio. Pinocchio's faster algorithm counts."""
+    return tuple(
+        (case.name, tuple(_headline(case, function) for function in SCALED)) for case in result.cases
+    )
 
 
-def headlines(result: BenchResult) -> tuple[Headline, ...]:
-    """Return for every robot how many times faster psdmc is than the installed Pinocchio library. Pinocchio's faster
-    algorithm counts."""
-    return tuple(_headline(case) for case in result.cases)
-
-
-def _headline(case: CaseResult) -> Headline:
-    def ratio(function: str, layout: str = "state", over: str = PINOCCHIO) -> str:
-        found = case.ratio(function, layout, over=over, rival=OURS)
-        return f"{found:.1f}" if found else "–"
-
-    def ns(function: str) -> str:
-        found = case.best(OURS, function)
-        return f"{found.ns:.0f}" if found else "–"
-
-    inverse, forward = SCALED
-    return Headline(
-        case.name,
-        ns(inverse), ratio(inverse), ratio(inverse, over=CASADI), ratio(inverse, "rows"), ratio(inverse, "lanes"),
-        ns(forward), ratio(forward), ratio(forward, over=CASADI), ratio(forward, "rows"), ratio(forward, "lanes"),
-    )  # fmt: skip
+def _headline(case: CaseResult, function: str) -> Cells:
+    ours = case.best(OURS, function)
+    batches = (("state", PINOCCHIO), ("state", CASADI), ("rows", PINOCCHIO), ("lanes", PINOCCHIO))
+    ratios = (case.ratio(function, layout, over=rival, rival=OURS) for layout, rival in batches)
+    return (f"{ours.ns:.0f}" if ours else "–", *(f"{ratio:.1f}" if ratio else "–" for ratio in ratios))
 
 
 def function_tables(case: CaseResult) -> tuple[FunctionTable, ...]:
@@ -119,19 +96,7 @@ def _row(m: Measurement, reference: float | None) -> Row:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Quoted:
-    """A row of table 5 of the paper Denso-2022, as printed or measured on this machine. It has the times of one library
-    in microseconds, and their ratios to the first row."""
-
-    method: str
-    inverse: str
-    forward: str
-    inverse_ratio: str
-    forward_ratio: str
-
-
-def quoted_table() -> tuple[Quoted, ...]:
+def quoted_table() -> tuple[Cells, ...]:
     """Denso-2022's table 5 as printed."""
     first = DENSO_TABLE_5[0]
     return tuple(
@@ -139,7 +104,7 @@ def quoted_table() -> tuple[Quoted, ...]:
     )
 
 
-def own_table(result: BenchResult) -> tuple[Quoted, ...]:
+def own_table(result: BenchResult) -> tuple[Cells, ...]:
     """Return table 5 of the paper Denso-2022 with times measured on this machine. The table is empty if the Denso robot
     was not measured."""
     case = next((case for case in result.cases if case.name == "Denso"), None)
@@ -153,8 +118,9 @@ def own_table(result: BenchResult) -> tuple[Quoted, ...]:
     return tuple(_quoted(rival, i, f, found[0][1], found[0][2]) for rival, i, f in found)
 
 
-def _quoted(method: str, inverse: float, forward: float, inverse_one: float, forward_one: float) -> Quoted:
-    return Quoted(
+def _quoted(method: str, inverse: float, forward: float, inverse_one: float, forward_one: float) -> Cells:
+    """A row of table 5: the library, its times, and their ratios to those of the first row."""
+    return (
         method,
         f"{inverse / 1e3:.3g} µs",
         f"{forward / 1e3:.3g} µs",
@@ -163,20 +129,7 @@ def _quoted(method: str, inverse: float, forward: float, inverse_one: float, for
     )
 
 
-@dataclass(frozen=True, slots=True)
-class PublishedRow:
-    """A robot's row in the table of times that the method's authors published. Beside them are psdmc's times for the
-    authors' form of code (expanded) and for psdmc's default form (factored)."""
-
-    robot: str
-    source: str
-    published: str
-    expanded: str
-    factored: str
-    derivation: str
-
-
-def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
+def published_rows(result: BenchResult) -> tuple[Cells, ...]:
     """Return rows with the times of inverse and forward dynamics in ns, for the robots whose times the method's authors
     published."""
     rows = []
@@ -186,7 +139,7 @@ def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
             continue
         seconds = f"{case.derive_seconds:.1f} s" if case.derive_seconds is not None else "–"
         rows.append(
-            PublishedRow(
+            (
                 case.name,
                 theirs.source,
                 f"{theirs.inverse:.0f} / {theirs.forward:.0f}",
@@ -203,23 +156,10 @@ def _pair(case: CaseResult, rival: str) -> str:
     return " / ".join(f"{m.ns:.0f}" if m else "–" for m in both)
 
 
-@dataclass(frozen=True, slots=True)
-class ScalingRow:
-    """One number of joints, as text."""
-
-    n: str
-    sizes: str
-    derivation: str
-    memory: str
-    factored: str
-    expanded: str
-    pinocchio: str
-
-
-def scaling_rows(result: BenchResult) -> tuple[ScalingRow, ...]:
+def scaling_rows(result: BenchResult) -> tuple[Cells, ...]:
     """Return rows with the times of inverse and forward dynamics in ns, by number of joints."""
     return tuple(
-        ScalingRow(
+        (
             str(case.n),
             f"{case.p if case.p is not None else 'not expanded'} / {case.l}",
             f"{case.derive_seconds:.2f} s" if case.derive_seconds is not None else "–",
@@ -237,18 +177,7 @@ def _operations(case: CaseResult, rival: str) -> str:
     return " / ".join(str(sum(m.operations)) if m and m.operations else "–" for m in both)
 
 
-@dataclass(frozen=True, slots=True)
-class ThreadRow:
-    """A row of the table of threads: the times of a batch function on one and more threads."""
-
-    robot: str
-    function: str
-    layout: str
-    ns: tuple[str, ...]
-    speedup: str
-
-
-def thread_rows(result: BenchResult) -> tuple[ThreadRow, ...]:
+def thread_rows(result: BenchResult) -> tuple[tuple[str, str, str, Cells, str], ...]:
     """Return rows with the times in ns per state by number of threads. A row says how many times faster the most
     threads are than one thread."""
     rows = []
@@ -257,7 +186,47 @@ def thread_rows(result: BenchResult) -> tuple[ThreadRow, ...]:
             own = [t for t in case.threads if (t.function, t.layout) == (function, layout)]
             times = tuple(f"{t.ns:.1f}" for t in own)
             speedup = f"{own[0].ns / own[-1].ns:.2f}×"
-            rows.append(
-                ThreadRow(case.name, FUNCTION_TITLES[function], LAYOUT_TITLES[layout], times, speedup)
-            )
+            rows.append((case.name, FUNCTION_TITLES[function], LAYOUT_TITLES[layout], times, speedup))
     return tuple(rows)
+
+
+# Times that the authors of the method published: reports show them without ratios, as machines and inertias differ
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """Times that were published for one robot, in ns per call, and the time of its derivation in s. A time is None if
+    it was not published."""
+
+    robot: str
+    source: str
+    inverse: float
+    forward: float
+    derivation: float | None
+
+
+PSDM_2021 = "PSDM-2021 (Mech. Mach. Theory 156)"
+DENSO_2022 = "Denso-2022, table 5"
+
+PUBLISHED = {
+    "Denso": Published("Denso", DENSO_2022, 400.0, 630.0, 3.0),
+    "KR6": Published("KR6", PSDM_2021, 2110.0, 2270.0, 5.3),
+    "LBR7": Published("LBR7", PSDM_2021, 6490.0, 7280.0, 88.0),
+}
+"""By the benchmark's name of the robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableRow:
+    """A row of table 5 of the paper Denso-2022: times in ns per call."""
+
+    method: str
+    inverse: float
+    forward: float
+
+
+DENSO_TABLE_5 = (
+    TableRow("PSDM", 400.0, 630.0),
+    TableRow("RNE", 6000.0, 19900.0),
+    TableRow("RNE, regressive form", 17200.0, 112000.0),
+)

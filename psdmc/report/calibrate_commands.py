@@ -18,11 +18,11 @@ from psdmc.calibration.campaign import (
     require_free,
     write_campaign,
 )
-from psdmc.calibration.given_load import given_load
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.trajectory import write_trajectory
+from psdmc.calibration.payload_found import given_load
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of

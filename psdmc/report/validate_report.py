@@ -13,7 +13,7 @@ import numpy as np
 
 from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
-from psdmc.calibration.comparison import Comparison, Curve
+from psdmc.calibration.compared import Comparison, Curve
 from psdmc.calibration.validation import JointError, Validation
 from psdmc.report.calibrate_plots import MEASURED, PANEL, PREDICTED, RESIDUAL, alone, step_panels
 from psdmc.report.calibrate_report import FigureView

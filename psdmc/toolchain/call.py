@@ -37,7 +37,7 @@ class CompiledRobot(CompiledFunctions):
     Some descriptions name the base frame. For a robot with a floating base, this is the world frame.
 
     In addition to the arithmetic, a call takes about 0.3 us if all input arrays are contiguous and have the robot's dtype
-    and equal axes (...). With other input arrays, or if Python's C headers are not installed, it takes about 10 us.
+    and the same batch axes (...). With other input arrays, or if Python's C headers are not installed, it takes about 10 us.
     """
 
     def _bind(self, compiled: CompiledFunctions) -> None:

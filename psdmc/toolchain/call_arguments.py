@@ -171,7 +171,7 @@ def indefinite(
     scalars  values of the function's scalar inputs at this state
     state    index of the state in the batch
     """
-    for matrix in function.factorises:
+    for matrix in function.factorises * function.stages:
         shape = axes.sizes.shape(matrix.axes)
         if pivot < math.prod(shape):
             break

@@ -123,7 +123,7 @@ def _object(source: str) -> str:
 
 KERNELS = "kernels.json"
 
-DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot", "target")
+DECIDES = ("dynamics", "friction", "functions", "lower", "model", "program", "recipes", "robot", "target")
 """Folders of psdmc whose files the result of a lowering depends on, beside the modules at psdmc's top level."""
 
 

@@ -87,7 +87,8 @@ _SIZES = {
     "...": "batch axes, if the call computes many states; none for one state",
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
-    "nx": "2 nv: the first nv are for q (ball joint or floating base: for x in integrate(q, x)), the last nv for qd",
+    "nx": "2 nv: the first nv for q, the last nv for qd. If the robot has a ball joint or a floating base, q is replaced by "
+    "integrate(q, x), and the first nv are for x at x = 0",
     "nxa": "3 nv: nv for q, nv for qd and nv for qdd",
     "nxu": "3 nv: nv for q, nv for qd and nv for tau",
     "l": "number of base parameters, the entries of theta_b",

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.bench.agree import disagreement
 from psdmc.bench.build import native_flags
 from psdmc.bench.contestant import SEVERAL_SHARE, Contestant, Runner, Unavailable
 from psdmc.bench.rivals import cppadcg_c, psdmc_c
-from psdmc.bench.run import checked
+from psdmc.bench.run import checked, disagreement
 from psdmc.bench.states import States
 from psdmc.errors import ToolchainError
 

@@ -12,10 +12,9 @@ from tiny_contestants import tiny
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Runner
 from psdmc.bench.measure import CALLS, LEAST, MOST, code_bytes, code_sizes, swept_memory
-from psdmc.bench.results import BenchResult
+from psdmc.bench.results import BenchResult, as_text
 from psdmc.bench.run import Settings, run
 from psdmc.bench.states import States
-from psdmc.bench.table import as_text
 from psdmc.report.bench_page import page
 
 COLDER = 3.0

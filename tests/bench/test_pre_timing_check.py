@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psdmc.bench.agree import relative_error
 from psdmc.bench.build import native_flags
 from psdmc.bench.contestant import Runner
 from psdmc.bench.rivals import psdmc_c
-from psdmc.bench.run import checked
+from psdmc.bench.run import checked, relative_error
 from psdmc.bench.states import States
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Op, Program

@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 from made_up_bench import made_up_result
 
-from psdmc.bench.results import BenchResult, Unavailable
-from psdmc.bench.table import as_text
+from psdmc.bench.results import BenchResult, Unavailable, as_text
 from psdmc.errors import InputError
 from psdmc.report.bench_markdown import markdown
 from psdmc.report.bench_page import page, write_page

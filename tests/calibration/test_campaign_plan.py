@@ -10,10 +10,9 @@ import pytest
 from quick_campaign import QUICK
 
 from psdmc.calibration.calibrate import calibrate
-from psdmc.calibration.campaign import write_campaign
+from psdmc.calibration.campaign import summary, write_campaign
 from psdmc.calibration.campaign_file import listed_runs
 from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
-from psdmc.calibration.campaign_summary import summary
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.motions.allowed import GivenLimits, bounded

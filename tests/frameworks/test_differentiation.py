@@ -25,6 +25,7 @@ INVERTING = {
     "impulse",
     "mass_matrix_inverse",
     "semi_implicit_euler",
+    "constrained_semi_implicit_euler",
     "rk4_step",
 }
 COUNT = 4

@@ -30,13 +30,20 @@ FUNCTIONS = (
     "constrained_forward_dynamics_derivatives",
     "constrained_forward_dynamics_vjp",
     "constrained_forward_dynamics_jvp",
+    "constrained_semi_implicit_euler",
+    "constrained_semi_implicit_euler_derivatives",
+    "constrained_rk4_step",
     "impulse",
     "impulse_derivatives",
     "impulse_vjp",
     "impulse_jvp",
     "contact_jacobian",
+    "contact_jacobian_local",
     "contact_drift",
+    "contact_drift_local",
     "delassus",
+    "contact_space_inertia",
+    "contact_inverse_dynamics",
 )
 
 SHAPES = ("a trunk with two arms", "four legs on a body", "a wrist with two fingers")
@@ -107,6 +114,7 @@ def given_to(robot: Mechanism) -> dict[str, Array]:
         "qd": qd,
         "qd_before": qd,
         "tau": tau,
+        "dt": np.linspace(0.001, 0.02, COUNT),
         "active": masks.astype(float),
         "mu": np.zeros(COUNT),
         "kp": rng.uniform(0.0, 50.0, COUNT),

@@ -86,6 +86,8 @@ def test_what_calls_forward_dynamics_says_that_the_mass_matrix_is_not_positive(f
 JACOBIANS = [
     ("semi_implicit_euler", "small"),
     ("semi_implicit_euler", "hand"),
+    ("constrained_semi_implicit_euler", "small"),
+    ("constrained_semi_implicit_euler", "hand"),
     ("rk4_step", "two"),
     ("rk4_step", "pair"),
 ]
@@ -97,26 +99,38 @@ def test_a_steps_jacobians_are_its_slopes_along_the_tangents(function: str, name
     times M's condition number, of each column's largest entry (Higham, Accuracy and Stability, 10.1)."""
     own = wide_robot(name)
     recipe, nv, nq = RECIPES[f"{function}_derivatives"], own.model.nv, own.model.nq
+    blocks = [
+        name for name in ("A", "B", "B_error") if name in {each.name for each in recipe.signature.outputs}
+    ]
     given = {quantity.name: own.given[quantity.name] for quantity in recipe.signature.inputs}
     given["qdd"] = own.arrays.accelerations(given["q"], given["qd"], given["tau"])
     found = recipe.reference(own.arrays, given)
-    whole = np.concatenate([found["A"], found["B"]], axis=-1)
+    whole = np.concatenate([found[name] for name in blocks], axis=-1)
+    width = whole.shape[-1]
 
     def rates_of_coordinates(q: np.ndarray) -> np.ndarray:
         units = (np.broadcast_to(unit, (len(q), nv)) for unit in np.eye(nv))
         return np.stack([own.pinocchio.coordinate_rates(q, unit) for unit in units], axis=-1)
 
-    by_qd, by_tau = np.eye(3 * nv)[nv : 2 * nv], np.eye(3 * nv)[2 * nv :]
-    by_q = rates_of_coordinates(given["q"]) @ np.eye(nv, 3 * nv)
-    ways = {"q": by_q, "qd": by_qd[None], "tau": by_tau[None]}
-    point = {"q": given["q"], "qd": given["qd"], "tau": given["tau"], "dt": given["dt"][:, None]}
+    _, by_qd, by_tau, by_error = np.split(np.eye(width), [nv, 2 * nv, 3 * nv])
+    by_q = rates_of_coordinates(given["q"]) @ np.eye(nv, width)
+    ways = {"q": by_q, "qd": by_qd[None], "tau": by_tau[None]} | (
+        {"error": by_error[None]} if len(by_error) else {}
+    )
+    inputs = [quantity.name for quantity in recipe.signature.inputs]
+    point = {name: given[name].reshape(len(given["q"]), -1) for name in inputs}
     step = lowered(own.model, functions=[function])[function].single
     q_next, of_coordinates = slopes_along(step, point, ways, "q_next", nq)
     _, of_rates = slopes_along(step, point, ways, "qd_next", nv)
     of_tangents = np.linalg.pinv(rates_of_coordinates(q_next)) @ of_coordinates
     slopes = np.concatenate([of_tangents, of_rates], axis=1)
 
-    condition = np.linalg.cond(own.arrays.mass_matrix(given["q"])).max()
+    condition = np.linalg.cond(mass := own.arrays.mass_matrix(given["q"])).max()
+    if len(by_error):
+        rows = RECIPES["contact_jacobian"].reference(own.arrays, given)["J"]
+        condition *= np.linalg.cond(
+            rows @ np.linalg.inv(mass) @ rows.swapaxes(1, 2) + 0.1 * np.eye(len(by_error))
+        ).max()
     largest = np.abs(slopes).max(axis=(0, 1))
     error = (np.abs(whole - slopes) / largest).max()
     assert error < nv * np.finfo(float).eps * condition

@@ -45,6 +45,7 @@ VALUES: dict[str, tuple[str, ...]] = {
     "--frames": ("thumb,nail", "palm", "left,right", "left,left", "camera", "base", ",", "nowhere", "universe"),
     "--with": ("casadi", "casadi,casadi", "x", ""),
     "--target": ("native", "cortex-m4f", "avx2", "x", ""),
+    "--estimator": ("mass", "inertia", "all", "", "mass,inertia"),
     "--friction": ("coulomb,viscous,offset", "coulomb,viscous^0.5", "viscous", "x", ",", "coulomb,viscous^nan"),
     "--split": ("0.3", "0.15,40", "1", "nan", "0.1,1e9", ",", "x"),
     "--validate": ("log.csv", "log.npz", "campaign", "missing", "empty"),

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.lower.expanded.constants import Constants
-from psdmc.lower.expanded.diagram import Diagram, nested_horner, operations, with_constants
-from psdmc.lower.expanded.orders import base_first, candidates, tip_first
+from psdmc.lower.expanded.diagram import Constants, Diagram, nested_horner, operations, with_constants
+from psdmc.lower.expanded.lowering import base_first, candidates, polynomial_values, tip_first
 from psdmc.lower.expanded.terms import Terms
-from psdmc.lower.expanded.values import polynomial_values
 from psdmc.program.cost import cost
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Slot

@@ -43,8 +43,10 @@ def test_what_stands_before_products_comes_back():
 
 def test_limbs_and_the_products_behind_them_come_back():
     group = LimbGroup(0, 2, ((Slot("group0_q", 0), (Slot("q", 0), Slot("q", 1))),), ((1.0, 2.0),), ())
-    products = ThinProducts(("g",), (0,), 2, (0,), (Shares("group0_shares", (1,), (0,)),))
-    limbs = LimbProgram((group,), (Stage(None, parse("a = load q[0]\nout g_core[0] = a")),), 4, products)
+    products = ThinProducts(("g",), (0,), 2, (0,), (Shares("group0_shares", (1,), (0,), True),), ("g",))
+    limbs = LimbProgram(
+        (group,), (Stage(None, parse("a = load q[0]\nout g_core[0] = a")),), 4, (products,), True
+    )
     made = Kernel(SIGNATURES["gravity"], False, GRAVITY, GRAVITY, "factored", limbs=limbs)
     assert kernels_from_json(kernels_to_json({"gravity": made}), SIGNATURES) == {"gravity": made}
 

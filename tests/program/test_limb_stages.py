@@ -103,7 +103,7 @@ def test_products_behind_limbs_are_written_out_entry_by_entry():
         out group0_output[2] = y
     """)
     products = ThinProducts(("M",), (1,), 3, (0,), (Shares("shares", (1, 2), (0,)),))
-    limbs = LimbProgram((group,), staged(whole, [group]), products=products)
+    limbs = LimbProgram((group,), staged(whole, [group]), products=(products,))
     v, a, b = q = np.array([0.7, 0.3, -0.4])
 
     found = interpret(unpacked(limbs), {"q": q}, {"M": 9})["M"].reshape(3, 3)

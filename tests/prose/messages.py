@@ -18,7 +18,6 @@ SHOWN_BY = {
     "append",
     "Option",
     "Argument",
-    "FaultAndRemedy",
 }
 """Calls whose strings are shown. `append` is that of notes, faults, warnings, doubts and reasons."""
 LISTS = ("notes", "faults", "warnings", "doubts", "reasons", "lines")

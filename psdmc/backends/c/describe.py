@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 
 from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
@@ -12,13 +13,16 @@ from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Target
 
+WIDTH = 116
+"""Characters of a line in the header."""
+
 
 def description(
     info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView], with_frames: bool
 ) -> tuple[str, ...]:
     """Return the text at the top of the C header, as lines. It gives the facts of the robot, the layout of arrays, and
     the variants of functions (such as for many states). Names from the robot file are not escaped yet."""
-    lines = [*facts(info, options), *_arrays(info), *_forms(options.target)]
+    lines = [*facts(info, options), *_friction(info, functions), *_arrays(info), *_forms(options.target)]
     if any(function.name.endswith(THETA_ROWS) for function in functions):
         lines += [
             f"  _theta_rows with one theta_b per state: thetas is an input like q, a state has l = {info.l} reals of it"
@@ -32,6 +36,43 @@ def description(
         *(frame_lines(info) if with_frames else ()),
         *(contact_lines(info) if touching else ()),
     )
+
+
+def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str, ...]:
+    """The friction that motor torques contain, with its values, and which functions contain it."""
+    law = info.in_dynamics
+    if law is None:
+        return ()
+    names: dict[bool, list[str]] = {True: [], False: []}
+    for function in functions:
+        names[function.signature.has_motor_torques].append(function.name)
+    headings = [name for term in law.terms for name in term.names]
+    return (
+        "Friction in the dynamics: tau are the torques of the motors, M(q) qdd + h(q, qd) + friction (N m; N if sliding).",
+        "Friction is positive where the motor must push in the positive direction: Coulomb and viscous friction have the",
+        f"sign of the joint's rate v (rad/s; m/s if sliding). With s = tanh(v / {law.sign_speed!r}), a smooth sign, it is",
+        f"  {law.formula}",
+        f"Values per joint ({', '.join(headings)}):",
+        *(
+            f"  {joint}: {', '.join(f'{x:.9g}' for x in values)}"
+            for joint, values in zip(_with_friction(info), law.values.tolist(), strict=True)
+        ),
+        *wrap(f"Functions with friction: {', '.join(names[True]) or 'none'}.", WIDTH, subsequent_indent="  "),
+        *wrap(
+            f"Functions without friction: {', '.join(names[False]) or 'none'}.", WIDTH, subsequent_indent="  "
+        ),
+        *(
+            (f"The calibration also found what tau does not have: {'; '.join(law.beyond)}.",)
+            if law.beyond
+            else ()
+        ),
+        "",
+    )
+
+
+def _with_friction(info: PackageInfo) -> list[str]:
+    """Names of the joints that have friction: those of one rate."""
+    return [joint.name for joint in info.joints if joint.nv == 1]
 
 
 def _arrays(info: PackageInfo) -> tuple[str, ...]:

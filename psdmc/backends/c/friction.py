@@ -64,11 +64,7 @@ class FrictionView:
     @property
     def formula(self) -> str:
         """The law, for the header."""
-        terms = self.friction.terms
-        against = " + ".join(term.formula for term in terms if term.law.against)
-        return " + ".join(
-            (*((f"s ({against})",) if against else ()), *(t.formula for t in terms if not t.law.against))
-        )
+        return self.friction.formula
 
     @property
     def sign_speed(self) -> str:

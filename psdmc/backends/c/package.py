@@ -7,17 +7,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from psdmc.backends.c.bodies_view import BodiesView
+from psdmc.backends.c.bodies_view import BodiesView, PayloadView
 from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
 from psdmc.backends.c.describe import description
+from psdmc.backends.c.estimator import EstimatorView
 from psdmc.backends.c.friction import FrictionView
 from psdmc.backends.c.function_view import FunctionView, function_views
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.operations import CallView, call_views
 from psdmc.backends.c.patterns import Pattern, patterns
-from psdmc.backends.c.payload_view import PayloadView
 from psdmc.backends.c.products import Shape
 from psdmc.backends.c.reals import CReal, c_real, check_range
 from psdmc.backends.c.references import ReferenceView, reference_view
@@ -47,6 +47,7 @@ class PackageView:
     references  inputs and expected results for the self-test; None: no self-test
     adapters    names of the other programs, such as CasADi, for which the package has files
     private     functions for one state that only adapters call; no header declares them
+    estimator   the load estimator; None: no estimator
     """
 
     robot: str
@@ -56,6 +57,7 @@ class PackageView:
     references: ReferenceView | None
     adapters: tuple[str, ...] = ()
     private: tuple[FunctionView, ...] = ()
+    estimator: EstimatorView | None = None
 
     @property
     def alone(self) -> PackageView:
@@ -166,7 +168,8 @@ class PackageView:
         bodies = ("src/bodies.c",) if self.info.bodies else ()
         friction = ("src/friction.c",) if self.info.friction else ()
         functions = (f"src/{unit.name}.c" for function in self.functions for unit in function.units)
-        return ("src/tables.c", *functions, *payload, *bodies, *friction)
+        estimator = self.estimator.sources if self.estimator else ()
+        return ("src/tables.c", *functions, *payload, *bodies, *friction, *estimator)
 
     @property
     def friction(self) -> FrictionView | None:
@@ -213,8 +216,13 @@ class PackageView:
 
     @property
     def _all_kernels(self) -> tuple[KernelView, ...]:
-        """The kernels of all functions, with those that only adapters call."""
-        return (*self.kernels, *(kernel for function in self.private for kernel in function.kernels))
+        """The kernels of all functions, with those that only adapters or the estimator call."""
+        return (*self.kernels, *(kernel for function in self.undeclared for kernel in function.kernels))
+
+    @property
+    def undeclared(self) -> tuple[FunctionView, ...]:
+        """Functions for one state that no header declares: those of adapters and of the estimator."""
+        return (*self.private, *((self.estimator.momentum,) if self.estimator else ()))
 
     @property
     def is_mixed(self) -> bool:
@@ -312,12 +320,12 @@ def package_view(
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
     check_range(info, kernels, c_real(options))
-    _check_calls(info, kernels, options)
-    if info.friction and options.trig == "freestanding":
+    if (info.friction or info.in_dynamics) and options.trig == "freestanding":
         raise InputError(
             f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
             "emit it with --trig inline, or leave --friction out",
         )
+    _check_calls(info, kernels, options)
     robot = identifier(info.name)
     functions = function_views(kernels, info.sizes, robot, options, info.base_frame)
     package = PackageView(robot, info, options, functions, None, tuple(adapters))

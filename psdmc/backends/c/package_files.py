@@ -103,7 +103,7 @@ def library_files(package: PackageView) -> dict[str, str]:
         )
     for function, shown in (
         *((each, package) for each in package.functions),
-        *((each, package.alone) for each in package.private),
+        *((each, package.alone) for each in package.undeclared),
     ):
         for unit in function.units:
             files[f"src/{unit.name}.c"] = render(
@@ -127,6 +127,8 @@ def library_files(package: PackageView) -> dict[str, str]:
         files["src/bodies.c"] = render("bodies.c.jinja", package=package)
     if package.info.friction:
         files["src/friction.c"] = render("friction.c.jinja", package=package)
+    if package.estimator:
+        files["src/estimator.c"] = render("estimator.c.jinja", package=package)
     return files
 
 

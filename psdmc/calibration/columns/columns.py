@@ -3,7 +3,7 @@ unknown values, such as a stiffness, adds one column to the linear least-squares
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,58 @@ from numpy.typing import NDArray
 from psdmc.calibration.columns.effect import Content, Effect, Motion, Unknown
 from psdmc.calibration.columns.flags import joints_of
 from psdmc.calibration.columns.kinds import KINDS
-from psdmc.calibration.columns.rubbing import rubbing
 from psdmc.calibration.columns.spring import Spring
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
 from psdmc.calibration.logs.wording import quoted
-from psdmc.friction.law import Law, Term
+from psdmc.friction.law import At, Law, Term
 from psdmc.friction.own import laws_of, read_law
 from psdmc.friction.terms import KEYS, OPTIONAL
 from psdmc.robot.mechanism import Mechanism
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rubbing:
+    """The friction of some joints: one contribution to the motor torques that a fit predicts, with unknown values.
+
+    terms     terms of friction laws, each with the index of its joint
+    unknowns  the unknown values of all terms, term after term
+    """
+
+    terms: tuple[tuple[int, Term], ...]
+    unknowns: tuple[Unknown, ...]
+
+    @property
+    def by_load(self) -> bool:
+        return any("load" in term.reads for _, term in self.terms)
+
+    def columns(self, motion: Motion) -> Array:
+        load = np.zeros_like(motion.speed) if motion.load is None else motion.load
+        sign = np.tanh(motion.speed / motion.sign_speed)
+        each = []
+        for joint, term in self.terms:
+            at = At(*(part[:, joint] for part in (motion.place, motion.speed, sign, load)))
+            each += [(joint, column) for column in term.columns(at)]
+        found = np.zeros((*motion.speed.shape, len(each)))
+        for k, (joint, column) in enumerate(each):
+            found[:, joint, k] = column
+        return found if motion.onto is None else np.einsum("tmk,mj->tjk", found, motion.onto)
+
+
+def rubbing(terms: Sequence[tuple[int, Term]], chain: Mechanism) -> Rubbing:
+    """Return the friction of some joints as one contribution to the motor torques that a fit predicts.
+
+    terms  terms of friction laws, such as Coulomb friction, each with the index of its joint
+    """
+    unknowns = [
+        Unknown(chain.joint_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
+        for joint, term in terms
+        for name, unit, value in zip(
+            term.names, term.units(chain.joints[joint].type.effort_unit), term.law.values, strict=True
+        )
+    ]
+    return Rubbing(tuple(terms), tuple(unknowns))
+
 
 MOST_SPRINGS = 50
 HINT = "docs/how-to/springs-and-friction.md describes these tables"

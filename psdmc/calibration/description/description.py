@@ -1,7 +1,7 @@
 """A log description (log.toml): the file says what the columns of a user's logs are, and how to fit them.
 
-Each top-level key of the file is described by an object of the class Table in a separate module; `tables.TABLES` lists
-these objects.
+Each top-level key of the file is described by an object of the class Table in a separate module; `TABLES` lists these
+objects.
 """
 
 from __future__ import annotations
@@ -12,9 +12,49 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from psdmc.calibration.description.table import Reading, Table
-from psdmc.calibration.description.tables import TABLES
+from psdmc.calibration.description.table_coupling import COUPLING
+from psdmc.calibration.description.table_fit import FIT
+from psdmc.calibration.description.table_joints import JOINTS
+from psdmc.calibration.description.table_logs import CSV_FORM, LOGS, TIME
+from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_none
+
+
+def _kept(key: str) -> Table[object]:
+    """A table that is handed on as it is."""
+
+    def read(value: object, reading: Reading) -> object:
+        return value
+
+    def options(options: LinearOptions, value: object) -> LinearOptions:
+        return options if value is None else replace(options, tables={**options.tables, key: value})
+
+    return Table(key, read, None, options)
+
+
+SPRINGS, FRICTION = _kept("springs"), _kept("friction")
+PRIOR, BODIES, ESSENTIAL = _kept("prior"), _kept("bodies"), _kept("essential")
+"""Tables that are read where the robot is known: columns of the fit beside rigid bodies and plain friction
+(psdmc.calibration.columns), and what is known before the fit (psdmc.calibration.identify.knowledge)."""
+
+TABLES: tuple[Table[Any], ...] = (
+    LOGS,
+    CSV_FORM,
+    TIME,
+    POSITION,
+    VELOCITY,
+    EFFORT,
+    JOINTS,
+    COUPLING,
+    FIT,
+    SPRINGS,
+    FRICTION,
+    PRIOR,
+    BODIES,
+    ESSENTIAL,
+)
+
 
 WHAT = "a log description (log.toml), as `psdmc calibrate --describe` drafts one"
 HINT = "docs/log_description.md has every key; `psdmc calibrate --describe LOG` drafts a description"

@@ -9,18 +9,24 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import interpolate
 
-from psdmc.calibration.description.columns_found import Found, JointColumns, joint_columns, place_of
+from psdmc.calibration.description.columns_found import (
+    Found,
+    JointColumns,
+    held_quantity,
+    joint_columns,
+    place_of,
+    torque_factor,
+)
 from psdmc.calibration.description.description import LogDescription
-from psdmc.calibration.description.efforts import held_quantity, torque_factor
 from psdmc.calibration.description.table_coupling import COUPLING, CouplingEntry
 from psdmc.calibration.description.table_logs import CSV_FORM, LOGS, TIME, LogEntry, TimeEntry
 from psdmc.calibration.description.table_quantities import refused
-from psdmc.calibration.identify.coupling import coupling_of
+from psdmc.calibration.identify.motor_model import coupling_of
+from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED_ROWS
 from psdmc.calibration.logs.formats import format_of
 from psdmc.calibration.logs.log import Array, Quantity, date_of
 from psdmc.calibration.logs.log_format import Columns, Opening
 from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
-from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 from psdmc.progress import Progress

@@ -10,15 +10,11 @@ import numpy as np
 
 from psdmc.calibration.identify.friction_fit import JointFriction, fit_joint, unknowns_of
 from psdmc.calibration.identify.friction_run import JointRun, prepared
-from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.quality import quality
-from psdmc.calibration.identify.residuals import CORRELATED
-from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, StepOptions
+from psdmc.calibration.identify.residuals import CORRELATED, quality
+from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, Robot, StepOptions
 from psdmc.calibration.logs.log import Array
 from psdmc.model.calibrated import JointQuality, Remark, Sample, StepQuality
 from psdmc.processes import in_processes
-from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,20 +79,13 @@ def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFrict
 
 
 def prepared_runs(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    theta_b: Array,
-    runs: Sequence[FrictionRun],
-    options: StepOptions,
+    robot: Robot, theta_b: Array, runs: Sequence[FrictionRun], options: StepOptions
 ) -> dict[str, JointRun]:
     """Return the friction runs (recordings in which one joint moves) by joint, in the order of the robot's joints. Each
     has its gravity torque, which is computed from the base parameters theta_b."""
-    places = {name: k for k, name in enumerate(chain.joint_names)}
+    places = {name: k for k, name in enumerate(robot.chain.joint_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
-    return {
-        run.joint: prepared(chain, model, motors, theta_b, run, places[run.joint], options) for run in own
-    }
+    return {run.joint: prepared(robot, theta_b, run, places[run.joint], options) for run in own}
 
 
 _Task = tuple[str, JointRun, FrictionOptions, JointFriction | None]

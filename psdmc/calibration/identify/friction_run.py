@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
+from psdmc.calibration.identify.predictor import gravity_regressor, payload_torque
 from psdmc.calibration.identify.state_friction import friction_torque
-from psdmc.calibration.identify.steps import FrictionRun, StepOptions
+from psdmc.calibration.identify.steps import FrictionRun, Robot, StepOptions
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
@@ -72,22 +71,14 @@ class JointRun:
         return np.asarray((self.low_pass(self.torque(p)) - self.measured)[rows])
 
 
-def prepared(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    theta_gravity: Array,
-    run: FrictionRun,
-    k: int,
-    options: StepOptions,
-) -> JointRun:
+def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, options: StepOptions) -> JointRun:
     """Return the friction run of joint k with the torques of gravity and of the known load. Raises InputError if other
     joints move, too."""
-    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
-    _require_alone(run, chain, k, states)
-    gravity = (gravity_regressor(model, states.q) @ theta_gravity)[:, k]
+    states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
+    _require_alone(run, robot.chain, k, states)
+    gravity = (gravity_regressor(robot.regressor, states.q) @ theta_gravity)[:, k]
     if run.tool is not None:
-        gravity = gravity + payload_torque(chain, states.q, run.tool.mass, run.tool.com)[:, k]
+        gravity = gravity + payload_torque(robot.chain, states.q, run.tool.mass, run.tool.com)[:, k]
     rows = thinned(states, options.filter)
     out = held_out(len(rows), options.split)
     return JointRun(
@@ -96,7 +87,7 @@ def prepared(
         qd=states.qd[:, k],
         qdd=states.qdd[:, k],
         gravity=gravity,
-        measured=motors.torque(states.effort)[:, k],
+        measured=robot.motors.torque(states.effort)[:, k],
         low_pass=states.low_pass,
         every=rows,
         fit=rows[~out],

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior, base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.least_squares import estimate
-from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
-from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
-from psdmc.calibration.identify.steps import GravityRun, StepOptions, judged
+from psdmc.calibration.identify.steps import GravityRun, Robot, StepOptions, judged
 from psdmc.calibration.logs.filter import States, away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
@@ -106,10 +104,8 @@ def gravity_split(chain: Mechanism, model: Regressor, l: int, seed: int = 0) -> 
 
 
 def calibrate_gravity(
-    chain: Mechanism,
-    model: Regressor,
+    robot: Robot,
     split: GravitySplit,
-    motors: Motors,
     runs: Sequence[GravityRun],
     options: StepOptions,
     theta_b: Array | None = None,
@@ -123,75 +119,64 @@ def calibrate_gravity(
     file_theta  the base parameters of the robot file. They remain in directions (linear combinations) that no run
                 determines; None: zero
     """
-    q, target, use, currents = _even_parts(chain, model, motors, runs, options, theta_b)
-    columns = gravity_regressor(model, q)[:, :, split.pivots]
+    q, target, use, currents = _even_parts(robot, runs, options, theta_b)
+    columns = gravity_regressor(robot.regressor, q)[:, :, split.pivots]
     out = held_out(len(q), options.split)
     kept = use & ~out[:, None]
-    consider = Consider(-currents[:, :, None] * np.eye(len(chain)), np.diag(motors.relative_std**2))
-    scale = base_parameter_scale(chain, model, torque_sizes(currents), file_theta)[split.pivots]
+    consider = Consider(
+        -currents[:, :, None] * np.eye(len(robot.chain)), np.diag(robot.motors.relative_std**2)
+    )
+    scale = base_parameter_scale(robot.chain, robot.regressor, torque_sizes(currents), file_theta)[
+        split.pivots
+    ]
     start = np.zeros(len(scale)) if file_theta is None else split.phi(file_theta)
     solved = estimate(columns, target, options.fit, consider, kept, Prior(start, scale))
-    return GravityResult(split, solved, noise_warnings("gravity", chain.joint_names, solved))
+    return GravityResult(split, solved, noise_warnings("gravity", robot.chain.joint_names, solved))
 
 
 def judge_gravity(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    runs: Sequence[GravityRun],
-    options: StepOptions,
-    theta_b: Array,
+    robot: Robot, runs: Sequence[GravityRun], options: StepOptions, theta_b: Array
 ) -> StepQuality:
     """Return how well the base parameters predict gravity torques. The measured torques are averaged over both
     directions of motion, which cancels friction."""
-    q, target, use, _ = _even_parts(chain, model, motors, runs, options, theta_b)
+    q, target, use, _ = _even_parts(robot, runs, options, theta_b)
     out = held_out(len(q), options.split)
-    predicted = gravity_regressor(model, q) @ theta_b
+    predicted = gravity_regressor(robot.regressor, q) @ theta_b
     row = np.arange(len(q), dtype=np.float64)
-    return judged("Gravity", chain.joint_names, row, target, predicted, out, use, "sample")
+    return judged("Gravity", robot.chain.joint_names, row, target, predicted, out, use, "sample")
 
 
 def _even_parts(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    runs: Sequence[GravityRun],
-    options: StepOptions,
-    theta_b: Array | None,
+    robot: Robot, runs: Sequence[GravityRun], options: StepOptions, theta_b: Array | None
 ) -> tuple[Array, Array, NDArray[np.bool_], Array]:
     """All runs' rows one after the other: position, torque without friction, usable entries, total motor torque."""
-    parts = [_even_part(chain, model, motors, run, options, theta_b) for run in runs]
+    parts = [_even_part(robot, run, options, theta_b) for run in runs]
     q, target, use, torque = (np.concatenate(x) for x in zip(*parts, strict=True))
     return q, target, use, torque
 
 
 def _even_part(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    run: GravityRun,
-    options: StepOptions,
-    theta_b: Array | None,
+    robot: Robot, run: GravityRun, options: StepOptions, theta_b: Array | None
 ) -> tuple[Array, Array, NDArray[np.bool_], Array]:
     """Mean position, torque without friction, usable entries and total motor torque, one row per independent sample."""
-    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
+    states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
     there, back = _pairs(states, options)
-    torque = motors.torque(states.effort)
+    torque = robot.motors.torque(states.effort)
     target = torque.copy()
     if theta_b is not None:
-        full = model.regressor(
+        full = robot.regressor.regressor(
             states.q[[*there, *back]], states.qd[[*there, *back]], states.qdd[[*there, *back]]
         )
-        still = gravity_regressor(model, states.q[[*there, *back]])
+        still = gravity_regressor(robot.regressor, states.q[[*there, *back]])
         target[[*there, *back]] -= (full - still) @ theta_b
     if run.tool is not None:
-        target -= payload_torque(chain, states.q, run.tool.mass, run.tool.com)
+        target -= payload_torque(robot.chain, states.q, run.tool.mass, run.tool.com)
     turning = np.any(np.abs(states.qdd) >= STEADY_ACCELERATION, axis=1)
     steady = away_from(turning, options.filter, states.period)
     moves = np.abs(states.qd) > MOVING
     near = np.all(np.abs(states.q[there] - states.q[back]) < SAME_PLACE, axis=1)
     use = (near & steady[there] & steady[back])[:, None] & moves[there] & moves[back]
-    if use.sum() < 10 * len(chain):
+    if use.sum() < 10 * len(robot.chain):
         raise InputError(
             f"{run.log.name}: the backward sweep does not follow the forward sweep at constant speed",
             "gravity needs each path run forwards and backwards, slowly: `psdmc excite` plans such runs",

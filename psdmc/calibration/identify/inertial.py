@@ -12,22 +12,20 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior, base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import GravityResult, gravity_split
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
-from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.state_friction import friction_torque
-from psdmc.calibration.identify.steps import InertialRun, StepOptions, judged
+from psdmc.calibration.identify.steps import InertialRun, Robot, StepOptions, judged
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.model.calibrated import StepQuality
-from psdmc.robot.mechanism import Mechanism
 
 FRICTION_STEP = 0.1
 """Step of the finite difference for a friction parameter's effect on the torque, in its standard deviations."""
@@ -80,9 +78,7 @@ class _Rows:
 
 
 def calibrate_inertial(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
+    robot: Robot,
     gravity: GravityResult,
     friction: FrictionResult,
     runs: Sequence[InertialRun],
@@ -96,13 +92,13 @@ def calibrate_inertial(
                 determines; None: zero
     """
     split = gravity.split
-    rows = _stacked([_rows(chain, model, motors, friction, run, options) for run in runs])
+    rows = _stacked([_rows(robot, friction, run, options) for run in runs])
     static = rows.columns @ (split.from_phi() @ gravity.estimate.values) + rows.known
     target = rows.torque - static - rows.friction
     out = held_out(len(target), options.split)
-    consider = _considered(motors, gravity, friction, rows)
-    kept = np.repeat(~out[:, None], len(chain), axis=1)
-    scale = base_parameter_scale(chain, model, torque_sizes(rows.torque), file_theta)
+    consider = _considered(robot.motors, gravity, friction, rows)
+    kept = np.repeat(~out[:, None], len(robot.chain), axis=1)
+    scale = base_parameter_scale(robot.chain, robot.regressor, torque_sizes(rows.torque), file_theta)
     start = np.zeros(len(split.rest)) if file_theta is None else file_theta[split.rest]
     prior = Prior(start, scale[split.rest], rows.noise @ split.from_psi())
     solved = estimate(rows.columns @ split.from_psi(), target, options.fit, consider, kept, prior)
@@ -110,12 +106,12 @@ def calibrate_inertial(
     by_phi, by_psi = split.from_phi(), split.from_psi()
     return InertialResult(
         theta_b=theta_b,
-        covariance=_combined(motors, gravity, friction, solved),
+        covariance=_combined(robot.motors, gravity, friction, solved),
         identifiable=_identifiable(gravity, solved),
         estimate=solved,
         unseen=np.hstack([by_phi @ _believable(gravity.estimate), by_psi @ _believable(solved)]),
         scale=scale,
-        warnings=noise_warnings("inertial", chain.joint_names, solved),
+        warnings=noise_warnings("inertial", robot.chain.joint_names, solved),
     )
 
 
@@ -125,23 +121,17 @@ def _believable(solved: Estimate) -> Array:
 
 
 def judge_inertial(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    theta_b: Array,
-    friction: FrictionResult,
-    runs: Sequence[InertialRun],
-    options: StepOptions,
+    robot: Robot, theta_b: Array, friction: FrictionResult, runs: Sequence[InertialRun], options: StepOptions
 ) -> tuple[StepQuality, StepQuality]:
     """Return how well the base parameters predict the torques of the fast motion. The first result is for inertial
     torques alone, after gravity and friction are subtracted; the second is for the whole torques."""
-    split = gravity_split(chain, model, len(theta_b))
-    rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
+    split = gravity_split(robot.chain, robot.regressor, len(theta_b))
+    rows = _stacked([_rows(robot, friction, run, options, sensitive=False) for run in runs])
     still = split.from_phi() @ split.phi(theta_b)
     static = rows.columns @ still + rows.known + rows.friction
     moving = rows.columns @ (theta_b - still)
     out = held_out(len(rows.time), options.split)
-    names = chain.joint_names
+    names = robot.chain.joint_names
     return (
         judged("Inertial", names, rows.time, rows.torque - static, moving, out),
         judged("All", names, rows.time, rows.torque, static + moving, out),
@@ -154,29 +144,25 @@ def _stacked(parts: Sequence[_Rows]) -> _Rows:
 
 
 def _rows(
-    chain: Mechanism,
-    model: Regressor,
-    motors: Motors,
-    friction: FrictionResult,
-    run: InertialRun,
-    options: StepOptions,
-    sensitive: bool = True,
+    robot: Robot, friction: FrictionResult, run: InertialRun, options: StepOptions, sensitive: bool = True
 ) -> _Rows:
     """One run's rows. `sensitive` adds noise columns and slopes of friction, which a fit needs and a prediction does
     not."""
-    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
+    states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
     at = thinned(states, options.filter)
     late = Late(states, friction.delay, at)
     known = np.zeros_like(states.q)
     if run.tool is not None:
-        known = payload_torque(chain, states.q, run.tool.mass, run.tool.com)
-    columns = _late_columns(model, late, (states.q, states.qd, states.qdd))
+        known = payload_torque(robot.chain, states.q, run.tool.mass, run.tool.com)
+    columns = _late_columns(robot.regressor, late, (states.q, states.qd, states.qdd))
     by_noise = (
-        _late_columns(model, late, states.jittered()) - columns if sensitive else np.zeros_like(columns)
+        _late_columns(robot.regressor, late, states.jittered()) - columns
+        if sensitive
+        else np.zeros_like(columns)
     )
     rubbed = np.zeros_like(states.q)
     slopes: list[Array] = []
-    for k, name in enumerate(chain.joint_names):
+    for k, name in enumerate(robot.chain.joint_names):
         if name in friction.joints:
             rubbed[:, k] = friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
             if sensitive:
@@ -184,12 +170,12 @@ def _rows(
                 slopes += [late(slope, k) for slope in own]
     return _Rows(
         time=states.time[at],
-        torque=motors.torque(states.effort)[at],
+        torque=robot.motors.torque(states.effort)[at],
         known=late(known),
         columns=columns,
         noise=by_noise,
         friction=late(rubbed),
-        friction_columns=np.stack(slopes, axis=-1) if slopes else np.zeros((len(at), len(chain), 0)),
+        friction_columns=np.stack(slopes, axis=-1) if slopes else np.zeros((len(at), len(robot.chain), 0)),
     )
 
 

@@ -16,6 +16,7 @@ from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.model import recursive
+from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.payload import body_parameters, carrying_frame, load_parameters
 from psdmc.robot.inertia import inertia_matrix
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
@@ -46,6 +47,11 @@ class KnownLoad:
     @property
     def is_point(self) -> bool:
         return not np.any(self.inertia)
+
+    def added_to(self, model: DynamicsModel) -> DynamicsModel:
+        """Return the model with this load attached. Raises InputError if no real body has these values, or if the
+        model has no such frame."""
+        return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
 
     def parameters(self, chain: Mechanism) -> Array:
         """Return the standard parameters (11 n,) of a robot with n joints whose only body is the load. Each joint has

@@ -8,8 +8,14 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import Consider, Estimate, FitOptions, Prior
 from psdmc.calibration.identify.linear_rows import Block, Rows, collected, reduced, residual_of
-from psdmc.calibration.identify.residuals import sample_correlation, spread, widening
-from psdmc.calibration.identify.reweighted import Sandwich, huber_sandwich, squares
+from psdmc.calibration.identify.residuals import (
+    Sandwich,
+    huber_sandwich,
+    sample_correlation,
+    spread,
+    squares,
+    widening,
+)
 from psdmc.calibration.logs.log import Array
 
 

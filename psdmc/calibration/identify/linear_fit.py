@@ -13,14 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Estimate, FitOptions, Prior
-from psdmc.calibration.identify.extra import extra_scale
+from psdmc.calibration.identify.estimate import (
+    Estimate,
+    FitOptions,
+    Prior,
+    base_parameter_scale,
+    torque_sizes,
+)
 from psdmc.calibration.identify.least_squares import estimate_rows
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
+from psdmc.calibration.identify.linear_problem import LinearProblem, extra_scale, linear_problem
 from psdmc.calibration.identify.motor_model import Motors, RowsByMotors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.predictor import payload_torque
-from psdmc.calibration.identify.quality import quality
-from psdmc.calibration.identify.residuals import widening
+from psdmc.calibration.identify.residuals import quality, widening
 from psdmc.calibration.identify.steps import MotorRun, StepOptions
 from psdmc.calibration.logs.filter import away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array, Log

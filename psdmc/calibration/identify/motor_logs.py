@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.estimate import Estimate, Prior
+from psdmc.calibration.identify.estimate import Estimate, Prior, torque_sizes
 from psdmc.calibration.identify.known_load import REMEDIES, KnownLoad, unreached
 from psdmc.calibration.identify.least_squares import estimate_rows
 from psdmc.calibration.identify.linear_fit import linear_prior
@@ -38,7 +38,6 @@ from psdmc.calibration.identify.linear_rows import Block, residual_of
 from psdmc.calibration.identify.motor import MotorResult, negative_warnings
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.prior import torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.logs.filter import stretches
 from psdmc.calibration.logs.log import Array

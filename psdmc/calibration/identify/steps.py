@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import FitOptions
-from psdmc.calibration.identify.quality import quality
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.residuals import quality
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.model.calibrated import JointQuality, Sample, StepQuality, StepUsed
+from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +26,20 @@ class Load:
 
     mass: float
     com: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """What the steps of a four-step calibration know of the robot.
+
+    chain      the joints, with their limits
+    regressor  object that computes the robot's regressor
+    motors     the motors, which convert logged effort to torque
+    """
+
+    chain: Mechanism
+    regressor: Regressor
+    motors: Motors
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,8 +17,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, WRITE_AGAIN, decoding, opened
-from psdmc.calibration.logs.table_limits import ALWAYS_ALLOWED, LARGEST_EXPANSION
+from psdmc.calibration.logs.foreign_bytes import (
+    ALWAYS_ALLOWED,
+    LARGEST_EXPANSION,
+    LARGEST_FILE,
+    WRITE_AGAIN,
+    decoding,
+    opened,
+)
 from psdmc.errors import InputError
 
 PACKED = ".zstd"

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import decoding
-from psdmc.calibration.logs.log import Array, date_of
-from psdmc.calibration.logs.log_format import PIECE_ROWS, Columns, LogFormat, Opening, refuse_dates
-from psdmc.calibration.logs.stored_log import AnyLog, RowStore, StoredLog
-from psdmc.calibration.logs.table_limits import (
+from psdmc.calibration.logs.foreign_bytes import (
     LARGEST_COLUMNS,
     LARGEST_ROWS,
     LARGEST_STORED_ROWS,
     LARGEST_VALUES,
+    decoding,
 )
+from psdmc.calibration.logs.log import Array, date_of
+from psdmc.calibration.logs.log_format import PIECE_ROWS, Columns, LogFormat, Opening, refuse_dates
+from psdmc.calibration.logs.stored_log import AnyLog, RowStore, StoredLog
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 

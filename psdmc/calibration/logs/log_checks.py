@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import NamedTuple, TypeVar
@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from psdmc.calibration.logs.log import Array, Log
-from psdmc.calibration.logs.log_survey import NoNumber, Survey, surveyed
+from psdmc.calibration.logs.log_survey import Survey, surveyed
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.wording import first_faults, listed
 from psdmc.errors import InputError
@@ -26,90 +26,6 @@ UNIT_MATCH = 0.1
 """Share by which velocity over slope may differ from a unit's factor."""
 SMALLEST_STEP = 1e-9
 """s between any two rows: the resolution of time stamps."""
-
-FaultAndRemedy = tuple[str, str]
-
-
-def time_faults(log: AnyLog, survey: Survey, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
-    """Return the faults of the time of a log whose numbers are finite, each with its remedy and at most one of each
-    kind."""
-    steps = np.diff(log.time)
-    order = _order(log, steps)
-    if order:
-        return order
-    shortest = float(steps.min())
-    if shortest < SMALLEST_STEP or log.period * options.fastest < 1.0:
-        step, smallest = (
-            (shortest, SMALLEST_STEP) if shortest < SMALLEST_STEP else (log.period, 1 / options.fastest)
-        )
-        text = f"time_s grows by {step:.3g} s from row to row, expected at least {smallest:g} s"
-        return [(text, "write time_s in seconds")]
-    unit = suspected_unit(log, survey)
-    if unit:
-        return [(f"time_s looks like {unit}: {log.period:.4g} from row to row", "write time_s in seconds")]
-    return _gaps(log, steps, options) + _length(log, options) + _too_slow(log, cutoff, options)
-
-
-def suspected_unit(log: AnyLog, survey: Survey) -> str:
-    """Return the likely unit of time if it is not seconds. It follows from the ratio of velocity to slope of the
-    position, or else from the period."""
-    ratios = list(survey.velocity_ratios.values())
-    if ratios:
-        middle = float(np.median(ratios))
-        return next((name for name, factor in UNITS if abs(middle / factor - 1.0) < UNIT_MATCH), "")
-    fitting = [name for (name, _), smallest in zip(UNITS, PERIODS, strict=True) if log.period >= smallest]
-    return fitting[-1] if fitting else ""
-
-
-def _order(log: AnyLog, steps: Array) -> list[FaultAndRemedy]:
-    backwards = np.flatnonzero(steps <= 0)
-    if not len(backwards):
-        return []
-    row = int(backwards[0]) + 1
-    before, after = log.time[row - 1], log.time[row]
-    word = "goes backwards" if after < before else "stands still"
-    return [
-        (
-            f"time {word} at row {row + 1} ({before:.6g} s, then {after:.6g} s), {len(backwards)} time(s)",
-            "sort the rows by time and drop doubled ones, or cut the log to a clean stretch",
-        )
-    ]
-
-
-def _gaps(log: AnyLog, steps: Array, options: CheckOptions) -> list[FaultAndRemedy]:
-    gaps = np.flatnonzero(steps > options.largest_gap * log.period)
-    if not len(gaps):
-        return []
-    row = int(gaps[0])
-    return [
-        (
-            f"time has {len(gaps)} gap(s): {steps[row]:.3g} s without a row after {log.time[row]:.6g} s",
-            "give the stretches between the gaps as logs of their own",
-        )
-    ]
-
-
-def _length(log: AnyLog, options: CheckOptions) -> list[FaultAndRemedy]:
-    if log.duration < options.shortest:
-        text = f"too short: {log.duration:.3g} s, expected at least {options.shortest:g} s"
-        return [(text, "record a longer motion")]
-    if log.duration > options.longest:
-        text = f"lasts {log.duration:.4g} s, expected at most {options.longest:g} s"
-        return [(text, "cut it into several, or write time_s in seconds")]
-    return []
-
-
-def _too_slow(log: AnyLog, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
-    rate = 1.0 / log.period
-    if rate >= options.samples_per_cycle * cutoff:
-        return []
-    return [
-        (
-            f"sampling at {rate:.4g} Hz is too slow for a cut-off of {cutoff:g} Hz, "
-            f"expected at least {options.samples_per_cycle * cutoff:g} Hz",
-            f"record faster, or filter a plain log at {rate / options.samples_per_cycle:.3g} Hz or less: --cutoff",
-        )
-    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,14 +60,26 @@ class CheckOptions:
     fastest: float = 1e6
 
 
-LogKind = TypeVar("LogKind", Log, StoredLog, AnyLog)
-
-
 class Fault(NamedTuple):
     """A fault because of which a log cannot be used, and the remedy."""
 
     text: str
     remedy: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looked:
+    """What the checks of a log read: the log, its statistics, the robot, the cut-off of the filter (Hz) that will be
+    applied to the log, and the limits."""
+
+    log: AnyLog
+    survey: Survey
+    chain: Mechanism
+    cutoff: float
+    options: CheckOptions
+
+
+LogKind = TypeVar("LogKind", Log, StoredLog, AnyLog)
 
 
 def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions | None = None) -> LogKind:
@@ -169,16 +97,16 @@ def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions
             f"{log.name}: too short: {len(log)} row(s)", f"at least {options.shortest:g} s are needed"
         )
     log = log.ordered(chain.joint_names)
-    survey = surveyed(log, options.saturated_share)
+    of = Looked(log, surveyed(log, options.saturated_share), chain, cutoff, options)
     for stage in _FAULTS:
-        found = [check(log, survey, chain, cutoff, options) for check in stage]
+        found = [check(of) for check in stage]
         # the first of each kind before the others: one wrong unit gives a fault for every joint
         faults = [fault for same_rank in zip_longest(*found) for fault in same_rank if fault is not None]
         if faults:
             raise InputError(
                 f"{log.name}: {first_faults([fault.text for fault in faults])}", faults[0].remedy
             )
-    notes = [text for check in _REMARKS for text in check(log, survey, chain, cutoff, options)]
+    notes = [text for check in _REMARKS for text in check(of)]
     return _with_notes(log, tuple(Remark(f"{log.name}: {note}", code_of(note)) for note in notes))
 
 
@@ -187,61 +115,108 @@ def _with_notes(log: LogKind, notes: tuple[str, ...]) -> LogKind:
     return replace(log, notes=(*said, *notes))
 
 
-def _no_numbers(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
-    return [_no_number(found, log) for found in survey.no_numbers]
+# Faults of numbers and of time
 
 
-def _no_number(found: NoNumber, log: AnyLog) -> Fault:
-    """The fault of a column's first value that is not finite, or too large for a measurement."""
-    word = "is not finite" if not np.isfinite(found.value) else f"reaches {found.value:.3g}"
-    return Fault(
-        f"{found.what} {word} in {found.rows} row(s), the first is row {found.first + 1} of {len(log)}",
-        "cut the log to a clean stretch, or leave a damaged velocity out",
-    )
+def _no_numbers(of: Looked) -> Iterator[Fault]:
+    """Faults of columns with values that are not finite, or too large for a measurement."""
+    for found in of.survey.no_numbers:
+        word = "is not finite" if not np.isfinite(found.value) else f"reaches {found.value:.3g}"
+        yield Fault(
+            f"{found.what} {word} in {found.rows} row(s), the first is row {found.first + 1} of {len(of.log)}",
+            "cut the log to a clean stretch, or leave a damaged velocity out",
+        )
 
 
-def _units(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
+def _times(of: Looked) -> Iterator[Fault]:
+    """Faults of the time of a log whose numbers are finite, at most one of each kind."""
+    log, options = of.log, of.options
+    steps = np.diff(log.time)
+    backwards = np.flatnonzero(steps <= 0)
+    shortest = float(steps.min())
+    if len(backwards):
+        row = int(backwards[0]) + 1
+        before, after = log.time[row - 1], log.time[row]
+        word = "goes backwards" if after < before else "stands still"
+        yield Fault(
+            f"time {word} at row {row + 1} ({before:.6g} s, then {after:.6g} s), {len(backwards)} time(s)",
+            "sort the rows by time and drop doubled ones, or cut the log to a clean stretch",
+        )
+    elif shortest < SMALLEST_STEP or log.period * options.fastest < 1.0:
+        step, smallest = (
+            (shortest, SMALLEST_STEP) if shortest < SMALLEST_STEP else (log.period, 1 / options.fastest)
+        )
+        text = f"time_s grows by {step:.3g} s from row to row, expected at least {smallest:g} s"
+        yield Fault(text, "write time_s in seconds")
+    elif unit := suspected_unit(of):
+        yield Fault(f"time_s looks like {unit}: {log.period:.4g} from row to row", "write time_s in seconds")
+    else:
+        yield from _gaps_and_length(of, steps)
+
+
+def suspected_unit(of: Looked) -> str:
+    """Return the likely unit of time if it is not seconds. It follows from the ratio of velocity to slope of the
+    position, or else from the period."""
+    ratios = list(of.survey.velocity_ratios.values())
+    if ratios:
+        middle = float(np.median(ratios))
+        return next((name for name, factor in UNITS if abs(middle / factor - 1.0) < UNIT_MATCH), "")
+    fitting = [name for (name, _), smallest in zip(UNITS, PERIODS, strict=True) if of.log.period >= smallest]
+    return fitting[-1] if fitting else ""
+
+
+def _gaps_and_length(of: Looked, steps: Array) -> Iterator[Fault]:
+    log, options = of.log, of.options
+    gaps = np.flatnonzero(steps > options.largest_gap * log.period)
+    if len(gaps):
+        row = int(gaps[0])
+        yield Fault(
+            f"time has {len(gaps)} gap(s): {steps[row]:.3g} s without a row after {log.time[row]:.6g} s",
+            "give the stretches between the gaps as logs of their own",
+        )
+    if log.duration < options.shortest:
+        text = f"too short: {log.duration:.3g} s, expected at least {options.shortest:g} s"
+        yield Fault(text, "record a longer motion")
+    elif log.duration > options.longest:
+        text = f"lasts {log.duration:.4g} s, expected at most {options.longest:g} s"
+        yield Fault(text, "cut it into several, or write time_s in seconds")
+    rate, needed = 1.0 / log.period, options.samples_per_cycle * of.cutoff
+    if rate < needed:
+        yield Fault(
+            f"sampling at {rate:.4g} Hz is too slow for a cut-off of {of.cutoff:g} Hz, "
+            f"expected at least {needed:g} Hz",
+            f"record faster, or filter a plain log at {rate / options.samples_per_cycle:.3g} Hz or less: --cutoff",
+        )
+
+
+# Faults of columns
+
+
+def _units(of: Looked) -> Iterator[Fault]:
     """Faults of columns in rad for joints that slide, or in m for joints that turn."""
-    if log.sliding is None:
-        return []
-    faults = []
-    for joint in chain.joints:
-        found, right = ("m" if joint.name in log.sliding else "rad"), joint.type.position_unit
+    for joint in of.chain.joints if of.log.sliding is not None else ():
+        found, right = ("m" if joint.name in (of.log.sliding or ()) else "rad"), joint.type.position_unit
         if found != right:
-            faults.append(
-                Fault(
-                    f"joint {joint.name}: position_{found}.{joint.name}, but it {joint.type.verb}",
-                    f"expected position_{right}.<joint>, and its other columns in units to match",
-                )
+            yield Fault(
+                f"joint {joint.name}: position_{found}.{joint.name}, but it {joint.type.verb}",
+                f"expected position_{right}.<joint>, and its other columns in units to match",
             )
-    return faults
 
 
-def _positions(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
-    faults = []
-    for k, joint in enumerate(chain.joints):
-        reach = float(survey.reach[k])
+def _positions(of: Looked) -> Iterator[Fault]:
+    for joint, reach in zip(of.chain.joints, of.survey.reach.tolist(), strict=True):
         bound = max(abs(joint.limits.lower), abs(joint.limits.upper))
-        bound = _allowed(bound, options.free_position, options)
+        bound = _allowed(bound, of.options.free_position, of.options)
         if not reach > bound:
             continue
         unit = joint.type.position_unit
         suspicion = ": degrees?" if unit == "rad" and np.radians(reach) <= bound else ""
-        faults.append(
-            Fault(
-                f"joint {joint.name}: position reaches {reach:.4g} {unit}, limit {bound:.4g} {unit}{suspicion}",
-                "positions are expected in rad: convert the columns"
-                if suspicion
-                else "correct the columns, or the limits in the robot file",
-            )
+        yield Fault(
+            f"joint {joint.name}: position reaches {reach:.4g} {unit}, limit {bound:.4g} {unit}{suspicion}",
+            "positions are expected in rad: convert the columns"
+            if suspicion
+            else "correct the columns, or the limits in the robot file",
         )
-    return faults
 
 
 def _allowed(limit: float, free: float, options: CheckOptions) -> float:
@@ -249,102 +224,73 @@ def _allowed(limit: float, free: float, options: CheckOptions) -> float:
     return limit * (1 + options.limit_slack) if np.isfinite(limit) else free
 
 
-def _speeds(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
-    faults = []
-    for k, joint in enumerate(chain.joints):
-        speed = float(survey.speed[k])
-        bound = _allowed(joint.limits.speed, options.free_speed, options)
+def _speeds(of: Looked) -> Iterator[Fault]:
+    for joint, speed in zip(of.chain.joints, of.survey.speed.tolist(), strict=True):
+        bound = _allowed(joint.limits.speed, of.options.free_speed, of.options)
         if speed > bound:
-            faults.append(
-                Fault(
-                    f"joint {joint.name}: moves at {speed:.4g} per s, limit {bound:.4g}: unit of time or position?",
-                    "time is expected in s, positions in rad or m: convert the columns",
-                )
+            yield Fault(
+                f"joint {joint.name}: moves at {speed:.4g} per s, limit {bound:.4g}: unit of time or position?",
+                "time is expected in s, positions in rad or m: convert the columns",
             )
-    return faults
 
 
-def _rates(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
+def _rates(of: Looked) -> Iterator[Fault]:
     """Faults of the logged velocity against the position's slope: a ratio far from one is a wrong unit."""
-    faults = []
-    for k, ratio in survey.velocity_ratios.items():
-        if abs(ratio - 1.0) <= options.rate_disagreement:
+    for k, ratio in of.survey.velocity_ratios.items():
+        if abs(ratio - 1.0) <= of.options.rate_disagreement:
             continue
         degrees = 40 < abs(ratio) < 70 or 0.014 < abs(ratio) < 0.025
-        faults.append(
-            Fault(
-                f"joint {log.joint_names[k]}: velocity is {ratio:.4g} times the position's slope"
-                f"{': degrees?' if degrees else ''}",
-                "velocities are expected in rad/s or m/s, with the position's sign: convert the columns, "
-                "or leave them out",
-            )
+        yield Fault(
+            f"joint {of.log.joint_names[k]}: velocity is {ratio:.4g} times the position's slope"
+            f"{': degrees?' if degrees else ''}",
+            "velocities are expected in rad/s or m/s, with the position's sign: convert the columns, "
+            "or leave them out",
         )
-    return faults
 
 
-def _nothing_there(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
-    faults = []
-    if np.all(survey.motion < options.smallest_motion):
-        faults.append(Fault("no joint moves", "give a log of a motion; `psdmc excite` plans one"))
-    if not survey.largest_effort.any():
-        faults.append(
-            Fault(
-                f"{log.quantity} is zero throughout, for every joint",
-                "record the motors' currents or torques too",
-            )
+def _nothing_there(of: Looked) -> Iterator[Fault]:
+    if np.all(of.survey.motion < of.options.smallest_motion):
+        yield Fault("no joint moves", "give a log of a motion; `psdmc excite` plans one")
+    if not of.survey.largest_effort.any():
+        yield Fault(
+            f"{of.log.quantity} is zero throughout, for every joint",
+            "record the motors' currents or torques too",
         )
-    return faults
 
 
-def _jitter(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions) -> list[str]:
-    steps = np.diff(log.time)
-    jitter = float(np.abs(steps - log.period).max() / log.period)
-    return [f"sample times jitter by {jitter:.0%}: resampled"] if jitter > options.largest_jitter else []
+# Remarks
 
 
-def _saturation(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[str]:
-    names = listed([f"joint {found.words}" for found in survey.saturated])
-    return [f"{log.quantity} saturated? {names} of its moving rows"] if survey.saturated else []
+def _jitter(of: Looked) -> Iterator[str]:
+    steps = np.diff(of.log.time)
+    jitter = float(np.abs(steps - of.log.period).max() / of.log.period)
+    if jitter > of.options.largest_jitter:
+        yield f"sample times jitter by {jitter:.0%}: resampled"
 
 
-def _still(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions) -> list[str]:
-    still = [
-        name
-        for name, motion in zip(log.joint_names, survey.motion, strict=True)
-        if motion < options.smallest_motion
-    ]
-    return [Remark(f"joint(s) {listed(still)} stand still", "standing")] if still else []
+def _saturation(of: Looked) -> Iterator[str]:
+    if of.survey.saturated:
+        names = listed([f"joint {found.words}" for found in of.survey.saturated])
+        yield f"{of.log.quantity} saturated? {names} of its moving rows"
 
 
-def _dead_effort(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[str]:
-    dead = [name for k, name in enumerate(log.joint_names) if not survey.largest_effort[k] > 0]
-    return [f"joint(s) {listed(dead)}: {log.quantity} is zero throughout"] if dead else []
+def _still(of: Looked) -> Iterator[str]:
+    moved = zip(of.log.joint_names, of.survey.motion, strict=True)
+    if still := [name for name, motion in moved if motion < of.options.smallest_motion]:
+        yield Remark(f"joint(s) {listed(still)} stand still", "standing")
 
 
-Check = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[Fault]]
-Noticing = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[str]]
+def _dead_effort(of: Looked) -> Iterator[str]:
+    efforts = zip(of.log.joint_names, of.survey.largest_effort, strict=True)
+    if dead := [name for name, effort in efforts if not effort > 0]:
+        yield f"joint(s) {listed(dead)}: {of.log.quantity} is zero throughout"
 
 
-def _times(
-    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
-) -> list[Fault]:
-    return [Fault(*fault) for fault in time_faults(log, survey, cutoff, options)]
-
-
-_FAULTS: tuple[tuple[Check, ...], ...] = (
+_FAULTS: tuple[tuple[Callable[[Looked], Iterator[Fault]], ...], ...] = (
     (_no_numbers, _units),
     (_times,),
     (_positions, _speeds, _rates, _nothing_there),
 )
 """In stages: the checks of a stage make sense only where earlier stages found no fault."""
-_REMARKS: tuple[Noticing, ...] = (_jitter, _saturation, _still, _dead_effort)
+
+_REMARKS: tuple[Callable[[Looked], Iterator[str]], ...] = (_jitter, _saturation, _still, _dead_effort)

@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import make_folder, whole_file
-from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, opened
+from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, LARGEST_STORED_ROWS, opened, require_size
 from psdmc.calibration.logs.formats import format_of, table_of
 from psdmc.calibration.logs.log import Array, Log, Quantity, date_of
 from psdmc.calibration.logs.log_format import TableFormat
 from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
-from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS, require_size
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.progress import Progress, Step

@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.integrate import ODEintWarning, odeint
 
 from psdmc.calibration.logs.foreign_bytes import decoding
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.calibration.plant.plant_file import (
     SIGN_SPEED,
@@ -34,8 +33,6 @@ from psdmc.errors import InputError
 from psdmc.friction.law import At, Term
 from psdmc.friction.scalars import tanh
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
-
-Array = NDArray[np.float64]
 
 RELATIVE_ERROR = 1e-9
 """Of the bristle deflection, per step of the stiff integrator."""

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.calibration.identify.coupling import Coupling
+from psdmc.calibration.identify.motor_model import Coupling
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Shifted

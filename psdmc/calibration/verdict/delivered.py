@@ -18,20 +18,18 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.columns.columns import Columns, read_columns
-from psdmc.calibration.identify.coupling import coupling_of
-from psdmc.calibration.identify.extra import motion_of
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.friction import FrictionResult, judge_friction, prepared_runs
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import Late, judge_inertial
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_columns, names_of
+from psdmc.calibration.identify.linear_problem import friction_columns, motion_of, names_of
 from psdmc.calibration.identify.motor import judge_motors
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
-from psdmc.calibration.identify.steps import StepOptions, judged, step_of
+from psdmc.calibration.identify.steps import Robot, StepOptions, judged, step_of
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
@@ -291,18 +289,18 @@ def _torque_with_state(
 
 
 def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
-    chain, motors, theta = found.model.mechanism, found.motors, found.theta_b
+    chain, theta = found.model.mechanism, found.theta_b
     steps = {name: step_of(step) for name, step in found.prediction.steps.items()}
-    regressor = ChainRegressor(found.model)
+    robot = Robot(chain, ChainRegressor(found.model), found.motors)
     friction = _with_state(found)
     joints = friction.joints
-    alone = prepared_runs(chain, regressor, motors, theta, runs.friction, steps["friction"])
+    alone = prepared_runs(robot, theta, runs.friction, steps["friction"])
     motor = (judge_motors(chain, runs.motor, steps["motor"], found.shown),) if runs.motor else ()
     return (
         *motor,
-        judge_gravity(chain, regressor, motors, runs.gravity, steps["gravity"], theta),
+        judge_gravity(robot, runs.gravity, steps["gravity"], theta),
         judge_friction(alone, joints),
-        *judge_inertial(chain, regressor, motors, theta, friction, runs.inertial, steps["inertial"]),
+        *judge_inertial(robot, theta, friction, runs.inertial, steps["inertial"]),
     )
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate
 
-from psdmc.calibration.identify.coupling import Coupling
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Coupling, Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.filter import States, stretches

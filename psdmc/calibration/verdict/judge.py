@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.identify.coupling import coupling_of
 from psdmc.calibration.identify.four_steps import Runs
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import CORRELATED
 from psdmc.calibration.logs.log_survey import Saturated

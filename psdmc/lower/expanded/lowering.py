@@ -9,8 +9,15 @@ import numpy as np
 
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, solve
-from psdmc.lower.expanded.diagram import Diagram, nested_horner, operations, with_constants
-from psdmc.lower.expanded.orders import Joints, base_first, candidates, tip_first
+from psdmc.lower.expanded.diagram import (
+    NOTHING,
+    ONE,
+    Diagram,
+    Level,
+    nested_horner,
+    operations,
+    with_constants,
+)
 from psdmc.lower.expanded.terms import (
     COEFFICIENT_NOISE,
     Terms,
@@ -24,7 +31,6 @@ from psdmc.lower.expanded.terms import (
     torque_terms,
     with_gravity,
 )
-from psdmc.lower.expanded.values import polynomial_values, row_symbols
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import BLOCKS
 from psdmc.program.cost import cost
@@ -137,3 +143,96 @@ def _vector(name: str, values: Sequence[Scalar]) -> Outputs:
 
 def _symmetric(values: dict[int, Scalar], n: int) -> list[list[Scalar]]:
     return [[values.get(min(i, j) * n + max(i, j), 0.0) for j in range(n)] for i in range(n)]
+
+
+Order = tuple[int, ...]
+Joints = tuple[int, ...]
+
+TRIGONOMETRY = ((0, 2, 1), (0, 1, 2))
+"""Row blocks of one joint's position, outermost first: q, cos, sin and q, sin, cos."""
+
+
+def base_first(n: int) -> Joints:
+    """Return the order of joints for torques, from the base outward. The inner parts of the nested forms then depend on
+    the outer links only, and recur often."""
+    return tuple(range(n))
+
+
+def tip_first(n: int) -> Joints:
+    """Return the order of joints for regressors, from the tip inward. A regressor column belongs to one link, and
+    joints after this link do not occur in it."""
+    return tuple(reversed(range(n)))
+
+
+def candidates(joints: Joints, rows: int) -> Iterator[Order]:
+    """Return orders of all variables (rows of the exponents), outermost first. Joint positions are in the given order
+    of joints.
+
+    In most orders, joint rates and accelerations are outermost, so that the torques of two joints share polynomials of
+    position. In the other orders, all variables of a joint stand together. Base parameters, the rows from 5 n on, are
+    always innermost.
+
+    rows  number of rows
+    """
+    n = len(joints)
+    parameters = tuple(range(BLOCKS * n, rows))
+    for blocks in TRIGONOMETRY:
+        position = _by_joint(joints, blocks, n)
+        for rates in (joints[::-1], joints):
+            yield _by_block(rates, (4, 3), n) + position + parameters
+        yield _by_joint(joints, (4, 3, *blocks), n) + parameters
+
+
+def _by_joint(joints: Sequence[int], blocks: Sequence[int], n: int) -> Order:
+    return tuple(block * n + joint for joint in joints for block in blocks)
+
+
+def _by_block(joints: Sequence[int], blocks: Sequence[int], n: int) -> Order:
+    return tuple(block * n + joint for block in blocks for joint in joints)
+
+
+def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
+    """Return a symbol for each variable of the polynomials: q, sin q, cos q, qd, qdd of all joints, then theta_b if
+    `theta`. The symbols record operations."""
+    n = model.n
+    q = tracer.symbols("q", n)
+    sincos = [
+        value.sincos() if joint.basis.has_sincos else (0.0, 0.0)
+        for value, joint in zip(q, model.mechanism.types, strict=True)
+    ]
+    rates = [*tracer.symbols("qd", n), *tracer.symbols("qdd", n)]
+    parameters = tracer.symbols("theta_b", model.l) if theta else []
+    return [*q, *(s for s, _ in sincos), *(c for _, c in sincos), *rates, *parameters]
+
+
+def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
+    """Return the value of each polynomial of the diagram by its number, from the values of the variables (rows)."""
+    nodes: dict[int, Scalar] = {NOTHING: 0.0, ONE: 1.0}
+    for level in diagram.levels:
+        _compute_level(nodes, level, rows[level.row])
+    return {
+        output: nodes[root] * factor
+        for output, root, factor in zip(
+            diagram.output.tolist(), diagram.root.tolist(), diagram.factor.tolist(), strict=True
+        )
+    }
+
+
+def _compute_level(nodes: dict[int, Scalar], level: Level, row: Scalar) -> None:
+    parts = zip(level.child.tolist(), level.ratio.tolist(), strict=True)
+    for number, (child, ratio) in enumerate(parts, start=level.first):
+        scaled = [None if c == NOTHING else nodes[c] * r for c, r in zip(child, ratio, strict=True)]
+        nodes[number] = _horner(scaled, row)
+
+
+def _horner(parts: Sequence[Scalar | None], row: Scalar) -> Scalar:
+    """parts[0] + row * (parts[1] + row * parts[2]), where None is nothing."""
+    constant, linear, square = parts
+    value: Scalar = 0.0
+    if square is not None and linear is not None:
+        value = (linear + row * square) * row
+    elif square is not None:
+        value = square * (row * row)
+    elif linear is not None:
+        value = linear * row
+    return value if constant is None else constant + value

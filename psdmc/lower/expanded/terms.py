@@ -12,9 +12,8 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Entries, Expansion, RowBlocks
 from psdmc.reproducible import length
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import Array, Mechanism
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 COEFFICIENT_NOISE = 1e-13

@@ -13,8 +13,8 @@ from sprung_plant import Run, recorded, torsional_spring
 from psdmc.calibration.columns.columns import read_columns
 from psdmc.calibration.columns.effect import Motion
 from psdmc.calibration.columns.kinds import KINDS
-from psdmc.calibration.identify.coupling import Coupling
-from psdmc.calibration.identify.extra import motion_of
+from psdmc.calibration.identify.linear_problem import motion_of
+from psdmc.calibration.identify.motor_model import Coupling
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError

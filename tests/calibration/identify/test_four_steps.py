@@ -14,7 +14,7 @@ from psdmc.calibration.campaign_file import listed_runs, read_campaign
 from psdmc.calibration.identify.four_steps import calibrate_four_steps
 from psdmc.calibration.identify.gravity import calibrate_gravity, gravity_split
 from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.identify.steps import CalibrationOptions, GravityRun, Load
+from psdmc.calibration.identify.steps import CalibrationOptions, GravityRun, Load, Robot
 from psdmc.calibration.motions.sweeps import SweepOptions, gravity_sweep
 from psdmc.calibration.plant.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
@@ -134,9 +134,8 @@ def test_a_known_tool_is_taken_out_of_gravity(arm):
 
     def phi(tool: Load | None) -> np.ndarray:
         runs = [GravityRun(log, tool)]
-        found = calibrate_gravity(
-            chain, arm.regressor, split, motors, runs, options.gravity, arm.model.theta_b
-        )
+        own = Robot(chain, arm.regressor, motors)
+        found = calibrate_gravity(own, split, runs, options.gravity, arm.model.theta_b)
         return found.estimate.values
 
     truth = split.phi(arm.model.theta_b)

@@ -102,7 +102,7 @@ def test_friction_moves_with_theta_as_far_as_its_run_lets_it(plain, physical):
 @pytest.mark.slow
 def test_one_vector_costs_less_than_theta_moved_alone(arm, runs: Runs):
     """The steps' own costs, written down a second time, from what they hand on: no better vector is near."""
-    from psdmc.calibration.identify.physical_steps import physical_steps
+    from psdmc.calibration.identify.four_steps import physical_steps
 
     found = calibrate_four_steps(arm.model.chain, arm.regressor, arm.model.l, runs, CalibrationOptions())
     near = physical_steps(arm.unknown, found)

@@ -13,7 +13,9 @@ from command_line import typed
 from worn_arm import VISCOUS, Worn, recorded
 
 import psdmc
-from psdmc.calibration.comparison import STATES, Comparison, _states, compare
+from psdmc.calibration.compared import Comparison
+from psdmc.calibration.comparison import compare
+from psdmc.calibration.torque_differences import STATES, _states
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot
 from psdmc.robot.reference import reference

@@ -1,0 +1,51 @@
+"""The drift of the contacts along their own axes: their accelerations at constant joint rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.named_frames import local_accelerations
+from psdmc.dynamics.scalar import Scalar
+from psdmc.functions import contact_drift
+from psdmc.program.signature import QD, Q, Signature
+from psdmc.recipes.contacts import LOCAL_ROW_WORDS
+from psdmc.recipes.placed import PlacedRobot, on_both
+from psdmc.recipes.recipe import Arrays, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+INPUTS = (Q, QD)
+(ALIGNED,) = contact_drift.RECIPE.signature.outputs
+
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    found = local_accelerations(robot.frames, robot.named, q, qd, [0.0] * len(qd))
+    pairs = zip(robot.named, found, strict=True)
+    return {"drift": [value for each, own in pairs for value in own[: each.rows]]}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"drift": contact_drift.accelerations(robot, given, "LOCAL")}
+
+
+RECIPE = Recipe(
+    Signature(
+        "contact_drift_local",
+        322,
+        "accelerations of all contacts at constant qd, along the contacts' own axes",
+        INPUTS,
+        (replace(ALIGNED, means=f"accelerations of the contacts (m/s^2, rad/s^2): {LOCAL_ROW_WORDS}"),),
+        theta=False,
+        summary="Compute the accelerations that all contacts have if qdd = 0, along each contact's own axes. For any qdd, "
+        "the accelerations are J qdd + drift, with J as in `contact_jacobian_local`.",
+    ),
+    "contact drift along the contacts' axes",
+    *on_both(values, INPUTS),
+    "getFrameClassicalAcceleration, LOCAL",
+    pinocchio,
+    beside="contact_jacobian_local",
+)

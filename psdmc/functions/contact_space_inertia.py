@@ -1,0 +1,90 @@
+"""The contact-space inertia: contact forces per unit acceleration of the active contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics import contacts
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import Factors, factorize, projected
+from psdmc.functions import delassus
+from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
+from psdmc.recipes.accelerations import MASS_MATRIX
+from psdmc.recipes.contacts import ACTIVE, CONTACTS, MU, ROW_WORDS, Held
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    (mu,), q = g.inputs[MU.name], g.inputs["q"]
+    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
+    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    return _values(factors, rows, Held(g.named, g.inputs[ACTIVE.name], mu, g.si))
+
+
+def _values(factors: Factors, jacobian: Sequence[Sequence[Scalar]], mask: Held) -> Outputs:
+    matrix = contacts.of_active(projected(factors, jacobian), *mask.rows)
+    own = factorize(matrix)
+    found = mask.compliance(own)
+    signs = mask.independent(matrix, own, [row[k] for k, row in enumerate(found)])
+    return {"Lambda": found, PIVOTS: [*factors.pivots, *signs]}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, count = list(given["q"].T), len(given["q"])
+    mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
+    rows = contacts.contact_jacobian(robot.frames, robot.chain.frames, q)
+    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    with np.errstate(all="ignore"):
+        found = _values(factorize([list(row) for row in mass]), rows, mask)
+        return {name: entries(value, count) for name, value in found.items()}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    found = delassus.RECIPE.pinocchio(robot, given)["D"]
+    masks = np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
+    for matrix, on, mu in zip(found, masks, np.reshape(given[MU.name], -1), strict=True):
+        own = np.ix_(on, on)
+        inverse = np.linalg.inv(matrix[own] + mu * np.eye(on.sum()))
+        matrix[:] = 0.0
+        matrix[own] = inverse
+    return {"Lambda": found}
+
+
+RECIPE = Recipe(
+    Signature(
+        "contact_space_inertia",
+        332,
+        "inverse (J M(q)^-1 J^T + mu I)^-1 in the rows and columns of the active contacts, zero in the others; both "
+        "triangles; J as in contact_jacobian; active is 0 or 1 for each contact, mu is not negative",
+        (Q, ACTIVE, MU),
+        (
+            Quantity(
+                "Lambda",
+                ("contact_rows", "contact_rows"),
+                means=f"symmetric matrix. Its rows, and likewise its columns, are those of the contacts: {ROW_WORDS}",
+                unit="J s^2",
+                powers=(-1, -1),
+            ),
+        ),
+        theta=True,
+        summary="Compute the contact-space inertia (J M^-1 J^T + mu I)^-1 of the active contacts. J is their Jacobian as in "
+        "`contact_jacobian`, M the mass matrix, and I the identity matrix. Rows and columns of other contacts are zero.",
+        factorises=(MASS_MATRIX, CONTACTS),
+    ),
+    "contact-space inertia",
+    trace,
+    reference,
+    "crba, computeFrameJacobian",
+    pinocchio,
+    shares="inverse_dynamics",
+    matters=("fold_double_angle",),
+)

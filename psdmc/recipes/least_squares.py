@@ -1,0 +1,99 @@
+"""Least-squares solutions of minimal norm, for matrices of any rank.
+
+Source: Bjorck 1996, Numerical Methods for Least Squares Problems, sections 2.4 (modified Gram-Schmidt) and 2.7 (complete
+orthogonal decomposition).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import inner_product
+from psdmc.program.operations import Op
+
+Row = list[Scalar]
+
+
+class _Orthogonal(NamedTuple):
+    """Vectors v_k = q_k + sum over j < k of shares[k][j] q_j, with orthogonal q.
+
+    basis     q; what belongs to dependent vectors is multiplied by 0 wherever it is used
+    inverses  1 / |q_k|^2, or 0 if the vector is dependent
+    kept      1, or 0 if the vector is dependent
+    """
+
+    basis: list[Row]
+    inverses: Row
+    kept: Row
+    shares: list[Row]
+
+
+def least_squares(rows: Sequence[Row], right: Sequence[Scalar], shift: Scalar) -> Row:
+    """Return the x that minimises |A x - b|^2 + shift |x|^2. If several x do, return that of the smallest norm |x|.
+
+    rows   rows of A, whose entries have no unit
+    right  b, an entry per row
+    shift  0 or more, without unit
+
+    A row counts as dependent on those before it if the square of its part orthogonal to them is lost in rounding when
+    it is added to the square of the row. The part is then shorter than about 1e-8 of the row in float64, or 2e-4 in
+    float32. Every rank executes the same operations.
+
+    A = L Q, with orthogonal rows of Q. Then y = Q x minimises |L y - b|. L is lower triangular with ones on its diagonal,
+    except for a zero column for each dependent row. If there is none, y follows by substitution. To include the shift,
+    A is continued by a unit matrix, whose columns have the weight `shift` in inner products.
+    """
+    count, length = len(rows), len(rows[0])
+    whole = [[*row, *_unit(k, count)] for k, row in enumerate(rows)]
+    weights = [1.0] * length + [shift] * count
+    across = _orthogonal(whole, weights)
+    lower = [[*own, keep] for own, keep in zip(across.shares, across.kept, strict=True)]
+    columns = [[0.0] * j + [row[j] for row in lower[j:]] for j in range(count)]
+    down = _orthogonal(columns[::-1], [1.0] * count, across.kept[::-1])
+    rest, y = list(right), []
+    for vector, inverse in zip(down.basis, down.inverses, strict=True):
+        y.append(inner_product(vector, rest) * inverse)
+        rest = _less(rest, y[-1], vector)
+    for k in reversed(range(count)):
+        for j, share in enumerate(down.shares[k]):
+            y[j] = y[j] - share * y[k]
+    x: Row = [0.0] * length
+    for vector, inverse, value in zip(reversed(across.basis), reversed(across.inverses), y, strict=True):
+        x = [entry + value * inverse * part for entry, part in zip(x, vector[:length], strict=True)]
+    return x
+
+
+def _orthogonal(vectors: Sequence[Row], weights: Sequence[Scalar], kept: Row | None = None) -> _Orthogonal:
+    """Return the vectors' parts orthogonal to those before them. `kept`: which are not dependent, if this is known."""
+    found = _Orthogonal([], [], [], [])
+    for k, vector in enumerate(vectors):
+        own, shares = list(vector), []
+        for other, inverse in zip(found.basis, found.inverses, strict=True):
+            shares.append(_weighted(weights, other, own) * inverse)
+            own = _less(own, shares[-1], other)
+        size = _weighted(weights, own, own)
+        if kept is None:
+            whole = _weighted(weights, vector, vector)
+            keep = Op.SELECT(whole, whole + size, 1.0, 0.0)
+            size = Op.SELECT(whole, whole + size, size, 1.0)
+        else:
+            keep = kept[k]
+            size = size + (1.0 - keep)
+        for values, value in zip(found, (own, keep / size, keep, shares), strict=True):
+            values.append(value)
+    return found
+
+
+def _unit(k: int, count: int) -> Row:
+    return [1.0 if i == k else 0.0 for i in range(count)]
+
+
+def _weighted(weights: Sequence[Scalar], a: Row, b: Row) -> Scalar:
+    return inner_product([weight * x for weight, x in zip(weights, a, strict=True)], b)
+
+
+def _less(a: Row, factor: Scalar, b: Row) -> Row:
+    """a - factor b"""
+    return [x - factor * y for x, y in zip(a, b, strict=True)]

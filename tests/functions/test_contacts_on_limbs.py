@@ -1,0 +1,155 @@
+"""Contacts on equal limbs, which are eliminated one by one: against dense systems of Pinocchio's numbers."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from direct import Direct
+from robots_at_hand import in_wheel
+from slow_cases import slow_but_for
+from unoptimised import compiled
+
+from psdmc.backends.c.package import package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
+from psdmc.derivation.derive import derive_model
+from psdmc.functions import RECIPES
+from psdmc.lower.kernels import lower
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import states_of
+from psdmc.program.interpret import interpret
+from psdmc.program.kernel import Kernel
+from psdmc.program.limb_program import unpacked
+from psdmc.program.signature import Sizes
+from psdmc.robot.load import LoadedRobot, load_robot
+from psdmc.robot.reference import reference
+
+Array = np.ndarray
+
+FUNCTIONS = (
+    "constrained_forward_dynamics",
+    "constrained_forward_dynamics_derivatives",
+    "impulse",
+    "impulse_derivatives",
+)
+FEET = ("lf_foot", "rf_foot", "lh_foot", "rh_foot")
+CONTACTS = {
+    "hyq_no_sensors.urdf": FEET,
+    "allegro_right_hand.urdf": tuple(f"link_{k}.0_tip" for k in (3, 7, 11, 15)),
+    "b1-z1.urdf": ("FL_foot", "FR_foot", "RL_foot", "RR_foot"),
+    "g1_29dof_rev_1_0.urdf": ("left_ankle_roll_link:6", "right_ankle_roll_link:6"),
+}
+"""A quadruped; a hand without a core; a quadruped whose core has an arm; a humanoid on two surfaces."""
+COUNT = 24
+
+
+@cache
+def loaded_of(file: str, contacts: tuple[str, ...]) -> LoadedRobot:
+    floating = file != "allegro_right_hand.urdf"
+    return load_robot(in_wheel(file), floating=floating, contacts=list(contacts))
+
+
+@cache
+def model_of(file: str, contacts: tuple[str, ...]) -> DynamicsModel:
+    return derive_model(loaded_of(file, contacts).mechanism, expand=False)
+
+
+@cache
+def kernels_of(file: str, contacts: tuple[str, ...]) -> dict[str, Kernel]:
+    return lower(model_of(file, contacts), functions=FUNCTIONS, theta_variants=False)
+
+
+def sizes_of(model: DynamicsModel) -> Sizes:
+    mechanism, rows = model.mechanism, tuple(model.mechanism.rows_of_contacts)
+    counts = (len(mechanism.joints), mechanism.nq, mechanism.nv, model.l, len(mechanism.frames))
+    return Sizes(*counts, rows_of_contacts=rows)
+
+
+def given_to(model: DynamicsModel, name: str, mu: float = 0.0) -> dict[str, Array]:
+    """Random states with random masks and gains."""
+    random, sizes = np.random.default_rng(5), sizes_of(model)
+    given = {
+        each.name: each.drawn(random.uniform(-1.0, 1.0, (COUNT, sizes.size(each))))
+        for each in RECIPES[name].signature.inputs
+    }
+    q, qd, tau = states_of(model.mechanism, random, COUNT)
+    given |= {"q": q, "mu": np.full((COUNT, 1), mu), "qd": qd, "tau": tau}
+    return {each.name: given[each.name] for each in RECIPES[name].signature.inputs}
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    slow_but_for(
+        [("hyq_no_sensors.urdf", FUNCTIONS[1]), ("allegro_right_hand.urdf", FUNCTIONS[3])],
+        [(file, name) for file in CONTACTS for name in FUNCTIONS],
+        spread=True,
+    ),
+)
+def test_limb_by_limb_as_the_dense_system(file: str, name: str) -> None:
+    """mu = 0. States at which a leg is almost straight are left to the dense system: at most every fifth."""
+    model, kernel = model_of(file, CONTACTS[file]), kernels_of(file, CONTACTS[file])[name]
+    assert kernel.limbs is not None
+    assert kernel.limbs.checked
+    given = given_to(model, name)
+    expected = RECIPES[name].pinocchio(reference(loaded_of(file, CONTACTS[file])), given)
+    found = interpret(unpacked(kernel.limbs), given, kernel.function.sizes(sizes_of(model)))
+    settled = (found["pivot"] > 0.0).all(axis=1)
+    assert settled.mean() > 0.8
+    bound = 1e-8 if name.endswith("derivatives") else 1e-10
+    for output, values in expected.items():
+        flat = values.reshape(COUNT, -1)
+        error = np.abs(found[output] - flat).max(axis=1)
+        assert (error <= bound * np.abs(flat).max(axis=1))[settled].all(), output
+
+
+def test_a_straight_knee_is_left_to_the_dense_system() -> None:
+    model, name = model_of("hyq_no_sensors.urdf", FEET), FUNCTIONS[0]
+    limbs = kernels_of("hyq_no_sensors.urdf", FEET)[name].limbs
+    assert limbs is not None
+    whole, sizes = unpacked(limbs), RECIPES[name].signature.sizes(sizes_of(model))
+    for active, mu, settled in [(1.0, 0.0, False), (0.0, 0.0, True), (1.0, 0.5, True)]:
+        given = given_to(model, name, mu)
+        given["q"][:, 7:] = np.tile([0.1, 0.7, -1.4], 4)
+        given["q"][:, 9] = 0.0  # lf_kfe_joint
+        given["active"][:, 0] = active
+        signs = interpret(whole, given, sizes)["pivot"][:, model.nv :]
+        assert ((signs[:, 0] > 0.0) == settled).all()
+        assert (signs[:, 1:] > 0.0).all()
+
+
+def test_limbs_with_other_contacts_are_not_eliminated_one_by_one() -> None:
+    """Two feet of four, a contact on the trunk, and legs with fewer joints than rows."""
+    for contacts in (FEET[:2], (*FEET, "trunk"), tuple(f"{foot}:6" for foot in FEET)):
+        model = model_of("hyq_no_sensors.urdf", contacts)
+        assert lower(model, functions=FUNCTIONS[:1], theta_variants=False)[FUNCTIONS[0]].limbs is None
+
+
+@pytest.mark.parametrize("name", slow_but_for([FUNCTIONS[0]], list(FUNCTIONS)))
+def test_c_takes_the_dense_system_where_it_must(name: str) -> None:
+    """One state at a time: bent and straight knees, outputs over inputs, and a state without a solution."""
+    model = model_of("hyq_no_sensors.urdf", FEET)
+    names = (name, *RECIPES[name].signature.calls)
+    info = package_info(model, "hyq")
+    package = package_view(info, lower(model, functions=names, theta_variants=False), EmitOptions())
+    call = Direct(package, compiled(package, False))
+    given, signature = given_to(model, name), RECIPES[name].signature
+    given["q"][::3, 9] = 0.0
+    expected = RECIPES[name].pinocchio(reference(loaded_of("hyq_no_sensors.urdf", FEET)), given)
+    sizes = signature.sizes(sizes_of(model))
+    bound = 1e-8 if name.endswith("derivatives") else 1e-10
+    for row in range(COUNT):
+        inputs = [given[each.name][row].copy() for each in signature.inputs]
+        outputs = {each.name: np.empty(sizes[each.name]) for each in signature.outputs}
+        assert call(name, *inputs, *outputs.values()) == 0
+        for output, found in outputs.items():
+            values = expected[output][row].ravel()
+            assert np.abs(found - values).max() <= bound * np.abs(values).max(), output
+        first = signature.outputs[0].name
+        assert call(name, *inputs, inputs[1], *list(outputs.values())[1:]) == 0
+        np.testing.assert_array_equal(inputs[1], outputs[first])
+    inputs = [given[each.name][0].copy() for each in signature.inputs]
+    inputs[[each.name for each in signature.inputs].index("active")][2] = 0.5
+    assert call(name, *inputs, *outputs.values()) == 1 + model.nv + 2
+    assert all(np.isnan(found).all() for found in outputs.values())
