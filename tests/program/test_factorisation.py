@@ -58,6 +58,12 @@ def test_inputs_are_drawn_within_their_bounds() -> None:
 
 def test_python_raises_only_for_matrices_with_an_error() -> None:
     raising = [name for name, signature in SIGNATURES.items() if signature.raises]
-    starts = ("operational_space_inertia", "constrained", "impulse")
+    starts = (
+        "operational_space_inertia",
+        "contact_space_inertia",
+        "contact_inverse",
+        "constrained",
+        "impulse",
+    )
     assert raising == [name for name in SIGNATURES if name.startswith(starts)]
     assert SIGNATURES["forward_dynamics"].factorises
