@@ -74,6 +74,7 @@ def derive(
     packages: Mapping[str, str | Path] | None = None,
     unknown: Sequence[str] | str = (),
     contacts: Sequence[str] | str = (),
+    loops: str | Path | Sequence[Mapping[str, Any]] = (),
 ) -> DynamicsModel:
     """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
@@ -107,6 +108,7 @@ def derive(
                    without an inertia in the file. Without this option, links without an inertia are massless
     contacts       names of links that can touch the world, for functions such as constrained_forward_dynamics. "foot" is a
                    point, "foot:6" a surface. These links become named frames, too; if empty: each named frame is a point
+    loops          path of a TOML file with closed loops, or its tables [[loop]] as a list of dictionaries
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
     needs other options, for example `expand=False` because E and P need too much memory.
@@ -144,6 +146,7 @@ def derive(
         packages=packages,
         unknown=_names(unknown),
         contacts=_names(contacts),
+        loops=loops,
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

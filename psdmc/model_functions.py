@@ -105,7 +105,7 @@ def evaluated(
         )
         for quantity, array in zip(signature.inputs, arrays, strict=True)
     }
-    if recipe.needs is not None and theta_b is None:
+    if recipe.lack_of_loops(model.mechanism) or (recipe.needs is not None and theta_b is None):
         _admit(model, recipe.name)
     if by_rows:
         found = _values_by_rows(model, recipe, given, axes.sizes)
@@ -159,13 +159,25 @@ def _axes(model: DynamicsModel, recipe: Recipe) -> RobotAxes:
     kept = len(recipe.packs.places(robot, model.representative)) if recipe.packs else 0
     frames = tuple(frame.name for frame in robot.frames)
     return RobotAxes(
-        Sizes(len(own), robot.nq, robot.nv, model.l, len(frames), kept, robot.rows_of_contacts),
+        Sizes(
+            len(own),
+            robot.nq,
+            robot.nv,
+            model.l,
+            len(frames),
+            kept,
+            robot.rows_of_contacts,
+            robot.rows_of_loops,
+        ),
         {
             "n": tuple(robot.joints[i].name for i in own),
             "nq": robot.q_names,
             "nv": robot.v_names,
             "frames": frames,
-            **contact_names((frame.name, frame.rows) for frame in robot.contacts),
+            **contact_names(
+                ((frame.name, frame.rows) for frame in robot.contacts),
+                ((loop.name, loop.rows) for loop in robot.loops),
+            ),
         },
         units_of(robot.joints[i].type for i in own),
     )

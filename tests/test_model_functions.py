@@ -18,7 +18,7 @@ from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.errors import InputError
-from psdmc.functions import RECIPES, SIGNATURES
+from psdmc.functions import OF_TREES, RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import Sizes
@@ -56,7 +56,7 @@ def entries(dense: dict[str, np.ndarray], recipe: Recipe, model: DynamicsModel) 
     return {VALUES.name: matrix[:, rows, columns]}
 
 
-@pytest.mark.parametrize("name", SIGNATURES)
+@pytest.mark.parametrize("name", OF_TREES)
 def test_every_function_has_pinocchios_values(name: str) -> None:
     """Of the robot's file, read by Pinocchio itself."""
     model, recipe = bundled_model("scara"), RECIPES[name]

@@ -44,6 +44,7 @@ DECISIONS = {
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
+    "derivation/closed_loops.py": "a refusal",
     "recipes/contacts.py": "Pinocchio's side of a comparison",
     "functions/delassus.py": "Pinocchio's side of a comparison",
     "functions/contact_inverse_dynamics.py": "Pinocchio's side of a comparison",

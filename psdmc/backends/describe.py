@@ -9,7 +9,7 @@ from itertools import accumulate
 from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import Signature
-from psdmc.robot.mechanism import BASE_FRAME, POINT
+from psdmc.robot.mechanism import BASE_FRAME, POINT, ROW_NAMES
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 
@@ -43,13 +43,32 @@ def frame_lines(info: PackageInfo) -> tuple[str, ...]:
 
 
 def contact_lines(info: PackageInfo) -> tuple[str, ...]:
-    """The contacts by number, with their rows."""
+    """The contacts by number, with their rows, and the closed loops."""
     ends = accumulate(rows for _, rows in info.contacts)
     numbered = (
         f"  {i}  {name}, {'a point' if rows == POINT else 'a surface'}: rows {end - rows} to {end - 1}"
         for i, ((name, rows), end) in enumerate(zip(info.contacts, ends, strict=True))
     )
-    return ("", "Contacts, in the order of every array over them:", *numbered)
+    return ("", "Contacts, in the order of every array over them:", *numbered, *loop_lines(info))
+
+
+def loop_lines(info: PackageInfo) -> tuple[str, ...]:
+    """The closed loops by number, with their rows; none without loops."""
+    if not info.loops:
+        return ()
+    first = info.sizes.contact_rows
+    numbered = (
+        f"  {i}  {name}: {', '.join(ROW_NAMES[row] for row in rows)}"
+        for i, (name, rows) in enumerate(info.loops)
+    )
+    return (
+        "",
+        f"Closed loops, with their rows along the axes of the first frame. In forces, they begin at entry {first}. They are",
+        "always active: active has no entry for them, and error none, as it is computed. Returned numbers of contacts",
+        f"from {info.sizes.contacts} on are theirs. kp and kd apply to them, and so does mu. All functions without contacts",
+        "compute the spanning tree, in which the loops are open.",
+        *numbered,
+    )
 
 
 def _extent(info: PackageInfo) -> str:
@@ -73,7 +92,7 @@ def uses_frames(signatures: Iterable[Signature]) -> bool:
 
 def uses_contacts(signatures: Iterable[Signature]) -> bool:
     """Return whether one of the functions has an input or output for the contacts of the robot."""
-    return any("contact_rows" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
+    return any({"contact_rows", "loop_rows"} & {*q.axes} for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:

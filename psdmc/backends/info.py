@@ -60,6 +60,7 @@ class PackageInfo:
     frames      names of the named frames, untrusted text; empty: the tip alone
     contacts    names of the frames that can touch the world, each with the number of its rows in the contact Jacobian;
                 empty: all frames, as points
+    loops       names of the closed loops, untrusted text, each with the rows that it closes
     payload     (l, 10) maps from the ten parameters of a load to the change of the l base parameters: for a load at the
                 tip, then at each named frame. Empty if the package has no function that adds loads
     units       index ranges (start, end) of q whose length must be one (quaternions)
@@ -83,6 +84,7 @@ class PackageInfo:
     options: Mapping[str, str] = field(default_factory=dict)
     frames: tuple[str, ...] = ()
     contacts: tuple[tuple[str, int], ...] = ()
+    loops: tuple[tuple[str, tuple[int, ...]], ...] = ()
     payload: tuple[NDArray[np.float64], ...] = ()
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
@@ -130,7 +132,8 @@ class PackageInfo:
         """Return the lengths of array axes for this robot: numbers of joints, entries of q, rates, base parameters,
         frames and contacts."""
         rows = tuple(rows for _, rows in self.contacts)
-        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames), rows_of_contacts=rows)
+        closed = tuple(rows for _, rows in self.loops)
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames), 0, rows, closed)
 
     @property
     def l(self) -> int:  # noqa: E743
@@ -187,6 +190,7 @@ def package_info(
         options=dict(options or {}),
         frames=tuple(frame.name for frame in chain.frames),
         contacts=tuple((frame.name, frame.rows) for frame in chain.contacts),
+        loops=tuple((loop.name, loop.rows) for loop in chain.loops),
         payload=_load_maps(model) if payload else (),
         followers=tuple(_followers(chain)),
         units=units_of(chain.joints[i].type for i in chain.own_joints),

@@ -151,7 +151,13 @@ def _drawn(model: DynamicsModel) -> dict[str, Array]:
     """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
     robot, rng = model.mechanism, np.random.default_rng(SEED)
     sizes = Sizes(
-        model.n, model.nq, model.nv, model.l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
+        model.n,
+        model.nq,
+        model.nv,
+        model.l,
+        len(robot.frames),
+        rows_of_contacts=robot.rows_of_contacts,
+        rows_of_loops=robot.rows_of_loops,
     )
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
     drawn = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q)))) for q in read.values()}

@@ -129,6 +129,9 @@ def derive(
             help="links that can touch the world, as a point or (:6) a surface; default: each frame, a point",
         ),
     ] = None,
+    loops: Annotated[
+        Path | None, typer.Option(metavar="LOOPS.toml", help="file with closed loops, tables [[loop]]")
+    ] = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
@@ -159,6 +162,7 @@ def derive(
             package_folders(package),
             names(unknown),
             names(contacts),
+            loops or (),
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"

@@ -35,7 +35,7 @@ def placed_frames(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[tuple[Vector, Matrix]]:
     """Compute the origin (m) and the rotation matrix of each named frame, relative to the base frame."""
-    joints = _in_base(frames, q, root)
+    joints = joints_in_base(frames, q, root)
     return [
         (_point(joints[each.joint], each), multiply(joints[each.joint][0], _rotation(each))) for each in named
     ]
@@ -47,7 +47,7 @@ def frame_jacobians(
 ) -> list[list[list[Scalar]]]:
     """Compute the Jacobian, 6 x nv, of each named frame: linear velocity of its origin, then angular velocity, per unit
     joint rate, along the base's axes."""
-    joints = _in_base(frames, q, root)
+    joints = joints_in_base(frames, q, root)
     found = []
     for each in named:
         point = _point(joints[each.joint], each)
@@ -102,7 +102,7 @@ def frame_accelerations(
 ) -> list[tuple[Scalar, ...]]:
     """Compute six values per named frame: acceleration of its origin, without gravity, then angular acceleration, along
     the base's axes."""
-    joints = _in_base(frames, q, root)
+    joints = joints_in_base(frames, q, root)
     return [
         (*transform(joints[each.joint][0], linear), *transform(joints[each.joint][0], angular))
         for each, (linear, angular) in zip(named, _on_joints(frames, named, q, qd, qdd), strict=True)
@@ -290,7 +290,7 @@ def link_wrenches(
     return found
 
 
-def _in_base(frames: Sequence[Frame], q: Sequence[Scalar], root: Root) -> list[tuple[Matrix, Vector]]:
+def joints_in_base(frames: Sequence[Frame], q: Sequence[Scalar], root: Root) -> list[tuple[Matrix, Vector]]:
     """Rotation and origin of every joint frame in the base frame."""
     axes, origin = root
     placed = forward_kinematics(frames, q)

@@ -67,7 +67,13 @@ def jax_robot(
     key = repr((found.content_hash, lowering, real, trig, target))
     robot, chain = compiled, found.mechanism
     sizes = Sizes(
-        robot.n, robot.nq, robot.nv, robot.l, len(chain.frames), rows_of_contacts=chain.rows_of_contacts
+        robot.n,
+        robot.nq,
+        robot.nv,
+        robot.l,
+        len(chain.frames),
+        rows_of_contacts=chain.rows_of_contacts,
+        rows_of_loops=chain.rows_of_loops,
     )
     return _MADE.setdefault(key, JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes))
 

@@ -128,8 +128,8 @@ class TorchRobot:
     def shape(self, quantity: Quantity) -> tuple[int, ...]:
         """Return the shape of a function's input or output for one state."""
         model, chain = self.model, self.model.mechanism
-        rows = chain.rows_of_contacts
-        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), rows_of_contacts=rows)
+        rows, closed = chain.rows_of_contacts, chain.rows_of_loops
+        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), 0, rows, closed)
         return sizes.shape(quantity.axes)
 
     def operator(self, function: str) -> Any:

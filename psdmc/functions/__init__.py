@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 from psdmc.errors import InternalError
 from psdmc.program.signature import in_order
 from psdmc.program.theta_rows import THETA_ROWS, by_rows
-from psdmc.recipes.recipe import Recipe
+from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.robot.mechanism import Mechanism
 
 
@@ -26,6 +26,9 @@ SIGNATURES = {signature.name: signature for signature in in_order([r.signature f
 """By name, in the order of headers and documents."""
 
 RECIPES = {name: _FOUND[name] for name in SIGNATURES}
+
+OF_TREES = tuple(name for name, recipe in RECIPES.items() if recipe.needs is not Needs.LOOPS)
+"""Names of the functions of robots without closed loops."""
 
 BY_ROWS = {f"{each.name}{THETA_ROWS}": by_rows(each) for each in SIGNATURES.values() if each.theta}
 """By name, the variants that read one theta_b per state, in the same order."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.dynamics import contacts
+from psdmc.dynamics import closed_loops, contacts
 from psdmc.dynamics.arrow import Arrow, any_limbs
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
-from psdmc.functions import contact_drift, contact_jacobian
+from psdmc.functions import contact_drift, contact_jacobian, loop_drift, loop_error, loop_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import (
@@ -55,7 +55,7 @@ ERROR = Quantity(
 )
 FORCES = Quantity(
     "forces",
-    ("contact_rows",),
+    ("constraint_rows",),
     means="what the world exerts on the contacts, along the axes of the base frame; zero for contacts that are not active. "
     "A point has a force (N); a surface has a force and then a moment (N m) about the contact's origin",
     unit="J",
@@ -116,12 +116,17 @@ def solved(g: Ingredients) -> Solved:
     bias = torques(g, qd, g.still, g.base_acceleration)
     rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
     drifts = contacts.contact_drift(g.frames, g.named, q, qd, g.root)
+    errors = list(g.inputs[ERROR.name])
+    if g.loops:
+        rows += closed_loops.loop_jacobian(g.frames, g.loops, q, g.root)
+        drifts += closed_loops.loop_drift(g.frames, g.loops, q, qd, g.root)
+        errors += closed_loops.loop_error(g.frames, g.loops, q, g.root)
     wanted = [
         -(own + kd * inner_product(row, qd) + kp * error)
-        for own, row, error in zip(drifts, rows, g.inputs[ERROR.name], strict=True)
+        for own, row, error in zip(drifts, rows, errors, strict=True)
     ]
     load = [given - h for given, h in zip(tau, bias, strict=True)]
-    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si, g.loops)
     return *mask.solved(factors, rows, load, wanted), factors, rows
 
 
@@ -132,26 +137,38 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     These accelerations are given, and the torques were computed from them, so they are exact. The change that the
     contacts cause is added.
     """
-    free = given["qdd"]
+    free, loops = given["qdd"], robot.chain.loops
 
     def wanted(jacobian: Array) -> Array:
-        own = contact_drift.RECIPE.reference(robot, given)["drift"]
-        return -_stabilised(given, own, along(jacobian, given["qd"])) - along(jacobian, free)
+        own, errors = contact_drift.RECIPE.reference(robot, given)["drift"], given[ERROR.name]
+        if loops:
+            own = _joined(own, loop_drift.RECIPE.reference(robot, given)["drift"])
+            errors = _joined(errors, loop_error.RECIPE.reference(robot, given)["error"])
+        return -_stabilised(given, errors, own, along(jacobian, given["qd"])) - along(jacobian, free)
 
-    change, forces, pivots = held_on_arrays(robot, given, wanted)
+    change, forces, pivots = held_on_arrays(robot, given, wanted, loops)
     return {"qdd": free + change, "forces": forces, PIVOTS: pivots}
 
 
-def _stabilised(given: Given, own: Array, velocity: Array) -> Array:
+def _stabilised(given: Given, errors: Array, own: Array, velocity: Array) -> Array:
     kp, kd = (np.reshape(given[each.name], (-1, 1)) for each in (KP, KD))
-    return np.asarray(own + kd * velocity + kp * given[ERROR.name])
+    return np.asarray(own + kd * velocity + kp * errors)
+
+
+def _joined(of_contacts: Array, of_loops: Array) -> Array:
+    return np.concatenate([of_contacts, of_loops], axis=1)
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]
-    wanted = -_stabilised(given, own, along(jacobian, qd))
+    errors = given[ERROR.name]
+    if robot.loops:
+        jacobian = _joined(jacobian, loop_jacobian.RECIPE.pinocchio(robot, given)["J"])
+        own = _joined(own, loop_drift.RECIPE.pinocchio(robot, given)["drift"])
+        errors = _joined(errors, loop_error.RECIPE.pinocchio(robot, given)["error"])
+    wanted = -_stabilised(given, errors, own, along(jacobian, qd))
     load = given["tau"] - robot.nonlinear_effects(q, qd)
     qdd, forces = dense_solution(robot, given, jacobian, load, wanted)
     return {"qdd": qdd, "forces": forces}
@@ -177,5 +194,6 @@ RECIPE = Recipe(
     "crba, nonLinearEffects, computeFrameJacobian",
     pinocchio,
     shares="inverse_dynamics",
+    closes=True,
     in_limbs=True,
 )

@@ -19,6 +19,7 @@ from psdmc.robot.missing_inertia import idle_joints, massless_words, unknown_opt
 REMEDY = {
     Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency; use --unknown for a massless link",
     Needs.STANDARD: "derive the model from a file with the inertias of all links",
+    Needs.LOOPS: "declare loops with --loops",
 }
 
 
@@ -30,11 +31,15 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
     for name, reason in lacking.items():
         need = recipe_of(name).needs
         others = ",".join(other for other in names if other not in lacking)
-        leave = f"; without {name}: --functions {others}" if others else ""
+        leave = f"without {name}: --functions {others}" if others else ""
         chain, remedy = model.mechanism, REMEDY[need] if need else ""
+        if recipe_of(name).lack_of_loops(chain):
+            remedy = remedy if need is Needs.LOOPS else "derive the model without loops for the open tree"
         if need is Needs.POSITIVE_MASS and chain.massless and idle_joints(chain):
             remedy = f"add <inertial>, or derive again with {unknown_option(chain)}"
-        raise InputError(f"model {shown(chain.name)}: no {name}: {reason}", f"{remedy}{leave}")
+        raise InputError(
+            f"model {shown(chain.name)}: no {name}: {reason}", f"{'; '.join(filter(None, (remedy, leave)))}"
+        )
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -65,7 +70,8 @@ def _lacking(model: DynamicsModel, names: Sequence[str]) -> dict[str, str]:
     """Function -> why the model cannot have it."""
     reason = cache(lambda need: _REASONS[need](model))
     needs = {name: recipe_of(name).needs for name in names}
-    found = {name: reason(need) for name, need in needs.items() if need is not None}
+    found = {name: reason(need) for name, need in needs.items() if need in _REASONS}
+    found |= {name: why for name in names if (why := recipe_of(name).lack_of_loops(model.mechanism))}
     return {name: why for name, why in found.items() if why is not None}
 
 

@@ -102,4 +102,6 @@ def limbs_in(groups: Sequence[Limbs], kept: tuple[int, ...]) -> tuple[Limbs, ...
 @lru_cache(maxsize=256)
 def _part_of(whole: Reframed, kept: tuple[int, ...]) -> Reframed:
     places = tuple(whole.link_frames[joint] for joint in kept)
-    return replace(whole, frames=part_of(whole.frames, kept), link_frames=places, named=(), tip_body=0)
+    return replace(
+        whole, frames=part_of(whole.frames, kept), link_frames=places, named=(), loops=(), tip_body=0
+    )

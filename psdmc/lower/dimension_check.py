@@ -22,7 +22,7 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.errors import InputError
 from psdmc.lower.factored import RobotConstants, stored_entries
-from psdmc.lower.reframe import Reframed
+from psdmc.lower.reframe import Reframed, placed_loops
 from psdmc.lower.units import STANDARD, dimensions_of_traced, own_axes
 from psdmc.program.dimensioned import DimensionedTracer, UnlikeArguments
 from psdmc.program.dimensions import (
@@ -96,7 +96,7 @@ class _Measured:
         self.tracer = DimensionedTracer()
         self._numbers = count()
         self.theta_b, self.standard = _theta_dimensions(robot.representative, reframed.frames)
-        self.axes = own_axes(reframed.frames, reframed.named, self.theta_b)
+        self.axes = own_axes(reframed.frames, reframed.named, self.theta_b, reframed.loops)
 
     def value(self, dimension: Dimension) -> Scalar:
         return self.tracer.measured(Slot("ingredient", next(self._numbers)), dimension)
@@ -161,6 +161,7 @@ class _Measured:
             base_origin=self.vector(own.base_origin, LENGTH),
             link_frames=tuple(map(self.placed, own.link_frames)),
             named=tuple(replace(each, placement=self.placed(each.placement)) for each in own.named),
+            loops=placed_loops(own.loops, lambda end: self.placed(end.placement)),
             tip=self.placed(own.tip),
             tip_body=own.tip_body,
             lift=self.lift() if has_parameters else self.robot.representative,

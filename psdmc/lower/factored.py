@@ -23,7 +23,7 @@ from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.errors import InternalError
 from psdmc.lower.link_parameters import bodies_from_carriers
-from psdmc.lower.reframe import Reframed
+from psdmc.lower.reframe import Reframed, placed_loops
 from psdmc.lower.units import are_scaled, dimensions_of_traced, multiple, own_axes, scaled_parameters
 from psdmc.program.cost import Cost
 from psdmc.program.dimensions import NUMBER, dimension_of
@@ -150,7 +150,11 @@ def traced(
     """Record the operations of a function on symbols, for the given frames, bodies and inputs. Return every entry of
     the outputs with its slot (output name and index)."""
     is_scaled = unit != 1.0 and are_scaled((*recipe.signature.inputs, *recipe.signature.stored))
-    axes = own_axes(reframed.frames, reframed.named, [NUMBER] * robot.sizes.l) if is_scaled else {}
+    axes = (
+        own_axes(reframed.frames, reframed.named, [NUMBER] * robot.sizes.l, reframed.loops)
+        if is_scaled
+        else {}
+    )
     for quantity in recipe.signature.inputs if is_scaled else ():
         own = zip(inputs[quantity.name], quantity.dimensions(axes), strict=True)
         inputs = {**inputs, quantity.name: [symbol * multiple(unit, each) for symbol, each in own]}
@@ -164,6 +168,7 @@ def traced(
         base_origin=reframed.base_origin,
         link_frames=reframed.link_frames,
         named=reframed.named,
+        loops=reframed.loops,
         tip=reframed.tip,
         tip_body=reframed.tip_body,
         lift=_lift(robot, unit),
@@ -245,6 +250,7 @@ def in_unit(reframed: Reframed, unit: float) -> Reframed:
         tip=placed(reframed.tip),
         base_origin=scaled(reframed.base_origin),
         named=tuple(replace(frame, placement=placed(frame.placement)) for frame in reframed.named),
+        loops=placed_loops(reframed.loops, lambda end: placed(end.placement)),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Literal
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
 from psdmc.friction.in_dynamics import FrictionInDynamics
-from psdmc.functions import BY_ROWS, DEFAULT, RECIPES, default_of, recipe_of
+from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.dimension_check import check_dimensions
@@ -140,7 +140,8 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
         return default
     if isinstance(functions, str):
         functions = (functions,)
-    groups = {"default": default, "all": tuple(RECIPES)}
+    own = (name for name, recipe in RECIPES.items() if robot and recipe.lack_of_loops(robot) is None)
+    groups = {"default": default, "all": tuple(own) or OF_TREES}
     names = [name for word in functions for name in groups.get(word, (word,))]
     known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
     unknown = [name for name in names if name not in known]

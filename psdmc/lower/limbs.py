@@ -87,10 +87,11 @@ def has_contacts(signature: Signature) -> bool:
 
 
 def have_contacts_alike(recipe: Recipe, frames: Reframed, groups: Sequence[Limbs]) -> bool:
-    """Return whether the function has no contacts, or all contacts are at corresponding places of equal limbs."""
+    """Return whether the function has no contacts, or all contacts are at corresponding places of equal limbs, without
+    closed loops."""
     if not has_contacts(recipe.signature):
         return True
-    return merged_contacts(frames.named, places(len(frames.frames), groups)) is not None
+    return not frames.loops and merged_contacts(frames.named, places(len(frames.frames), groups)) is not None
 
 
 def has_columns(recipe: Recipe) -> bool:
@@ -161,6 +162,9 @@ class _Trace:
         self.first["nxa"] = [3 * self.first["nv"][-1]]
         self.first["contacts"] = [0, *range(1, 1 + len([each for each in whole.named if each.rows]))]
         self.first["contact_rows"] = [0, *accumulate(each.rows for each in whole.named if each.rows)]
+        # Limbs have no closed loops (have_contacts_alike): all constraints are contacts.
+        self.first["constraints"] = self.first["contacts"]
+        self.first["constraint_rows"] = self.first["contact_rows"]
         if has_columns(recipe):
             self._select_columns(whole.link_frames)
 
@@ -235,11 +239,11 @@ class _Trace:
             ]
         if "+" in axis:
             return self._along_several(axis.split("+"))
-        if axis in ("contacts", "contact_rows"):
+        if axis in ("contacts", "constraints", "contact_rows", "constraint_rows"):
             return [
                 (each.group, tuple(self.first[axis][k] + row for k in each.numbers))
                 for each in self.contacts
-                for row in range(each.frame.rows if axis == "contact_rows" else 1)
+                for row in range(each.frame.rows if axis.endswith("rows") else 1)
             ]
         return [(place.group, own) for place in self.places for own in self._entries(place, axis)]
 

@@ -13,7 +13,7 @@ this frame's axes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -46,7 +46,7 @@ from psdmc.lower.without_rounding import (
     without_rounding,
 )
 from psdmc.reproducible import angle_of, cross, length, times
-from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
+from psdmc.robot.mechanism import BASE, Array, Loop, Mechanism, NamedFrame, Placement
 
 Foot = Literal["previous", "next"]
 
@@ -63,6 +63,7 @@ class Reframed:
     tip_body           number of the body to which the tip frame is fixed
     base_origin        m, the origin from which frames on the base are given, in the robot's base frame
     named              the robot's named frames, placed in the new joint frames
+    loops              the robot's closed loops, placed in the new joint frames; on the base, in the base frame
     """
 
     frames: tuple[Frame, ...]
@@ -73,6 +74,7 @@ class Reframed:
     tip_body: int
     base_origin: Vector
     named: tuple[NamedFrame, ...]
+    loops: tuple[Loop, ...] = ()
 
     def is_same(self, other: Reframed) -> bool:
         """Return whether all numbers of the two robots' frames are equal."""
@@ -125,10 +127,33 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
         replace(frame, placement=without_rounding(_moved(after, origins, placed, frame), reach))
         for frame in chain.frames
     )
+    loops = placed_loops(
+        chain.loops, lambda end: without_rounding(_moved(after, origins, placed, end), reach)
+    )
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
     origin = as_vector((clean_lengths(origins[0], reach) + 0.0).tolist())
     return Reframed(
-        tuple(frames), as_vector(at_base.tolist()), tuple(link_frames), tip, base_axes, end, origin, named
+        tuple(frames),
+        as_vector(at_base.tolist()),
+        tuple(link_frames),
+        tip,
+        base_axes,
+        end,
+        origin,
+        named,
+        loops,
+    )
+
+
+def placed_loops(loops: Sequence[Loop], place: Callable[[NamedFrame], Placement]) -> tuple[Loop, ...]:
+    """Return the loops with new placements of both frames."""
+    return tuple(
+        replace(
+            loop,
+            first=replace(loop.first, placement=place(loop.first)),
+            second=replace(loop.second, placement=place(loop.second)),
+        )
+        for loop in loops
     )
 
 
@@ -144,6 +169,7 @@ def unmoved(chain: Mechanism) -> Reframed:
         chain.tip_body,
         ZERO,
         chain.frames,
+        chain.loops,
     )
 
 
@@ -152,6 +178,8 @@ def _moved(
 ) -> Placement:
     """Where a named frame sits in the new frame of its joint."""
     k = frame.joint
+    if k == BASE:
+        return frame.placement
     return Placement(axes[k], origins[k]).inverse() @ placed[k] @ frame.placement
 
 

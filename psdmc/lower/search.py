@@ -84,7 +84,15 @@ class Search:
     ) -> None:
         l, frames = representative.shape[1], len(chain.frames)
         contacts = chain.rows_of_contacts
-        sizes = Sizes(len(chain), chain.nq, chain.nv, l, frames, rows_of_contacts=contacts)
+        sizes = Sizes(
+            len(chain),
+            chain.nq,
+            chain.nv,
+            l,
+            frames,
+            rows_of_contacts=contacts,
+            rows_of_loops=chain.rows_of_loops,
+        )
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.is_large = len(chain) > LARGE

@@ -18,8 +18,8 @@ import numpy as np
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.slices import leading
 from psdmc.program.dimensions import INERTIA, LENGTH, MASS, MOMENT, NUMBER, Dimension, dimension_of, times
-from psdmc.program.signature import Quantity, Signature
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.program.signature import OF_ROWS, Quantity, Signature
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 Axes = Mapping[str, Sequence[Dimension]]
 """The dimensions that entries have along an axis, by its word."""
@@ -33,7 +33,12 @@ STANDARD = (MASS, *(MOMENT,) * 3, *(INERTIA,) * 7)
 """Of a link's standard parameters; the drive inertia of a sliding joint has another."""
 
 
-def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequence[Dimension]) -> Axes:
+def own_axes(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    theta_b: Sequence[Dimension],
+    loops: Sequence[Loop] = (),
+) -> Axes:
     """Return the physical dimensions of the entries along each kind of array axis (such as nq or nv), for a robot with
     these frames."""
     joints = [frame.joint for frame in leading(frames)]
@@ -41,6 +46,8 @@ def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequ
         [Dimension(0, order) for joint in joints for order in getattr(joint, orders)]
         for orders in ("q_orders", "v_orders")
     )
+    contacts = [axis for each in named for axis in TWIST[: each.rows]]
+    closed = [TWIST[row] for loop in loops for row in loop.rows]
     rates, accelerations = [times(each, RATE) for each in nv], [times(each, RATE, 2) for each in nv]
     return {
         "n": [NUMBER] * len(frames),
@@ -52,7 +59,8 @@ def own_axes(frames: Sequence[Frame], named: Sequence[NamedFrame], theta_b: Sequ
         "l": theta_b,
         "frames": [NUMBER] * len(named),
         "contacts": [NUMBER] * len([each for each in named if each.rows]),
-        "contact_rows": [axis for each in named for axis in TWIST[: each.rows]],
+        "constraints": [NUMBER] * (len([each for each in named if each.rows]) + len(loops)),
+        **dict(zip(OF_ROWS, (contacts, closed, contacts + closed), strict=True)),
         "6": TWIST,
     }
 
@@ -82,9 +90,7 @@ def multiple(unit: float, dimension: Dimension) -> float:
 def are_scaled(quantities: Iterable[Quantity]) -> bool:
     """Return whether one of these quantities has another value in the units inside a trace than in SI, for robots
     without sliding joints."""
-    return any(
-        quantity.dimension.order or {"6", "contact_rows"} & {*quantity.axes} for quantity in quantities
-    )
+    return any(quantity.dimension.order or {"6", *OF_ROWS} & {*quantity.axes} for quantity in quantities)
 
 
 def scaled_parameters(x: Array, unit: float) -> Array:

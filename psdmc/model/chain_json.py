@@ -18,10 +18,12 @@ from psdmc.robot.mechanism import (
     BASE,
     PARAMETERS_PER_LINK,
     POINT,
+    ROW_NAMES,
     SURFACE,
     Array,
     Joint,
     Limits,
+    Loop,
     Mechanism,
     NamedFrame,
     Placement,
@@ -65,6 +67,7 @@ def chain_to_json(chain: Mechanism) -> dict[str, Any]:
         }
         | ({"massless": list(chain.massless)} if chain.massless else {})
         | _frames_to_json(chain)
+        | ({"loops": [_loop_to_json(loop) for loop in chain.loops]} if chain.loops else {})
         | _tree_to_json(chain)
     )
 
@@ -134,9 +137,31 @@ def _frame_to_json(frame: NamedFrame) -> dict[str, Any]:
     return plain if frame.rows == POINT else {**plain, "rows": frame.rows}
 
 
-def _frame_from_json(data: object, joints: int) -> NamedFrame:
+def _loop_to_json(loop: Loop) -> dict[str, Any]:
+    ends = {"first": _frame_to_json(loop.first), "second": _frame_to_json(loop.second)}
+    return {"name": loop.name, **ends, "rows": list(loop.rows)}
+
+
+def _loop_from_json(data: object, joints: int) -> Loop:
+    first, second = (_frame_from_json(part(data, end, "a loop"), joints, BASE) for end in ("first", "second"))
+    rows = entries(part(data, "rows", "a loop"), "a loop's rows", len(ROW_NAMES))
+    return Loop(
+        text(part(data, "name", "a loop"), "a loop's name"),
+        first,
+        second,
+        tuple(whole(row, "a loop's row", 0, len(ROW_NAMES) - 1) for row in rows),
+    )
+
+
+def _loops(data: object, joints: int) -> tuple[Loop, ...]:
+    """Closed loops; none in files of earlier versions."""
+    found = data.get("loops", []) if isinstance(data, dict) else []
+    return tuple(_loop_from_json(loop, joints) for loop in entries(found, "the chain's loops", MOST_FRAMES))
+
+
+def _frame_from_json(data: object, joints: int, least: int = 0) -> NamedFrame:
     name = text(part(data, "name", "a frame"), "a frame's name")
-    joint = whole(part(data, "joint", "a frame"), "a frame's joint", 0, joints - 1)
+    joint = whole(part(data, "joint", "a frame"), "a frame's joint", least, joints - 1)
     rows = whole(data.get("rows", POINT), "a contact's rows", 0, SURFACE) if isinstance(data, dict) else POINT
     return NamedFrame(name, joint, _placement_from_json(part(data, "placement", "a frame"), "a frame"), rows)
 
@@ -164,6 +189,7 @@ def chain_from_json(data: object) -> Mechanism:
         ),
         frames=tuple(_frame_from_json(frame, len(listed)) for frame in _frames(data)),
         massless=_massless(data, len(listed)),
+        loops=_loops(data, len(listed)),
         **_tree_from_json(data, len(listed)),
     )
 

@@ -20,7 +20,15 @@ from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array, made_again
+from psdmc.robot.mechanism import (
+    PARAMETERS_PER_LINK,
+    ROW_NAMES,
+    Array,
+    Mechanism,
+    Placement,
+    frozen_array,
+    made_again,
+)
 from psdmc.robot.zeros import leading_rows
 
 if TYPE_CHECKING:
@@ -127,6 +135,17 @@ class DynamicsModel(Answers):
         `constrained_forward_dynamics` and other functions return contact forces in the order of this dictionary.
         """
         return {frame.name: frame.rows for frame in self.mechanism.contacts}
+
+    @property
+    def loops(self) -> dict[str, tuple[str, ...]]:
+        """Return, by name of closed loop, the rows that it closes: 'x', 'y', 'z', 'rx', 'ry' or 'rz'.
+
+        The forces of loops follow those of contacts, in the order of this dictionary.
+        """
+        return {
+            name: tuple(ROW_NAMES[row] for row in rows)
+            for name, rows in ((loop.name, loop.rows) for loop in self.mechanism.loops)
+        }
 
     @property
     def n(self) -> int:

@@ -165,6 +165,8 @@ def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
     for statement in json.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
         json.text(statement, "an entry of the option assume_zero")
     json.number(options.get("snap", 0.0), "the option snap")
+    for table in json.entries(options.get("loops", []), "the option loops", MOST_ROWS):
+        json.record(table, "an entry of the option loops")
     for option in ("frames", "contacts"):
         for name in json.entries(options.get(option, []), f"the option {option}", MOST_ROWS):
             json.text(name, f"the option {option}")

@@ -38,6 +38,7 @@ def _with_calibration(manifest: dict[str, Any]) -> dict[str, Any]:
 _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     1: lambda manifest: manifest | {"schema": 2},
     2: _with_calibration,
+    3: lambda manifest: manifest | {"schema": 4},
 }
 """By schema: what makes its manifest one of the next schema. A chain of schema 1 is read as it is."""
 

@@ -34,8 +34,10 @@ CHAIN_SCHEMA = 1
 """Of files with serial chains, which every psdmc reads."""
 TREE_SCHEMA = 2
 """Of files with trees, or with joints that follow others."""
-SCHEMA = 3
-"""Of files with a calibration: the newest."""
+CALIBRATED_SCHEMA = 3
+"""Of files with a calibration."""
+SCHEMA = 4
+"""Of files with closed loops: the newest."""
 FORMAT = "psdmc model"
 ARRAYS = ("E", "theta_b", "P_joint", "P_row", "P_col", "P_value", "B")
 
@@ -113,9 +115,10 @@ def _nothing(n: int, l: int) -> Expansion:
 def _manifest(model: Model) -> dict[str, Any]:
     schema = CHAIN_SCHEMA if is_plain_chain(model.mechanism) else TREE_SCHEMA
     calibrated = model.calibrated
+    schema = schema if calibrated is None else CALIBRATED_SCHEMA
     return {
         "format": FORMAT,
-        "schema": schema if calibrated is None else SCHEMA,
+        "schema": SCHEMA if model.mechanism.loops else schema,
         "psdmc": psdmc_version(),
         "expanded": model.expansion is not None,
         "theta_b_known": model.theta_b is not None,

@@ -15,10 +15,17 @@ from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
 from psdmc.program.thin_products import Thin
 
-WORDS = ("n", "nq", "nv", "nx", "nxa", "nxu", "l", "frames", "contacts", "contact_rows", "nonzeros")
+OF_ROWS = ("contact_rows", "loop_rows", "constraint_rows")
+"""Rows of all contacts, of all loops, and of contacts and loops."""
+
+WORDS = (
+    *("n", "nq", "nv", "nx", "nxa", "nxu", "l", "frames", "contacts", "constraints"),
+    *OF_ROWS,
+    "nonzeros",
+)
 """Sizes that depend on the robot: joints, length of q, of qd, of both together, and of these with qdd and with tau, base
-parameters, named frames, contacts and the rows of all contacts; and, of a function that packs a matrix, entries that it puts
-out."""
+parameters, named frames, contacts, contacts and closed loops, and their rows; and, of a function that packs a matrix,
+entries that it puts out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +34,7 @@ class Sizes:
     Shapes use their names as words, such as nv for the number of joint rates.
 
     rows_of_contacts  3 or 6 for each contact; left out: every named frame is a point, of 3 rows
+    rows_of_loops     for each closed loop, the axes that it closes
     """
 
     n: int
@@ -36,6 +44,7 @@ class Sizes:
     frames: int
     nonzeros: int = 0
     rows_of_contacts: tuple[int, ...] = ()
+    rows_of_loops: tuple[tuple[int, ...], ...] = ()
 
     @property
     def contacts(self) -> int:
@@ -44,6 +53,18 @@ class Sizes:
     @property
     def contact_rows(self) -> int:
         return sum(self.rows_of_contacts) or 3 * self.frames
+
+    @property
+    def loop_rows(self) -> int:
+        return sum(map(len, self.rows_of_loops))
+
+    @property
+    def constraints(self) -> int:
+        return self.contacts + len(self.rows_of_loops)
+
+    @property
+    def constraint_rows(self) -> int:
+        return self.contact_rows + self.loop_rows
 
     @property
     def nx(self) -> int:
@@ -238,6 +259,7 @@ class Signature:
         positive. Pivots are numbered from 0 over all matrices."""
         lengths = [" ".join(matrix.axes) for matrix in self.factorises]
         later = f", + ({' + '.join(lengths)}) times the stage of the step" if self.stages > 1 else ""
+        later = later.replace("constraints", "contacts")  # no such function has closed loops
         return tuple(
             "".join(f"{length} + " for length in lengths[:k]) + matrix.number + later
             for k, matrix in enumerate(self.factorises)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from psdmc.dynamics.closed_loops import loop_jacobian
 from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inverse, inverse_diagonal
@@ -16,7 +17,7 @@ from psdmc.program.operations import Op
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import RobotOnArrays, columns, matrix
 from psdmc.recipes.pivots import regular
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -48,12 +49,12 @@ MU = Quantity(
 CONTACTS = SymmetricMatrix(
     "J M^-1 J^T + mu I of the active contacts",
     Structure.DENSE,
-    ("contacts",),
+    ("constraints",),
     number="the number, from 0, of the contact at which J M^-1 J^T + mu I of the active contacts is not positive definite, "
     "or whose active is neither 0 nor 1",
     failure="an entry of active is neither 0 nor 1\nmu is negative\nJ M^-1 J^T + mu I of the active contacts is not "
     "positive definite, for example because mu = 0 and two active contacts prevent the same motion",
-    error="contact {contacts!r}: J M^-1 J^T + mu I of the active contacts is not positive definite at mu = {mu:g}, or "
+    error="{constraints}: J M^-1 J^T + mu I of the active contacts is not positive definite at mu = {mu:g}, or "
     "active is not 0 or 1",
     hint="give active 0 or 1 for each contact, and mu > 0, such as 1e-6, if contacts hold more motions than the robot has",
 )
@@ -72,6 +73,7 @@ class Held(NamedTuple):
     axes (rows) for each.
 
     named   the named frames, some of which are contacts
+    loops   the closed loops, whose rows follow those of the contacts and are always active
     active  1 for each contact that touches the world, else 0
     mu      regularisation: what is added to the diagonal of J M^-1 J^T
     si      returns a constant from its value and its unit
@@ -81,23 +83,34 @@ class Held(NamedTuple):
     active: Sequence[Scalar]
     mu: Scalar
     si: Callable[[float, str], Scalar] = lambda value, unit: value
+    loops: Sequence[Loop] = ()
+
+    @property
+    def axes(self) -> list[Sequence[int]]:
+        """For each contact and each loop its rows: 0 to 2 along an axis, 3 to 5 about an axis."""
+        return [*(range(each.rows) for each in self.named if each.rows), *(loop.rows for loop in self.loops)]
 
     @property
     def counts(self) -> list[int]:
-        """The number of rows of each contact."""
-        return [each.rows for each in self.named if each.rows]
+        """The number of rows of each contact and of each loop."""
+        return [len(own) for own in self.axes]
+
+    @property
+    def acting(self) -> list[Scalar]:
+        """For each contact and each loop, whether it acts."""
+        return [*self.active, *(1.0 for _ in self.loops)]
 
     @property
     def rows(self) -> tuple[list[Scalar], list[Scalar], list[Scalar]]:
         """For each row: whether its contact is active, what is added to the diagonal, and a one in the diagonal's
         unit."""
-        si, counts = self.si, self.counts
+        si, axes = self.si, self.axes
         shift = [self.mu] * 3 + [self.mu * si(1.0, "1/m^2")] * 3
         unit = [si(1.0, "1/kg")] * 3 + [si(1.0, "1/(kg m^2)")] * 3
         return (
-            [on for on, count in zip(self.active, counts, strict=True) for _ in range(count)],
-            [each for count in counts for each in shift[:count]],
-            [each for count in counts for each in unit[:count]],
+            [on for on, own in zip(self.acting, axes, strict=True) for _ in own],
+            [shift[row] for own in axes for row in own],
+            [unit[row] for own in axes for row in own],
         )
 
     def compliance(self, factors: Factors) -> list[list[Scalar]]:
@@ -112,8 +125,8 @@ class Held(NamedTuple):
     def solved(
         self, factors: Factors, jacobian: Rows, load: Sequence[Scalar], wanted: Sequence[Scalar]
     ) -> tuple[Constrained, list[Scalar]]:
-        """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact,
-        too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
+        """Return the motion and the contact forces, as `constrained` computes them. Return a sign for each contact, and
+        for each loop, too: -1 if the matrix of the active contacts is not positive definite there, else 1."""
         found = constrained(factors, jacobian, load, wanted, *self.rows)
         return found, self.independent(found.matrix, found.factors, inverse_diagonal(found.factors))
 
@@ -121,9 +134,13 @@ class Held(NamedTuple):
         """Return a sign for each contact: -1 if `matrix` is not positive definite there, or if active or mu is not
         allowed, else 1. `inverse` is the diagonal of the inverse matrix."""
         signs, first = [], 0
-        for sign, count in zip(self.allowed(), self.counts, strict=True):
+        for number, (untested, count) in enumerate(zip(self.allowed(), self.counts, strict=True)):
+            sign = untested
             for k in range(first, first + count):
                 sign = regular(sign, factors.pivots[k], matrix[k][k], inverse[k])
+            if self.loops and number < len(self.active):
+                # Where loops have no solution, contacts that are not active are not at fault.
+                sign = Op.SELECT(self.active[number], 0.5, untested, sign)
             signs.append(sign)
             first += count
         return signs
@@ -144,23 +161,31 @@ class Held(NamedTuple):
             off = on - on * on
             sign = Op.SELECT(off, NOTHING, Op.SELECT(self.mu, 0.0, -1.0, 1.0), -1.0)
             yield Op.SELECT(-NOTHING, off, sign, -1.0)
+        for _ in self.loops:
+            yield Op.SELECT(self.mu, 0.0, -1.0, 1.0)
 
 
 def held_on_arrays(
-    robot: RobotOnArrays, given: Mapping[str, Array], wanted: Callable[[Array], Array]
+    robot: RobotOnArrays,
+    given: Mapping[str, Array],
+    wanted: Callable[[Array], Array],
+    loops: Sequence[Loop] = (),
 ) -> tuple[Array, Array, Array]:
     """Solve for the motion with active contacts, in NumPy, for k states without applied torques.
 
     Return the motion x (k, nv), such as accelerations, the contact forces f (k, rows), and numbers that must be
     positive. These are the pivots of the mass matrix and a sign for each contact. `wanted` computes the prescribed
-    motion of the contacts (k, rows) from the contact Jacobian J (k, rows, nv).
+    motion of the contacts (k, rows) from the contact Jacobian J (k, rows, nv). The rows of `loops` follow those of the
+    contacts.
     """
     q, count = list(given["q"].T), len(given["q"])
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])
     rows = contact_jacobian(robot.frames, robot.chain.frames, q)
+    if loops:
+        rows += loop_jacobian(robot.frames, loops, q)
     right = list(wanted(matrix(rows, count)).T)
-    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1), loops=loops)
     with np.errstate(all="ignore"):
         found, signs = mask.solved(factors, rows, [0.0] * robot.nv, right)
     return (
@@ -181,6 +206,8 @@ def dense_solution(
     """
     counts = [rows for _, rows in robot.contacts]
     masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
+    loops = jacobian.shape[1] - masks.shape[1]
+    masks = np.pad(masks, ((0, 0), (0, loops)), constant_values=True)
     motion, forces = np.zeros(load.shape), np.zeros(wanted.shape)
     for k, (mass, on, mu) in enumerate(
         zip(robot.mass_matrix(given["q"]), masks, np.reshape(given[MU.name], -1), strict=True)

@@ -16,9 +16,9 @@ from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.structure import Places
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.program.regions import Regions
-from psdmc.program.signature import Signature
+from psdmc.program.signature import OF_ROWS, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays as RobotOnArrays
-from psdmc.robot.mechanism import Array, Mechanism, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, Loop, Mechanism, NamedFrame, Placement
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference as Reference
@@ -62,6 +62,7 @@ class Ingredients:
     base_origin        origin from which the placement of the first joint is given, in the base frame
     link_frames        placements of the n link frames of the robot file in the joint frames
     named              the named frames, placed in the joint frames
+    loops              the closed loops, whose frames are placed in the joint frames, or in the base frame
     tip                the tip frame, in the joint frame of tip_body
     tip_body           the body to which the tip frame is fixed
     lift               (11 n, l) matrix that gives standard parameters about the link frames from theta_b
@@ -85,6 +86,7 @@ class Ingredients:
     base_origin: Vector
     link_frames: tuple[Placement, ...]
     named: tuple[NamedFrame, ...]
+    loops: tuple[Loop, ...]
     tip: Placement
     tip_body: int
     lift: Array
@@ -122,6 +124,7 @@ class Needs(StrEnum):
     """A property of a model, besides known base parameters, that a generated function needs."""
 
     POSITIVE_MASS = "a positive definite mass matrix"
+    LOOPS = "closed loops"
     STANDARD = "standard parameters of its links"
 
 
@@ -173,6 +176,8 @@ class Recipe:
                  generated, and all other entries are left out. `trace` and `pinocchio` compute the whole matrix
     regions      the function's body as loops and calls, from which C is printed; `trace` computes the same. It is made
                  from the joint frames and the named frames. None: C is printed from code without loops
+    closes       whether the function takes closed loops into account. Other functions with contacts and theta_b are refused
+                 for robots with loops; all others compute the spanning tree, whose loops are open
     straight     number of joint rates up to which C is printed from code without loops although there are `regions`.
                  Code without loops has SIMD lanes for batches. A KR6's second derivatives also execute 15 % fewer
                  instructions, but a quadruped's would be 38,000 operations
@@ -200,6 +205,7 @@ class Recipe:
     packs: Packing | None = None
     regions: Callable[[Sequence[Frame], Sequence[NamedFrame]], Regions] | None = None
     straight: int = 8
+    closes: bool = False
 
     def __post_init__(self) -> None:
         if self.needs is None and any("nv" in matrix.axes for matrix in self.signature.factorises):
@@ -208,3 +214,14 @@ class Recipe:
     @property
     def name(self) -> str:
         return self.signature.name
+
+    def lack_of_loops(self, robot: Mechanism) -> str | None:
+        """Return why a robot has no such function, because it has closed loops or has none; None: it may have it."""
+        if not robot.loops:
+            return "the robot has no closed loops" if self.needs is Needs.LOOPS else None
+        signature = self.signature
+        touching = {"contacts", *OF_ROWS}
+        touches = any(touching & {*q.axes} for q in (*signature.inputs, *signature.outputs))
+        if touches and signature.theta and not self.closes:
+            return "for robots with closed loops, psdmc does not generate it yet"
+        return None

@@ -22,7 +22,7 @@ from psdmc.robot.zeros import ZERO_NAMES
 
 Convention = Literal["standard", "modified"]
 
-ROBOT_KEYS = ("name", "convention", "gravity", "joint")
+ROBOT_KEYS = ("name", "convention", "gravity", "joint", "loop")
 JOINT_KEYS = ("name", "parent", "type", "a", "alpha", "d", "theta", "limits", "drive_inertia", "link")
 LIMIT_KEYS = ("position", "speed", "acceleration", "effort")
 LINK_KEYS = ("mass", "com", "inertia_com", "zero")
@@ -62,12 +62,14 @@ class DhJoint:
 
 @dataclass(frozen=True, slots=True)
 class DhRobot:
-    """The content of a DH file: name, convention, rows, and gravity in m/s^2 along the axes of the base frame."""
+    """The content of a DH file: name, convention, rows, gravity in m/s^2 along the axes of the base frame, and tables of
+    closed loops (closed_loops.py)."""
 
     name: str
     convention: Convention
     gravity: Triple
     joints: tuple[DhJoint, ...]
+    loops: tuple[Any, ...] = ()
 
 
 def read_dh(text: str, source: str) -> DhRobot:
@@ -112,6 +114,7 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
         convention=table.read("convention", one_of("standard", "modified"), "standard"),
         gravity=table.read("gravity", _gravity, (0.0, 0.0, -9.81)),
         joints=tuple(replace(joint, parent=k) for joint, k in zip(joints, parents, strict=True)),
+        loops=tuple(table.read("loop", any_list, [])),
     )
 
 

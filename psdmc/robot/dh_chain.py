@@ -58,6 +58,12 @@ def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames:
         frames=named,
         parents=parents,
         tip_body=tip,
+        loops=robot.loops,
+        frame_of=lambda name: (
+            NamedFrame(name, BASE, Placement.identity())
+            if name == BASE_NAME
+            else _frame(joints, name, source)
+        ),
     )
 
 

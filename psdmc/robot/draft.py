@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.mechanism import BASE as ON_BASE
@@ -39,6 +40,8 @@ class Draft:
     gravity        (3,) m/s^2 in the base frame
     frames         named frames; empty: the tip alone
     massless       moving links without inertia in the file, which psdmc treats as massless
+    loops          tables of closed loops in the file
+    frame_of       returns the frame of a link by its name, with the joint BASE if the link is fixed to the base
     parents, tip_body, coordinates   as in Mechanism; left out: those of a serial chain without mimic joints
     """
 
@@ -59,6 +62,8 @@ class Draft:
     tip_body: int = ON_BASE
     coordinates: tuple[Coordinate, ...] = ()
     massless: tuple[str, ...] = ()
+    loops: tuple[Any, ...] = ()
+    frame_of: Callable[[str], NamedFrame] | None = None
 
     @property
     def tip_frame(self) -> NamedFrame:

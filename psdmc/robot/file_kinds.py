@@ -27,8 +27,8 @@ SourceFormat = Literal["urdf", "dh"]
 def as_source(
     file: Path, text: str, options: LoadOptions, packages: Mapping[str, Path]
 ) -> tuple[str, SourceFormat, LoadOptions]:
-    """Return the text of the robot to read, the format of the text, and the options. An MJCF file adds gravity and a
-    floating base to the options.
+    """Return the text of the robot to read, the format of the text, and the options. An MJCF file adds gravity, a
+    floating base and closed loops to the options.
 
     packages   folders of ROS packages that a xacro file uses, by name
 
@@ -69,6 +69,7 @@ def as_source(
 
 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:
+    from psdmc.robot.closed_loops import merged_loops
     from psdmc.robot.mjcf import read_mjcf
 
     found = read_mjcf(file, file.name, options.root)
@@ -78,4 +79,6 @@ def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, Loa
             "leave --base and --tip out; --lock holds joints",
         )
     gravity = found.gravity if options.gravity is None else options.gravity
-    return found.text, "urdf", replace(options, gravity=gravity, floating=options.floating or found.is_free)
+    floating = options.floating or found.is_free
+    loops = merged_loops(found.loops, options.loops)
+    return found.text, "urdf", replace(options, gravity=gravity, floating=floating, loops=loops)

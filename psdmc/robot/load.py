@@ -13,12 +13,13 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.reading import in_words, read_file
 from psdmc.robot import limits
+from psdmc.robot.closed_loops import closed_loops, loop_tables
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, TOOL, LoadOptions, checked_options, parsed_contact
-from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
+from psdmc.robot.mechanism import DRIVE, ROW_NAMES, Array, Loop, Mechanism, NamedFrame
 from psdmc.robot.missing_inertia import with_massless_warning
 from psdmc.robot.source_words import with_source_words
 from psdmc.robot.urdf_bodies import tool_frame
@@ -62,13 +63,17 @@ class LoadedRobot:
 def load_robot(
     path: str | Path, *, packages: Mapping[str, str | PathLike[str]] | None = None, **options: Any
 ) -> LoadedRobot:
-    """Return the robot in a URDF, MJCF, xacro or DH TOML file.
+    """Return the robot in a URDF, MJCF, xacro or DH TOML file. The option `loops` can be the path of a TOML with closed
+    loops.
 
     The suffixes .toml and .xacro and the root element determine the format. Options are those of LoadOptions;
     `packages` are folders of ROS packages, by name, that a xacro file uses. Raises InputError if the file or an option
     is wrong.
     """
     file = Path(path)
+    if isinstance(options.get("loops"), str | PathLike):
+        tables = Path(options["loops"])
+        options["loops"] = loop_tables(tables, robot_text(tables))
     text = robot_text(file)
     text, source_format, found = as_source(file, text, checked_options(**options), checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
@@ -156,6 +161,8 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
     turned = dict.fromkeys(
         f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in draft.snaps
     )
+    frames = _with_contacts(_frames(draft, options, source), options)
+    loops = _loops(draft, options, frames, source)
     mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
@@ -166,12 +173,13 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         parameter_span=block_diagonal([link_span(zero) for zero in zeros]),
         gravity=draft.gravity,
         tip=draft.tip,
-        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values)),
-        frames=_with_contacts(_frames(draft, options, source), options),
+        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values), *map(_loop_note, loops)),
+        frames=frames,
         parents=draft.parents,
         tip_body=draft.tip_body,
         coordinates=draft.coordinates,
         massless=draft.massless,
+        loops=loops,
     )
     return with_massless_warning(mechanism)
 
@@ -193,6 +201,26 @@ def _with_contacts(frames: tuple[NamedFrame, ...], options: LoadOptions) -> tupl
         return frames
     rows = dict(map(parsed_contact, options.contacts))
     return tuple(replace(frame, rows=rows.get(frame.name, 0)) for frame in frames)
+
+
+def _loops(draft: Draft, options: LoadOptions, frames: Sequence[NamedFrame], source: str) -> tuple[Loop, ...]:
+    """The closed loops of the file, then those of the options."""
+    named = {frame.name: frame for frame in frames}
+    find = draft.frame_of
+    tables = (*draft.loops, *options.loops)
+    if not tables or find is None:
+        return ()
+    return closed_loops(
+        tables, lambda name: named[name] if name in named else find(name), options.snap, source
+    )
+
+
+def _loop_note(loop: Loop) -> str:
+    rows = ", ".join(ROW_NAMES[row] for row in loop.rows)
+    return (
+        f"loop '{loop.name}' closes {rows} in constrained_forward_dynamics; functions without contacts compute the open "
+        "tree"
+    )
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:

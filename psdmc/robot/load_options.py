@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass, field, replace
@@ -14,7 +15,7 @@ from psdmc.robot.limits import shown
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
-LATER = ("contacts", "frames", "tool", "lock", "floating", "root", "xacro_args", "unknown")
+LATER = ("contacts", "loops", "frames", "tool", "lock", "floating", "root", "xacro_args", "unknown")
 """Options that the first versions did not have."""
 
 TOOL = "tool"
@@ -48,6 +49,7 @@ class LoadOptions:
     unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": links without
                    any
     contacts       frames that can touch the world, which `frames` contains: "foot" is a point, "foot:6" a surface
+    loops          tables of closed loops (closed_loops.py), in addition to those of the file
     """
 
     base: str | None = None
@@ -64,6 +66,7 @@ class LoadOptions:
     xacro_args: dict[str, str] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
     contacts: tuple[str, ...] = ()
+    loops: tuple[Mapping[str, Any], ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the keyword arguments of load_robot_text as plain JSON values.
@@ -151,6 +154,20 @@ def _contacts(contacts: Sequence[str]) -> tuple[str, ...]:
         )
     _each_once("contact", [parsed_contact(text)[0] for text in contacts])
     return tuple(contacts)
+
+
+def _loops(tables: object) -> tuple[Mapping[str, Any], ...]:
+    """Plain tables. Their contents are checked with the robot's links."""
+    try:
+        plain = json.loads(json.dumps(tables, allow_nan=False))
+    except (TypeError, ValueError, RecursionError):
+        plain = None
+    if not isinstance(plain, list) or not all(isinstance(table, dict) for table in plain):
+        raise InputError(
+            f"loops are {shown(tables)}, expected tables of loops",
+            'such as [{"rows": ["x", "z"], "first": "link3", "second": "base"}], or the path of a TOML file',
+        )
+    return tuple(plain)
 
 
 def _with_contacts(options: LoadOptions) -> LoadOptions:
@@ -286,6 +303,7 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "snap": _snap,
     "frames": _frames,
     "contacts": _contacts,
+    "loops": _loops,
     "tool": _tool,
     "lock": _lock,
     "xacro_args": _xacro_args,

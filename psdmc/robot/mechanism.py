@@ -94,12 +94,47 @@ class NamedFrame:
     rows: int = POINT
 
 
-def contact_names(contacts: Iterable[tuple[str, int]]) -> dict[str, tuple[str, ...]]:
-    """Return the names of contacts ('contacts'), and the names of the contacts' rows ('contact_rows', such as
-    'foot.x'). They label the axes of arrays."""
-    own = tuple(contacts)
-    rows = (f"{name}.{axis}" for name, count in own for axis in ("x", "y", "z", "rx", "ry", "rz")[:count])
-    return {"contacts": tuple(name for name, _ in own), "contact_rows": tuple(rows)}
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """A closed loop: two frames of the spanning tree that the mechanism keeps together along some axes of the first one.
+
+    name           untrusted text
+    first, second  the frames; the joint is BASE for a frame on the base
+    rows           axes of the first frame along which the frames cannot move apart (0 to 2) or turn (3 to 5), ascending
+    """
+
+    name: str
+    first: NamedFrame
+    second: NamedFrame
+    rows: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        if not self.rows or sorted({*self.rows} & {*range(len(ROW_NAMES))}) != list(self.rows):
+            raise ValueError(f"loop {self.name!r} has the rows {self.rows}")
+
+
+ROW_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+"""Rows of contacts and loops: motion along an axis, then about an axis."""
+
+
+def contact_names(
+    contacts: Iterable[tuple[str, int]], loops: Iterable[tuple[str, Sequence[int]]] = ()
+) -> dict[str, tuple[str, ...]]:
+    """Return names of entries by the word of their axis: contacts, their rows (such as 'foot.x'), rows of loops, rows of
+    both, and both in the words of messages."""
+    own, closed = tuple(contacts), tuple(loops)
+    rows = tuple(f"{name}.{axis}" for name, count in own for axis in ROW_NAMES[:count])
+    others = tuple(f"{name}.{ROW_NAMES[row]}" for name, places in closed for row in places)
+    return {
+        "contacts": tuple(name for name, _ in own),
+        "contact_rows": rows,
+        "loop_rows": others,
+        "constraint_rows": rows + others,
+        "constraints": (
+            *(f"contact {name!r}" for name, _ in own),
+            *(f"loop {name!r}" for name, _ in closed),
+        ),
+    }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +154,7 @@ class Mechanism:
     coordinates      n, the coordinate that determines each joint's q; left out: no joint is a mimic joint
     frames           named frames; left out: the tip alone
     massless         moving links without inertia in the file, which psdmc treats as massless: they have no parameters
+    loops            closed loops; joints and parents are those of the spanning tree, in which the loops are open
     """
 
     name: str
@@ -136,6 +172,7 @@ class Mechanism:
     coordinates: tuple[Coordinate, ...] = ()
     frames: tuple[NamedFrame, ...] = ()
     massless: tuple[str, ...] = ()
+    loops: tuple[Loop, ...] = ()
 
     __reduce__ = made_again
 
@@ -156,6 +193,8 @@ class Mechanism:
         object.__setattr__(self, "frames", tuple(self.frames) or (self.tip_frame,))
         if any(not 0 <= frame.joint < n for frame in self.frames):
             raise ValueError(f"a frame moves with none of the {n} joints")
+        if any(not BASE <= end.joint < n for loop in self.loops for end in (loop.first, loop.second)):
+            raise ValueError(f"a loop moves with none of the {n} joints")
         if not self.contacts or {*self.rows_of_contacts} - {POINT, SURFACE}:
             raise ValueError(f"the frames have {[frame.rows for frame in self.frames]} rows of contacts")
 
@@ -201,6 +240,11 @@ class Mechanism:
     @property
     def rows_of_contacts(self) -> tuple[int, ...]:
         return tuple(frame.rows for frame in self.contacts)
+
+    @property
+    def rows_of_loops(self) -> tuple[tuple[int, ...], ...]:
+        """For each loop the axes of its first frame that it closes."""
+        return tuple(loop.rows for loop in self.loops)
 
     @property
     def types(self) -> tuple[JointType, ...]:

@@ -25,6 +25,7 @@ from psdmc.robot.mjcf_faults import (
     refuse_constraints,
     refuse_references,
 )
+from psdmc.robot.mjcf_loops import mjcf_loops
 from psdmc.robot.mjcf_terms import Names, acting, gravity, is_active, is_odd, named
 from psdmc.robot.mjcf_text import tree_text
 from psdmc.robot.mujoco_warnings import kept_warnings
@@ -48,11 +49,12 @@ REASON = 300
 @dataclass(frozen=True, slots=True)
 class MjcfRobot:
     """The result of reading an MJCF file. `text` is a URDF of the tree, and `gravity` is in m/s^2 along the world's
-    axes. `is_free` says whether the root link is on a free joint."""
+    axes. `is_free` says whether the root link is on a free joint. `loops` are tables of closed loops."""
 
     text: str
     gravity: tuple[float, float, float]
     is_free: bool
+    loops: tuple[dict[str, Any], ...] = ()
 
 
 def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
@@ -97,7 +99,10 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
     notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names), *warned]
     follows = followers(mujoco, model, names)
     return MjcfRobot(
-        tree_text(mujoco, model, names, follows, free, notes), gravity(mujoco, model), free is not None
+        tree_text(mujoco, model, names, follows, free, notes),
+        gravity(mujoco, model),
+        free is not None,
+        tuple(mjcf_loops(mujoco, model, names, free, source)),
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import ANGLE, LENGTH, joined, shown
+from psdmc.robot.mjcf_loops import loop_kinds
 from psdmc.robot.mjcf_terms import Names, acting, armatures, armatures_elsewhere, is_active, named, reflected
 
 REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
@@ -26,7 +27,7 @@ class Follows:
 def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> None:
     """Raise InputError with the names of all constraints and joints that psdmc cannot model."""
     faults = [
-        *_loops(mujoco, model),
+        *_other_equalities(mujoco, model),
         *_followed_twice(mujoco, model, names),
         *_tendons(mujoco, model),
         *_wide_drives(mujoco, model, names),
@@ -76,9 +77,10 @@ def refuse_armatures(mujoco: Any, model: Any, names: Names, source: str) -> None
         )
 
 
-def _loops(mujoco: Any, model: Any) -> Iterator[str]:
+def _other_equalities(mujoco: Any, model: Any) -> Iterator[str]:
     for k in range(model.neq):
-        if is_active(mujoco, model, k) and not _is_linear(mujoco, model, k):
+        is_loop = int(model.eq_type[k]) in loop_kinds(mujoco)
+        if is_active(mujoco, model, k) and not is_loop and not _is_linear(mujoco, model, k):
             kind = mujoco.mjtEq(model.eq_type[k]).name.removeprefix("mjEQ_").lower()
             yield f"equality constraint {_name(mujoco, model, 'EQUALITY', k)} ({kind})"
 

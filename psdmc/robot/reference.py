@@ -15,7 +15,7 @@ from psdmc.robot.coordinates import Following
 from psdmc.robot.joints import REVOLUTE, WIDE_TYPES, JointType
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.mechanism import POINT, Array, Mechanism
-from psdmc.robot.reference_model import reference_model
+from psdmc.robot.reference_model import loop_frames, reference_model
 
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Weights of a central difference of eighth order."""
@@ -32,12 +32,14 @@ class Reference:
     tip_name     name of the frame of which `jacobian` returns the Jacobian
     frame_names  the named frames; empty: the tip alone
     rows         for each named frame, 3 for a contact point, 6 for a surface, 0 for none; empty: all are points
+    loops        for each closed loop, the numbers of its two frames, and its rows
     """
 
     model: pinocchio.Model
     tip_name: str
     frame_names: tuple[str, ...] = ()
     rows: tuple[int, ...] = ()
+    loops: tuple[tuple[int, int, tuple[int, ...]], ...] = ()
 
     @property
     def contacts(self) -> list[tuple[int, int]]:
@@ -315,7 +317,11 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
     model = reference_model(loaded, snapped=snapped, parameters=parameters)
     names = tuple(frame.name for frame in loaded.mechanism.frames)
     rows = tuple(frame.rows for frame in loaded.mechanism.frames)
-    return Reference(model, loaded.mechanism.tip_name, names, rows)
+    loops = tuple(
+        (*(model.getFrameId(frame) for frame in loop_frames(loop)), loop.rows)
+        for loop in loaded.mechanism.loops
+    )
+    return Reference(model, loaded.mechanism.tip_name, names, rows, loops)
 
 
 def pinocchio_version() -> str:

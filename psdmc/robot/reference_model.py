@@ -25,7 +25,15 @@ from psdmc.errors import InputError
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.load_options import TOOL
 from psdmc.robot.lock import held_positions
-from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
+from psdmc.robot.mechanism import (
+    DRIVE,
+    PARAMETERS_PER_LINK,
+    Array,
+    Loop,
+    Mechanism,
+    Placement,
+    frozen_array,
+)
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
 from psdmc.robot.urdf import read_urdf
 
@@ -72,7 +80,27 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
         above = model.frames[number]
         kind = pinocchio.FrameType.OP_FRAME
         model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
+    own = () if is_urdf else tomllib.loads(loaded.source_text).get("loop", ())
+    for loop, table in zip(loaded.mechanism.loops, (*own, *loaded.options.loops), strict=True):
+        for name, key in zip(loop_frames(loop), ("first", "second"), strict=True):
+            _add_loop_frame(model, name, table[key], loaded.mechanism.base_name)
     return model
+
+
+def _add_loop_frame(model: pinocchio.Model, name: str, given: Any, base_name: str) -> None:
+    """Add a frame of a loop, given by a link and by a placement in it, as a table [[loop]] has it."""
+    table = {"link": given} if isinstance(given, str) else given
+    turn = pinocchio.rpy.rpyToMatrix(*(_radians(each) for each in table.get("rpy", (0.0, 0.0, 0.0))))
+    if "quaternion" in table:
+        turn = pinocchio.Quaternion(np.array(table["quaternion"], float)).normalized().toRotationMatrix()
+    place = pinocchio.SE3(turn, np.array(table.get("xyz", (0.0, 0.0, 0.0)), float))
+    number = model.getFrameId(table["link"]) if model.existFrame(table["link"]) else 0
+    above, kind = model.frames[number], pinocchio.FrameType.OP_FRAME
+    if above.parentJoint == 0 and model.existFrame(base_name):
+        place = model.frames[model.getFrameId(base_name)].placement.inverse() * above.placement * place
+    else:
+        place = above.placement * place
+    model.addFrame(pinocchio.Frame(name, above.parentJoint, number, place, kind))
 
 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
@@ -154,9 +182,18 @@ def _placed_as(chain: Mechanism, model: pinocchio.Model) -> pinocchio.Model:
         if not placed.existFrame(frame.name):
             place, kind, above = _se3(frame.placement), pinocchio.FrameType.OP_FRAME, numbers[frame.joint + 1]
             placed.addFrame(pinocchio.Frame(frame.name, frame.joint + 1, above, place, kind))
+    for loop in chain.loops:
+        for name, end in zip(loop_frames(loop), (loop.first, loop.second), strict=True):
+            place, kind, above = _se3(end.placement), pinocchio.FrameType.OP_FRAME, numbers[end.joint + 1]
+            placed.addFrame(pinocchio.Frame(name, end.joint + 1, above, place, kind))
     placed.gravity.linear = np.array(chain.gravity)
     placed.armature = model.armature.copy()
     return placed
+
+
+def loop_frames(loop: Loop) -> tuple[str, str]:
+    """Return the names that both frames of a closed loop have in Pinocchio's model."""
+    return f"loop {loop.name}: first", f"loop {loop.name}: second"
 
 
 def _se3(placement: Placement) -> pinocchio.SE3:

@@ -92,6 +92,7 @@ def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
         tip_body=placed.tip.joint,
         coordinates=mimic_coordinates(route.movable, robot.joints, source),
         massless=found.massless,
+        frame_of=lambda name: base_or_frame(robot, route, placed.joints, placed.tip, name, source),
     )
 
 
@@ -264,6 +265,22 @@ def urdf_frames(
     return tuple(
         tip if name == tip.name else _frame_on(robot, route, joints, carriers, name, source) for name in names
     )
+
+
+def base_or_frame(
+    robot: UrdfRobot, route: Route, joints: Sequence[Joint], tip: NamedFrame, name: str, source: str
+) -> NamedFrame:
+    """Return the frame of a link, placed in the base frame (joint BASE) if no joint moves the link."""
+    fixed, carrier = _carried_by(robot, name)
+    if name not in robot.inertials or carrier is not None:
+        return urdf_frames(robot, route, joints, tip, (name,), source)[0]
+    place = Placement.identity()
+    for joint in route.to_base:
+        place = place @ place_of(joint)
+    place = place.inverse()
+    for joint in fixed:
+        place = place @ place_of(joint)
+    return NamedFrame(name, ON_BASE, place)
 
 
 def _frame_on(

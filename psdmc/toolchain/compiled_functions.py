@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
+from psdmc.robot.mechanism import ROW_NAMES
 from psdmc.toolchain.call_arguments import (
     RobotAxes,
     checked_outputs,
@@ -110,6 +111,14 @@ class RobotFacts:
         `constrained_forward_dynamics` and other functions return contact forces in the order of this dictionary.
         """
         return dict(self._interface.contacts)
+
+    @property
+    def loops(self) -> dict[str, tuple[str, ...]]:
+        """Return, by name of closed loop, the rows that it closes: 'x', 'y', 'z', 'rx', 'ry' or 'rz'.
+
+        The forces of loops follow those of contacts, in the order of this dictionary.
+        """
+        return {name: tuple(ROW_NAMES[row] for row in rows) for name, rows in self._interface.loops}
 
     @property
     def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:

@@ -18,7 +18,7 @@ from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import contact_names
 
-FORMAT = 7
+FORMAT = 8
 """Version of the text's form."""
 
 
@@ -35,6 +35,7 @@ class Interface:
     v_names      names of the nv entries of rates and torques
     frame_names  names of the named frames
     contacts     names and numbers of rows of the contacts
+    loops        names and rows of the closed loops
     units        (start, stop) slices (start, stop) of q that must have length one, such as quaternions
     limits       n rows: lower, upper, speed, acceleration, effort; infinite if unknown
     gravity      3 numbers, m/s^2 along the axes of the base frame
@@ -57,6 +58,7 @@ class Interface:
     v_names: tuple[str, ...]
     frame_names: tuple[str, ...]
     contacts: tuple[tuple[str, int], ...]
+    loops: tuple[tuple[str, tuple[int, ...]], ...]
     units: tuple[tuple[int, int], ...]
     limits: tuple[tuple[float, ...], ...]
     gravity: tuple[float, ...]
@@ -70,13 +72,14 @@ class Interface:
     def sizes(self) -> Sizes:
         """Return the lengths of this robot's axes, such as nq and nv."""
         rows = tuple(rows for _, rows in self.contacts)
-        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names), rows_of_contacts=rows)
+        closed = tuple(rows for _, rows in self.loops)
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names), 0, rows, closed)
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
         """Return the names of the entries along each axis: word of the axis, such as nq -> names."""
         own = {"n": self.joint_names, "nq": self.q_names, "nv": self.v_names, "frames": self.frame_names}
-        return own | contact_names(self.contacts)
+        return own | contact_names(self.contacts, self.loops)
 
 
 def interface_of(package: PackageView) -> Interface:
@@ -101,6 +104,7 @@ def interface_of(package: PackageView) -> Interface:
         v_names=package.info.v_names,
         frame_names=package.info.frames,
         contacts=package.info.contacts,
+        loops=package.info.loops,
         units=package.info.units,
         limits=tuple((j.lower, j.upper, j.speed, j.acceleration, j.effort) for j in package.info.joints),
         gravity=package.info.gravity,
@@ -143,6 +147,7 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
         joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
         coordinates, rates = tuple(plain.pop("q_names")), tuple(plain.pop("v_names"))
         contacts = tuple((str(name), int(rows)) for name, rows in plain.pop("contacts"))
+        loops = tuple((str(name), tuple(map(int, rows))) for name, rows in plain.pop("loops"))
         units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
         kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
         places = {
@@ -156,6 +161,7 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
             v_names=rates,
             frame_names=frames,
             contacts=contacts,
+            loops=loops,
             units=units,
             limits=limits,
             gravity=gravity,

@@ -36,6 +36,8 @@ _DIMENSIONS = {
     "frames": "frame",
     "contacts": "contact",
     "contact_rows": "contact_row",
+    "loop_rows": "loop_row",
+    "constraint_rows": "constraint_row",
     "3": "axis",
     "6": "twist",
 }

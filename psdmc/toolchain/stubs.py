@@ -95,6 +95,8 @@ _SIZES = {
     "frames": "number of named frames; `frame_names` lists them",
     "contacts": "number of contacts: links or frames that can touch the world; `contacts` lists them",
     "contact_rows": "number of rows of all contacts: 3 for each point, 6 for each surface, in the order of `contacts`",
+    "loop_rows": "number of rows of all closed loops, in the order of `loops`",
+    "constraint_rows": "contact_rows + loop_rows: the rows of all contacts, then those of all closed loops",
     "nonzeros": "number of matrix entries that can differ from zero",
 }
 

@@ -151,8 +151,8 @@ def test_a_changed_value_does_not_match_the_hash(tmp_path: Path) -> None:
 
 def test_a_newer_schema(tmp_path: Path) -> None:
     path = saved(tmp_path)
-    rewritten(path, schema=4, psdmc="9.9")
-    with pytest.raises(InputError, match="model schema 4, this psdmc reads up to 3") as caught:
+    rewritten(path, schema=5, psdmc="9.9")
+    with pytest.raises(InputError, match="model schema 5, this psdmc reads up to 4") as caught:
         load(path)
     assert "9.9" in caught.value.hint
 

@@ -281,12 +281,6 @@ def with_more(more: str) -> str:
 FIXED = '<tendon><fixed name="rope" {}><joint joint="j1" coef="1"/></fixed></tendon>'
 REFUSED = [
     (
-        '<equality><connect name="loop" body1="b" anchor="0 0 0"/></equality>',
-        "equality constraint 'loop' (connect)",
-    ),
-    ('<equality><weld name="glue" body1="b"/></equality>', "equality constraint 'glue' (weld)"),
-    ('<equality><weld body1="b"/></equality>', "equality constraint number 0 (weld)"),
-    (
         '<equality><joint name="cam" joint1="j1" joint2="j2" polycoef="0 1 .2 0 0"/></equality>',
         "'cam' (joint)",
     ),

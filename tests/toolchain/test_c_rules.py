@@ -17,7 +17,7 @@ from traced import arm_package
 from psdmc.backends.c.package import package_view
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
-from psdmc.functions import RECIPES
+from psdmc.functions import OF_TREES
 from psdmc.lower.kernels import lower, wanted
 from psdmc.program.kernel import Kernel
 from psdmc.toolchain.compile import lowered_once
@@ -77,11 +77,11 @@ def test_no_warnings(compiler: str, options: tuple[str, str], flag: str, tmp_pat
 
 def every_kernel() -> dict[str, Kernel]:
     """Of two_link."""
-    model, names = bundled_model("two_link"), tuple(RECIPES)
+    model, names = bundled_model("two_link"), OF_TREES
     return lowered_once((model.content_hash, "every kernel", *names), lambda: lower(model, functions=names))
 
 
-@pytest.mark.parametrize("name", slow_but_for(list(RECIPES)[::3], RECIPES))
+@pytest.mark.parametrize("name", slow_but_for(OF_TREES[::3], OF_TREES))
 def test_a_package_of_any_one_function_compiles(name: str, tmp_path: Path) -> None:
     """Macros and helpers that one function needs do not come from another that happens to be there."""
     _need("gcc")

@@ -18,7 +18,7 @@ from slow_cases import slow_but_for
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
-from psdmc.functions import RECIPES
+from psdmc.functions import OF_TREES
 from psdmc.functions.impulse import RESTITUTION
 from psdmc.functions.operational_space_inertia import MU
 from psdmc.lower.kernels import lower
@@ -39,7 +39,7 @@ DRAWN = {
 positive there is no operational-space inertia, which takes other instructions. Contacts are active or not."""
 
 PACKAGES = {
-    "two_link": tuple(RECIPES),
+    "two_link": OF_TREES,
     "kr6": ("inverse_dynamics", "forward_dynamics", "forward_dynamics_derivatives"),
 }
 """Robot and functions; of the larger one those that are written otherwise for many joints."""

@@ -22,7 +22,7 @@ from psdmc import compiler
 from psdmc.cli.boundary import run
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.functions import RECIPES
+from psdmc.functions import OF_TREES
 from psdmc.lower import kernels, search
 from psdmc.lower.admitted import require
 from psdmc.model.dynamics_model import DynamicsModel
@@ -132,7 +132,7 @@ def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: 
 
 
 def test_no_function_is_refused_to_joints_of_several_rates(model: DynamicsModel) -> None:
-    require(model, tuple(RECIPES))
+    require(model, OF_TREES)
 
 
 @pytest.mark.slow

@@ -91,6 +91,7 @@ class PackageView:
         wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
         if uses_contacts(function.signature for function in self.functions):
             wide |= {"CONTACTS": self.info.sizes.contacts, "CONTACT_ROWS": self.info.sizes.contact_rows}
+            wide |= {"LOOP_ROWS": self.info.sizes.loop_rows} if self.info.loops else {}
         return wide | {pattern.macro: len(pattern.places) for pattern in self.patterns}
 
     @property

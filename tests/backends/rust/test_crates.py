@@ -20,7 +20,7 @@ from psdmc.backends.rust.names import KEYWORDS, comment, identifier, text
 from psdmc.cli import pipeline
 from psdmc.compiler import emit
 from psdmc.errors import InputError
-from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, RECIPES
+from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, OF_TREES, RECIPES
 
 EVIL = 'a`"; \u202e*/ //! \n fn main() {} ```'
 """A robot's name."""
@@ -54,9 +54,9 @@ def test_of_arms(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.needs("cargo")
 def test_every_function_of_a_small_robot(tmp_path: Path) -> None:
-    emit(bundled_model("two_link"), tmp_path, "rust", functions=list(RECIPES))
+    emit(bundled_model("two_link"), tmp_path, "rust", functions=OF_TREES)
 
-    assert passed(cargo(tmp_path, "test")) > len(RECIPES)
+    assert passed(cargo(tmp_path, "test")) > len(OF_TREES)
 
 
 @pytest.mark.slow

@@ -233,7 +233,7 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
     whose = "a floating base" if robot.has_free_root else f"joint {wide.name!r}"
     rows, frames = robot.rows_of_contacts, len(robot.frames)
-    sizes = Sizes(len(robot.own_joints), robot.nq, robot.nv, l, frames, rows_of_contacts=rows)
+    sizes = Sizes(len(robot.own_joints), robot.nq, robot.nv, l, frames, 0, rows, robot.rows_of_loops)
     without = [name for name in functions if not (_has_blocks(name) or _is_by_program(name, sizes))]
     rest = f"; without derivatives: {', '.join(without)}" if without else ""
     return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"

@@ -1,0 +1,257 @@
+"""Closed loops of a mechanism: how far they are from closed, their Jacobian, and their accelerations at constant rates.
+
+A loop keeps two frames together that both move with the spanning tree. Let the first frame have the axes R, as columns.
+Let the second frame's origin be at d from the first frame's. The loop's velocity is that of the second frame seen from
+the first one, along its axes: R^T (v2 - v1 - w1 x d) and R^T (w2 - w1). A loop's forces act on the second frame, at its
+origin, and with the opposite sign on the body of the first frame, at the same point.
+
+Sources: Featherstone 2008, chapter 8; Siciliano et al. 2009, section 2.8.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from psdmc.dynamics.following import columns_summed, on_coordinates
+from psdmc.dynamics.frames import BASE, Frame
+from psdmc.dynamics.kinematics import AT_BASE, columns_at, path_to
+from psdmc.dynamics.named_frames import Root, frame_accelerations, joints_in_base, placed_frames
+from psdmc.dynamics.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    multiply,
+    scale,
+    transform,
+    transpose,
+)
+from psdmc.dynamics.slices import positions, rates
+from psdmc.robot.mechanism import Loop, NamedFrame
+
+ANGULAR = 3
+"""Number of the first row about an axis."""
+
+
+@on_coordinates()
+def loop_error(
+    frames: Sequence[Frame], loops: Sequence[Loop], q: Sequence[Scalar], root: Root = AT_BASE
+) -> list[Scalar]:
+    """Compute for each closed row how far its loop is from closed, along the axes of its first frame.
+
+    Rows 0 to 2 are the position of the second frame. The rows from 3 on are 2 tan(angle / 2) times the axis of a
+    rotation. If three of them are closed, or one, this is the rotation from the first frame to the second. If two are
+    closed, it is the smallest rotation that makes the two frames' third axes parallel.
+    """
+    found: list[Scalar] = []
+    for loop in loops:
+        part = _part(frames, loop, q, (), root)
+        apart, turn = transform(transpose(part.axes), part.apart), part.turn
+        found += [
+            apart[row] if row < ANGULAR else angle
+            for row, angle in zip(loop.rows, _angles(loop.rows, turn), strict=True)
+        ]
+    return found
+
+
+def _angles(rows: Sequence[int], turn: Matrix) -> list[Scalar]:
+    """For each row from 3 on its part of the rotation; zeros for the others."""
+    angular = [row - ANGULAR for row in rows if row >= ANGULAR]
+    if len(angular) == 2:
+        (free,) = {0, 1, 2} - {*angular}
+        axis = tuple(turn[row][free] for row in range(3))
+        unit = tuple(1.0 if row == free else 0.0 for row in range(3))
+        about, share = cross(unit, axis), 2.0 / (1.0 + axis[free])  # type: ignore[arg-type]
+    else:
+        about = tuple(turn[i][j] - turn[j][i] for i, j in ((2, 1), (0, 2), (1, 0)))
+        share = 2.0 / (1.0 + turn[0][0] + turn[1][1] + turn[2][2]) if angular else 0.0
+    return [about[row - ANGULAR] * share if row >= ANGULAR else 0.0 for row in rows]
+
+
+@on_coordinates(columns_summed)
+def loop_jacobian(
+    frames: Sequence[Frame], loops: Sequence[Loop], q: Sequence[Scalar], root: Root = AT_BASE
+) -> list[list[Scalar]]:
+    """Compute the Jacobian of all closed rows, nv entries each: the loops' velocities per unit joint rate."""
+    found: list[list[Scalar]] = []
+    nv = sum(frame.joint.nv for frame in frames)
+    for loop in loops:
+        part = _part(frames, loop, q, (), root)
+        rows: list[list[Scalar]] = [[0.0] * nv for _ in range(6)]
+        turned = transpose(part.axes)
+        for k, (along, about) in part.columns.items():
+            for row, value in enumerate((*transform(turned, along), *transform(turned, about))):
+                rows[row][k] = value
+        found += [rows[row] for row in loop.rows]
+    return found
+
+
+@on_coordinates()
+def loop_drift(
+    frames: Sequence[Frame],
+    loops: Sequence[Loop],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[Scalar]:
+    """Compute the accelerations of all closed rows at constant joint rates, the product dJ/dt qd.
+
+    They are R^T (a2 - a1 - z1 x d - w1 x (w1 x d) - 2 w1 x u) and R^T (z2 - z1 - w1 x w), with the accelerations a of the
+    origins, the angular accelerations z, and the velocity (u, w) of the second frame seen from the first one.
+    """
+    found: list[Scalar] = []
+    for loop in loops:
+        part = _part(frames, loop, q, qd, root)
+        (linear, angular), (own, turning) = part.accelerations
+        w, (u, spin) = part.first_rate, part.velocity
+        linear = _less(
+            linear, own, cross(turning, part.apart), cross(w, add(cross(w, part.apart), scale(u, 2.0)))
+        )
+        angular = _less(angular, turning, cross(w, spin))
+        turned = transpose(part.axes)
+        values = (*transform(turned, linear), *transform(turned, angular))
+        found += [values[row] for row in loop.rows]
+    return found
+
+
+def _less(value: Vector, *others: Vector) -> Vector:
+    for other in others:
+        value = (value[0] - other[0], value[1] - other[1], value[2] - other[2])
+    return value
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The joints of one loop, seen from the last body that carries both frames, as if it did not move.
+
+    frames         the joints, whose parents are numbers in this list
+    ends           the first and the second frame; the joint is BASE for a frame on the body that carries both
+    q, qd          their positions and rates
+    root           axes and origin of that body's frame
+    numbers        for each joint, the number of its first rate among all joints' rates
+    signs          for each joint, 1 if it carries the second frame, -1 if it carries the first one
+    """
+
+    frames: tuple[Frame, ...]
+    ends: tuple[NamedFrame, NamedFrame]
+    q: list[Scalar]
+    qd: list[Scalar]
+    root: Root
+    numbers: tuple[int, ...]
+    signs: tuple[int, ...]
+
+    @cached_property
+    def poses(self) -> tuple[tuple[Vector, Matrix], tuple[Vector, Matrix]]:
+        """Origin and axes of both frames."""
+        first, second = (
+            self._placed(end)
+            if end.joint == BASE
+            else placed_frames(self.frames, [end], self.q, self.root)[0]
+            for end in self.ends
+        )
+        return first, second
+
+    @staticmethod
+    def _placed(end: NamedFrame) -> tuple[Vector, Matrix]:
+        (rows, (x, y, z)) = end.placement.rotation.tolist(), end.placement.translation.tolist()
+        return (x, y, z), tuple(map(tuple, rows))  # type: ignore[return-value]
+
+    @property
+    def axes(self) -> Matrix:
+        """The first frame's axes, as columns."""
+        return self.poses[0][1]
+
+    @property
+    def apart(self) -> Vector:
+        """The second frame's origin, from the first one's."""
+        return _less(self.poses[1][0], self.poses[0][0])
+
+    @property
+    def turn(self) -> Matrix:
+        """The second frame's axes along those of the first."""
+        return multiply(transpose(self.axes), self.poses[1][1])
+
+    @property
+    def rates(self) -> list[tuple[int, int]]:
+        """For each of the part's rates, its number among all rates, and its joint's sign."""
+        own = zip(self.frames, self.numbers, self.signs, strict=True)
+        return [(first + k, sign) for frame, first, sign in own for k in range(frame.joint.nv)]
+
+    @cached_property
+    def columns(self) -> dict[int, tuple[Vector, Vector]]:
+        """By the number of the rate: the second frame's velocity per unit rate seen from the first one, before R^T."""
+        found: dict[int, tuple[Vector, Vector]] = {}
+        placed = joints_in_base(self.frames, self.q, self.root) if self.frames else []
+        for end, own in zip(self.ends, (-1, 1), strict=True):
+            columns = columns_at(self.frames, end.joint, placed, self.poses[1][0])
+            for (number, sign), column in zip(self.rates, columns, strict=True):
+                if sign == own:
+                    x, y, z, rx, ry, rz = column if sign > 0 else [0.0 - value for value in column]
+                    found[number] = (x, y, z), (rx, ry, rz)
+        return found
+
+    @property
+    def velocity(self) -> tuple[Vector, Vector]:
+        """The second frame's velocity seen from the first one, linear and angular."""
+        linear, angular = ZERO, ZERO
+        for (number, _), rate in zip(self.rates, self.qd, strict=True):
+            along, about = self.columns[number]
+            linear, angular = add(linear, scale(along, rate)), add(angular, scale(about, rate))
+        return linear, angular
+
+    @property
+    def first_rate(self) -> Vector:
+        """The first frame's angular velocity."""
+        found = ZERO
+        for (number, sign), rate in zip(self.rates, self.qd, strict=True):
+            if sign < 0:
+                found = _less(found, scale(self.columns[number][1], rate))
+        return found
+
+    @property
+    def accelerations(self) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector]]:
+        """Accelerations of the second frame and of the first one, linear and angular, at constant rates."""
+        found = []
+        for end in reversed(self.ends):
+            if end.joint == BASE:
+                found.append((ZERO, ZERO))
+                continue
+            still = [0.0] * len(self.qd)
+            ((x, y, z, *about),) = frame_accelerations(self.frames, [end], self.q, self.qd, still, self.root)
+            found.append(((x, y, z), (about[0], about[1], about[2])))
+        return found[0], found[1]
+
+
+def _part(
+    frames: Sequence[Frame], loop: Loop, q: Sequence[Scalar], qd: Sequence[Scalar], root: Root
+) -> _Part:
+    """The joints of a loop alone. `q` and `qd` have the values of all joints."""
+    first, second = (path_to(frames, end.joint) for end in (loop.first, loop.second))
+    shared = len([1 for a, b in zip(first, second, strict=False) if a == b])
+    kept = sorted((*first[shared:], *second[shared:]))
+    number = {joint: k for k, joint in enumerate(kept)}
+    starts = [0]
+    for frame in frames:
+        starts.append(starts[-1] + frame.joint.nv)
+    here = positions(frames, q)
+    moved = rates(frames, qd) if qd else [()] * len(frames)
+
+    def flat(values: Sequence[Scalar]) -> list[Scalar]:
+        return [x for j in kept for x in (values[j] if isinstance(values[j], tuple) else (values[j],))]
+
+    return _Part(
+        tuple(replace(frames[j], parent=number.get(frames[j].parent, BASE)) for j in kept),
+        (
+            replace(loop.first, joint=number.get(loop.first.joint, BASE)),
+            replace(loop.second, joint=number.get(loop.second.joint, BASE)),
+        ),
+        flat(here),
+        flat(moved),
+        AT_BASE if shared else root,
+        tuple(starts[j] for j in kept),
+        tuple(1 if j in second else -1 for j in kept),
+    )

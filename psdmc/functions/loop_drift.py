@@ -1,0 +1,79 @@
+"""The drift of the closed loops: the accelerations of their closed rows at constant joint rates, dJ/dt qd."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.closed_loops import loop_drift
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.closed_loops import ROW_WORDS, of_loops
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"drift": loop_drift(g.frames, g.loops, g.inputs["q"], g.inputs["qd"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, qd = given["q"], given["qd"]
+    return {"drift": columns(loop_drift(robot.frames, robot.chain.loops, list(q.T), list(qd.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def found(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
+        pin.updateFramePlacements(model, data)
+
+        def drift(a: int, b: int, rows: tuple[int, ...]) -> Array:
+            aligned = pin.LOCAL_WORLD_ALIGNED
+            first, second = (pin.getFrameVelocity(model, data, k, aligned) for k in (a, b))
+            own, other = (pin.getFrameClassicalAcceleration(model, data, k, aligned) for k in (a, b))
+            apart, w = data.oMf[b].translation - data.oMf[a].translation, first.angular
+            seen = second.linear - first.linear - np.cross(w, apart)
+            carried = np.cross(own.angular, apart) + np.cross(w, np.cross(w, apart)) + 2.0 * np.cross(w, seen)
+            angular = other.angular - own.angular - np.cross(w, second.angular)
+            turned = data.oMf[a].rotation.T
+            return np.append(turned @ (other.linear - own.linear - carried), turned @ angular)[list(rows)]
+
+        return of_loops(robot, drift)
+
+    return {"drift": robot.each(found, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "loop_drift",
+        454,
+        "accelerations of the closed loops at constant qd (dJ/dt qd), along the axes of the loops' first frames",
+        (Q, QD),
+        (
+            Quantity(
+                "drift",
+                ("loop_rows",),
+                means=f"accelerations (m/s^2, rad/s^2). {ROW_WORDS}",
+                unit="1/s^2",
+                powers=(1,),
+            ),
+        ),
+        theta=False,
+        summary="Compute the product (dJ/dt) qd with the Jacobian J of the closed loops. Motions of the mechanism have "
+        "J qdd + (dJ/dt) qd = 0.",
+    ),
+    "loop drift",
+    trace,
+    reference,
+    "getFrameClassicalAcceleration",
+    pinocchio,
+    beside="loop_jacobian",
+    needs=Needs.LOOPS,
+)

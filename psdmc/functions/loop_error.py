@@ -1,0 +1,75 @@
+"""How far the closed loops of a mechanism are from closed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.closed_loops import loop_error
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.closed_loops import ROW_WORDS, of_loops
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"error": loop_error(g.frames, g.loops, g.inputs["q"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"error": columns(loop_error(robot.frames, robot.chain.loops, list(q.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def errors(first: Any, second: Any, rows: tuple[int, ...]) -> Array:
+        between = first.actInv(second)
+        angular = [row - 3 for row in rows if row >= 3]
+        if len(angular) == 2:
+            free = ({0, 1, 2} - {*angular}).pop()
+            quaternion = pin.Quaternion.FromTwoVectors(np.eye(3)[free], between.rotation[:, free])
+        else:
+            quaternion = pin.Quaternion(between.rotation)
+        return np.append(between.translation, 2.0 * quaternion.vec() / quaternion.w)[list(rows)]
+
+    def found(model: Any, data: Any, q: Array) -> Array:
+        pin.framesForwardKinematics(model, data, q)
+        return of_loops(robot, lambda a, b, rows: errors(data.oMf[a], data.oMf[b], rows))
+
+    return {"error": robot.each(found, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "loop_error",
+        450,
+        "how far the closed loops are from closed: the second frame as seen from the first one, along the first one's axes",
+        (Q,),
+        (
+            Quantity(
+                "error",
+                ("loop_rows",),
+                means=f"{ROW_WORDS}. Linear rows are a displacement (m); angular rows are 2 tan(angle / 2) times the "
+                "axis of rotation, which is close to the rotation vector (rad)",
+                unit="1",
+                powers=(1,),
+            ),
+        ),
+        theta=False,
+        summary="Compute how far the closed loops of a mechanism are from closed.",
+    ),
+    "loop error",
+    trace,
+    reference,
+    "framesForwardKinematics",
+    pinocchio,
+    needs=Needs.LOOPS,
+)

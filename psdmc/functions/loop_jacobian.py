@@ -1,0 +1,77 @@
+"""The Jacobian of the closed loops: the velocities of their closed rows per unit joint rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.closed_loops import loop_jacobian
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.closed_loops import ROW_WORDS, of_loops
+from psdmc.recipes.on_arrays import RobotOnArrays, matrix
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"J": loop_jacobian(g.frames, g.loops, g.inputs["q"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"J": matrix(loop_jacobian(robot.frames, robot.chain.loops, list(q.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def found(model: Any, data: Any, q: Array) -> Array:
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+
+        def jacobian(a: int, b: int, rows: tuple[int, ...]) -> Array:
+            first, second = (
+                np.reshape(pin.getFrameJacobian(model, data, k, pin.LOCAL_WORLD_ALIGNED), (2, 3, -1))
+                for k in (a, b)
+            )
+            apart = data.oMf[b].translation - data.oMf[a].translation
+            seen = second - first
+            seen[0] -= np.cross(first[1], apart, axisa=0, axisc=0)
+            return np.concatenate(data.oMf[a].rotation.T @ seen)[list(rows)]
+
+        return of_loops(robot, jacobian)
+
+    return {"J": robot.each(found, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "loop_jacobian",
+        452,
+        "velocities of the closed loops per unit joint rate: of the second frame seen from the first one, along the first "
+        "one's axes",
+        (Q,),
+        (
+            Quantity(
+                "J",
+                ("loop_rows", "nv"),
+                means=f"Jacobian. Its column j is for qd[j]. {ROW_WORDS}",
+                unit="1",
+                powers=(1, -1),
+            ),
+        ),
+        theta=False,
+        summary="Compute the Jacobian J of the closed loops. Motions of the mechanism have J qd = 0.",
+    ),
+    "loop Jacobian",
+    trace,
+    reference,
+    "getFrameJacobian",
+    pinocchio,
+    needs=Needs.LOOPS,
+)

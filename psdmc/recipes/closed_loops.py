@@ -1,0 +1,20 @@
+"""What the functions of closed loops have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+ROW_WORDS = "The rows are those that the loops close: linear ones (x, y, z), then angular ones (rx, ry, rz), loop by loop"
+
+
+def of_loops(robot: Reference, values: Callable[[int, int, tuple[int, ...]], Array]) -> Array:
+    """Join the values of all loops, each computed from Pinocchio's numbers of its two frames and from its rows."""
+    return np.concatenate([values(*loop) for loop in robot.loops])

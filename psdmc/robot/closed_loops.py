@@ -1,0 +1,159 @@
+"""Closed loops of a robot file: tables [[loop]] of a TOML, read to loops of the mechanism.
+
+A robot file describes a tree. A loop closes it between two frames of the tree, along some axes of the first frame.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.robot import limits
+from psdmc.robot.dh import (
+    LENGTH,
+    CheckedTable,
+    angle,
+    any_list,
+    as_it_is,
+    finite,
+    plain_text,
+    triple_of,
+)
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import BASE, ROW_NAMES, Loop, NamedFrame, Placement
+from psdmc.robot.names import naming_faults
+from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
+from psdmc.robot.snap import snap_rotation
+
+FORMAT = "see the format of loops in docs/how-to/loops.md"
+LOOP_KEYS = ("name", "rows", "first", "second")
+FRAME_KEYS = ("link", "xyz", "rpy", "quaternion")
+
+UNTURNED = (0.0, 0.0, 0.0, 1.0)
+"""x, y, z and w of a quaternion."""
+
+UNIT = 1e-6
+"""Accepted error of its length."""
+
+CLOSED = {3: (0, 1, 2), 6: (0, 1, 2, 3, 4, 5)}
+"""Rows by the number that stands for them: a point, and all motion."""
+
+Tables = Sequence[Mapping[str, Any]]
+
+
+def loop_tables(path: Path, text: str) -> Tables:
+    """Return the tables [[loop]] of a TOML file. Raises InputError if the file contains anything else."""
+    try:
+        found = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split()) or "nested too deeply"
+        raise InputError(f"{path.name}: not a TOML file: {reason}", FORMAT) from None
+    tables = found.get("loop")
+    others = [key for key in found if key != "loop"]
+    if others or not isinstance(tables, list) or not tables:
+        what = f"{shown(others[0])} is not known here" if others else "no [[loop]] in it"
+        raise InputError(f"{path.name}: {what}", FORMAT)
+    return tables
+
+
+def closed_loops(
+    tables: Tables,
+    frame_of: Callable[[str], NamedFrame],
+    snap: float,
+    source: str,
+) -> tuple[Loop, ...]:
+    """Return the loops that tables describe. Raises one InputError that names all faults.
+
+    frame_of  returns the frame of a link, with the joint BASE if the link is fixed to the base
+    snap      rad; rotations that differ by at most this much from a right angle become exact
+    """
+    problems: list[str] = []
+    loops = [_loop(table, number, frame_of, snap, problems) for number, table in enumerate(tables, start=1)]
+    problems += naming_faults([name for name, *_ in loops], "loop")
+    for name, first, second, _ in loops:
+        if first.joint == second.joint and not problems:
+            problems.append(f"loop {shown(name)}: both frames are on one body: no joint moves between them")
+    if problems:
+        raise InputError(f"{source}: {limits.joined(problems)}", FORMAT)
+    return tuple(Loop(*loop) for loop in loops)
+
+
+def _loop(
+    value: object, number: int, frame_of: Callable[[str], NamedFrame], snap: float, problems: list[str]
+) -> tuple[str, NamedFrame, NamedFrame, tuple[int, ...]]:
+    given = value.get("name") if isinstance(value, Mapping) else None
+    name = given if isinstance(given, str) and given else f"loop{number}"
+    table = CheckedTable(value, f"loop {shown(name)}", LOOP_KEYS, problems)
+    table.read("name", plain_text, "")
+    problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:] if key not in table.table]
+    first, second = (
+        _frame(
+            table.read(key, as_it_is, {}), f"{table.where}: {key}", f"{name} {key}", frame_of, snap, problems
+        )
+        for key in LOOP_KEYS[2:]
+    )
+    return name, first, second, table.read("rows", _rows, CLOSED[6])
+
+
+def _rows(value: object) -> tuple[int, ...]:
+    """3 (a point), 6 (all motion), or a list of rows, such as ["x", "z"]."""
+    if value in (3, 6) and isinstance(value, int):
+        return CLOSED[value]
+    said = f"found {shown(value)}, expected 3 (a point), 6 (all motion) or a list of {', '.join(ROW_NAMES)}"
+    if not isinstance(value, list | tuple) or not value:
+        raise ValueError(said)
+    if any(row not in ROW_NAMES for row in value) or len({*value}) < len(value):
+        raise ValueError(said)
+    return tuple(sorted(ROW_NAMES.index(row) for row in value))
+
+
+def _unit(value: object) -> tuple[float, ...]:
+    """x, y, z and w of a rotation, made of length one."""
+    numbers = [finite(each) for each in any_list(value)]
+    size = math.hypot(*numbers)
+    if len(numbers) != len(UNTURNED) or abs(size - 1.0) > UNIT:
+        raise ValueError(f"found {shown(value)}, expected x, y, z and w of length one")
+    return tuple(each / size for each in numbers)
+
+
+def merged_loops(found: Tables, given: Tables) -> tuple[Mapping[str, Any], ...]:
+    """Return the tables of a file, with the keys that given tables of the same name replace, then the other given
+    tables."""
+    own = {table["name"]: dict(table) for table in found}
+    others = []
+    for table in given:
+        known = own.get(str(table.get("name")))
+        if known is None:
+            others.append(table)
+        else:
+            known.update(table)
+    return (*own.values(), *others)
+
+
+def _frame(
+    value: object,
+    where: str,
+    name: str,
+    frame_of: Callable[[str], NamedFrame],
+    snap: float,
+    problems: list[str],
+) -> NamedFrame:
+    table = CheckedTable({"link": value} if isinstance(value, str) else value, where, FRAME_KEYS, problems)
+    link = table.read("link", plain_text, "")
+    turn = roll_pitch_yaw(table.read("rpy", triple_of(angle), (0.0, 0.0, 0.0)), snap)
+    if "quaternion" in table.table:
+        turn = snap_rotation(from_quaternion(*table.read("quaternion", _unit, UNTURNED)), snap)[0]
+    if {"rpy", "quaternion"} <= table.table.keys():
+        problems.append(f"{where}: rpy and quaternion are both given")
+    place = Placement(turn, np.array(table.read("xyz", triple_of(LENGTH), (0.0, 0.0, 0.0))))
+    if not link:
+        problems += [] if "link" in table.table or not table.table else [f"{where}: link is missing"]
+        return NamedFrame(name, BASE, place, 0)
+    own = frame_of(link)
+    return NamedFrame(name, own.joint, own.placement @ place, 0)

@@ -1,0 +1,119 @@
+"""Random robots with closed loops and a contact, fixed or floating, their C, and Pinocchio's model of the same file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+import pinocchio as pin
+from contact_trees import FOOT, TRUNK
+from mimic_trees import as_urdf
+from random_trees import TREES, RandomTree
+from unoptimised import without_optimisation
+
+import psdmc
+from psdmc.derivation.derive import derive_model
+from psdmc.functions import RECIPES, SIGNATURES
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import states_of
+from psdmc.robot.coordinates import Coordinate
+from psdmc.robot.load import LoadedRobot, load_robot_text
+from psdmc.robot.reference import reference
+from psdmc.toolchain.call import CompiledRobot
+
+Array = np.ndarray
+
+FUNCTIONS = ("loop_error", "loop_jacobian", "loop_drift", "constrained_forward_dynamics")
+COUNT = 16
+
+ROWS = (3, ["y", "rx", "rz"], ["x", "z", "ry", "rz"], ["x", "y", "rx", "ry", "rz"])
+"""Rows of the loop between two ends, and for one more between an end and the base."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopTree:
+    """A robot with closed loops. `closed` is a configuration (nq,) in which they are closed."""
+
+    loaded: LoadedRobot
+    closed: Array
+
+    @cached_property
+    def model(self) -> DynamicsModel:
+        return derive_model(self.loaded.mechanism, expand=False)
+
+    @cached_property
+    def robot(self) -> CompiledRobot:
+        with without_optimisation():
+            return psdmc.compile(self.model, functions=FUNCTIONS)
+
+    @cached_property
+    def given(self) -> dict[str, Array]:
+        """States, of which the last one is closed. The contact acts in every second one if the base floats."""
+        robot = self.loaded.mechanism
+        rng = np.random.default_rng(5)
+        q, qd, tau = states_of(robot, rng, COUNT)
+        q[-1] = self.closed
+        return {
+            "q": q,
+            "qd": qd,
+            "tau": tau,
+            "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_free_root,
+            "mu": np.zeros(COUNT),
+            "kp": rng.uniform(0.0, 50.0, COUNT),
+            "kd": rng.uniform(0.0, 10.0, COUNT),
+            "error": 0.01 * rng.normal(size=(COUNT, sum(robot.rows_of_contacts))),
+        }
+
+    def expected(self, function: str, **other: Array) -> dict[str, Array]:
+        """The values from Pinocchio's own reading of the file and of the loops' frames."""
+        return RECIPES[function].pinocchio(reference(self.loaded, snapped=False), self.given | other)
+
+    def found(self, function: str, **other: Array) -> list[tuple[Array, ...]]:
+        """The values of C for many states, of C for each state, and of the model in NumPy."""
+        given = [(self.given | other)[q.name] for q in SIGNATURES[function].inputs]
+        many, plain = (getattr(robot, function)(*given) for robot in (self.robot, self.model))
+        each = [getattr(self.robot, function)(*state) for state in zip(*given, strict=True)]
+        if not isinstance(many, tuple):
+            return [(many,), (np.array(each),), (plain,)]
+        return [many, tuple(map(np.array, zip(*each, strict=True))), plain]
+
+
+def placed(model: pin.Model, data: pin.Data, link: str, world: pin.SE3) -> dict[str, object]:
+    """A frame of a loop, in a link, that is where `world` is."""
+    place = world
+    if model.existFrame(link) and link != "universe":
+        place = data.oMf[model.getFrameId(link)].inverse() * world
+    return {
+        "link": link,
+        "xyz": place.translation.tolist(),
+        "rpy": pin.rpy.matrixToRpy(place.rotation).tolist(),
+    }
+
+
+@cache
+def loop_tree(seed: int, floating: bool) -> LoopTree:
+    """Four legs on a body: two feet are joined, a third one is joined to the base, the last one can touch the world."""
+    pin.seed(seed)
+    tree = RandomTree(seed, TREES["four legs on a body"], "RRRRRRRR" if seed % 2 else "RRPRRRRR")
+    text = as_urdf(tree, [Coordinate(i) for i in range(tree.n)])
+    text = text.replace('<link name="base"/>', f'<link name="base">{TRUNK}</link>')
+    text = text.replace("</robot>", "".join(FOOT.format(i=i) for i in (2, 4, 6, 7)) + "</robot>")
+    model = (
+        pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if floating else pin.buildModelFromXML(text)
+    )
+    data, q = (
+        model.createData(),
+        pin.randomConfiguration(model, -2.0 * np.ones(model.nq), 2.0 * np.ones(model.nq)),
+    )
+    pin.framesForwardKinematics(model, data, q)
+    tables = []
+    for number, (first, second) in enumerate(
+        (("foot2", "link4"), ("universe" if floating else "base", "foot6"))
+    ):
+        where = data.oMf[model.getFrameId(first)] * pin.SE3.Random()
+        ends = {"first": placed(model, data, first, where), "second": placed(model, data, second, where)}
+        rows = ROWS[seed % 4 if floating and number else (seed + number) % 2]
+        tables.append({"rows": rows, **ends})
+    loaded = load_robot_text(text, "urdf", floating=floating, contacts=["foot7"], loops=tables)
+    return LoopTree(loaded, q)

@@ -1,0 +1,254 @@
+"""Constrained forward dynamics of robots with closed loops: dense systems, a four-bar mechanism, MuJoCo, and refusals."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from loop_trees import loop_tree
+from test_loop_error import TREES
+
+import psdmc
+from psdmc.errors import InputError
+
+NAME = "constrained_forward_dynamics"
+Array = np.ndarray
+
+BAR = '<inertial><origin xyz="{com}"/><mass value="{mass}"/><inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/>'
+LENGTHS = {"crank": 0.2, "coupler": 0.5, "rocker": 0.4}
+GROUND = 0.45
+"""m: bars, and the distance of the two pins on the ground."""
+
+FOUR_BAR = (
+    '<robot name="four_bar"><link name="ground"/>'
+    + "".join(
+        f'<link name="{name}">{BAR.format(com=f"{length / 2} 0 0", mass=2.0 * length, i=0.01 * length)}</inertial></link>'
+        for name, length in LENGTHS.items()
+    )
+    + "".join(
+        f'<joint name="{name}_pin" type="continuous"><parent link="{parent}"/><child link="{name}"/>'
+        f'<origin xyz="{x} 0 0"/><axis xyz="0 -1 0"/></joint>'
+        for name, parent, x in (
+            ("crank", "ground", 0),
+            ("coupler", "crank", 0.2),
+            ("rocker", "ground", GROUND),
+        )
+    )
+    + "</robot>"
+)
+"""In the plane x z; angles turn x towards z."""
+
+PIN = {
+    "name": "pin",
+    "rows": ["x", "z"],
+    "first": {"link": "rocker", "xyz": [0.4, 0.0, 0.0]},
+    "second": {"link": "coupler", "xyz": [0.5, 0.0, 0.0]},
+}
+
+
+def four_bar(tmp_path: Path, **changes: object) -> psdmc.DynamicsModel:
+    path = tmp_path / "four_bar.urdf"
+    path.write_text(FOUR_BAR, encoding="utf-8")
+    return psdmc.derive(path, loops=[PIN | changes], expand=False)
+
+
+def assembled(crank: float) -> Array:
+    """Crank, coupler (relative) and rocker by the law of cosines; the coupler is above the line of its ends' pins."""
+    a, b, c = LENGTHS.values()
+    x, z = GROUND - a * math.cos(crank), -a * math.sin(crank)
+    d, line = math.hypot(x, z), math.atan2(z, x)
+    coupler = line + math.acos((b * b + d * d - c * c) / (2 * b * d))
+    rocker = math.atan2(
+        a * math.sin(crank) + b * math.sin(coupler), a * math.cos(crank) + b * math.cos(coupler) - GROUND
+    )
+    return np.array([crank, coupler - crank, rocker])
+
+
+def rates(q: Array, rate: float) -> Array:
+    """Freudenstein's relations: rates of all bars from that of the crank."""
+    a, b, c = LENGTHS.values()
+    t2, t3, t4 = q[0], q[0] + q[1], q[2]
+    coupler = a * math.sin(t2 - t4) / (b * math.sin(t4 - t3)) * rate
+    rocker = a * math.sin(t2 - t3) / (c * math.sin(t4 - t3)) * rate
+    return np.array([rate, coupler - rate, rocker])
+
+
+@pytest.mark.parametrize(("seed", "floating"), TREES)
+def test_trees_with_loops_have_the_dense_systems_solution(seed: int, floating: bool) -> None:
+    """From Pinocchio's numbers of both frames, with the contact on and off, and mu = 0 or more."""
+    own = loop_tree(seed, floating)
+    for mu in (0.0, 0.3):
+        other = {"mu": np.full(len(own.given["q"]), mu)}
+        expected = own.expected(NAME, **other)
+        for found in own.found(NAME, **other):
+            for value, array in zip(found, expected.values(), strict=True):
+                assert np.abs(value - array).max() < 1e-10 * np.abs(array).max()
+
+
+def test_rates_of_a_four_bar_are_in_closed_form(tmp_path: Path) -> None:
+    model = four_bar(tmp_path)
+    assert model.loops == {"pin": ("x", "z")}
+    for crank in np.linspace(-3.0, 3.0, 13):
+        q = assembled(crank)
+        assert np.abs(model.loop_error(q)).max() < 1e-14
+        assert np.abs(model.loop_jacobian(q) @ rates(q, 2.0)).max() < 1e-13
+
+
+def test_a_four_bar_moves_with_one_coordinate(tmp_path: Path) -> None:
+    """Its equation of motion by the crank's angle alone: energies along the closed form, differentiated."""
+    model, step = four_bar(tmp_path), 1e-4
+    active = np.zeros(len(model.contacts))
+
+    def inertia(crank: float) -> float:
+        along = rates(assembled(crank), 1.0)
+        return float(along @ model.mass_matrix(assembled(crank)) @ along)
+
+    def slope(function: object, crank: float) -> float:
+        near, far = (function(crank + k * step) - function(crank - k * step) for k in (1, 2))
+        return (8 * near - far) / (12 * step)
+
+    for crank, rate, torque in ((0.4, 3.0, 0.0), (2.0, -1.5, 0.7), (-1.0, 0.0, -0.3)):
+        q = assembled(crank)
+        pull = slope(lambda angle: float(model.potential_energy(assembled(angle))), crank)
+        expected = (torque - pull - 0.5 * slope(inertia, crank) * rate**2) / inertia(crank)
+        qdd, forces = model.constrained_forward_dynamics(q, rates(q, rate), [torque, 0.0, 0.0], active)
+        assert abs(qdd[0] - expected) < 1e-8 * max(1.0, abs(expected))
+        assert forces.shape == (sum(model.contacts.values()) + 2,)
+
+
+def test_the_energy_of_a_swinging_four_bar_stays(tmp_path: Path) -> None:
+    """RK4 for 2 s. Halving the step lowers the drift by at least eight; Baumgarte's gains pull an open loop closed."""
+    model = four_bar(tmp_path)
+    robot = psdmc.compile(model, functions=[NAME])
+    still, active = np.zeros(3), np.zeros(len(model.contacts))
+
+    def moved(step: float, q: Array, qd: Array, **gains: float) -> tuple[Array, Array]:
+        def slope(q: Array, qd: Array) -> tuple[Array, Array]:
+            return qd, robot.constrained_forward_dynamics(q, qd, still, active, **gains).qdd
+
+        for _ in range(round(2.0 / step)):
+            k1 = slope(q, qd)
+            k2 = slope(q + step / 2 * k1[0], qd + step / 2 * k1[1])
+            k3 = slope(q + step / 2 * k2[0], qd + step / 2 * k2[1])
+            k4 = slope(q + step * k3[0], qd + step * k3[1])
+            q, qd = (
+                x + step / 6 * (a + 2 * b + 2 * c + d)
+                for x, a, b, c, d in zip((q, qd), k1, k2, k3, k4, strict=True)
+            )
+        return q, qd
+
+    def energy(q: Array, qd: Array) -> float:
+        return float(model.kinetic_energy(q, qd) + model.potential_energy(q))
+
+    first = assembled(0.3), rates(assembled(0.3), 1.0)
+    drifts = [abs(energy(*moved(step, *first)) - energy(*first)) for step in (4e-3, 2e-3)]
+    assert drifts[1] < min(1e-6 * 9.81, drifts[0] / 8.0)
+    opened = first[0] + [0.0, 0.01, 0.0]
+    assert np.abs(model.loop_error(opened)).max() > 1e-3
+    q, _ = moved(2e-3, opened, first[1], kp=400.0, kd=40.0)
+    assert np.abs(model.loop_error(q)).max() < 1e-9
+
+
+def test_mujoco_has_these_accelerations(tmp_path: Path) -> None:
+    """Its equality constraint is soft, with the least softness that it takes."""
+    model = four_bar(tmp_path)
+    spec = mujoco.MjSpec.from_string(
+        FOUR_BAR.replace(
+            '<link name="ground"/>', '<mujoco><compiler fusestatic="false"/></mujoco><link name="ground"/>'
+        )
+    )
+    spec.compiler.fusestatic = False
+    joined = spec.add_equality(name="pin", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
+    joined.name1, joined.name2 = "rocker", "coupler"
+    joined.data[:3] = [0.4, 0.0, 0.0]
+    joined.solref, joined.solimp = [-1e-3, -1e-3], [0.99999, 0.99999, 1e-3, 0.5, 2.0]
+    spec.option.cone, spec.option.disableflags = (
+        mujoco.mjtCone.mjCONE_ELLIPTIC,
+        mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    )
+    spec.option.tolerance, spec.option.iterations = 0.0, 200
+    theirs = spec.compile()
+    data = mujoco.MjData(theirs)
+    names = [theirs.joint(k).name.removesuffix("_pin") for k in range(3)]
+    order = [("crank", "coupler", "rocker").index(name) for name in names]
+    for crank, rate in ((0.4, 0.0), (2.0, 1.0)):
+        q = assembled(crank)
+        # MuJoCo takes the second anchor at the zero position: the coupler's end is at 0.5 along it wherever that is.
+        theirs.eq_data[0, 3:6] = [0.5, 0.0, 0.0]
+        data.qpos[:], data.qvel[:] = q[order], rates(q, rate)[order]
+        mujoco.mj_forward(theirs, data)
+        found = model.constrained_forward_dynamics(
+            q, rates(q, rate), np.zeros(3), np.zeros(len(model.contacts))
+        )
+        assert np.abs(found.qdd[order] - data.qacc).max() < 1e-3 * np.abs(data.qacc).max()
+
+
+@pytest.mark.parametrize(
+    ("rows", "lost", "kept"),
+    [
+        (3, "y of loop 'pin'", 'rows = ["x", "z"] in loop \'pin\''),
+        (["x", "z", "rx", "rz"], "rx, rz of loop 'pin'", 'rows = ["x", "z"] in loop \'pin\''),
+    ],
+)
+def test_redundant_rows_are_named(tmp_path: Path, rows: object, lost: str, kept: str) -> None:
+    with pytest.raises(InputError, match=f"redundant rows: {lost}: ") as error:
+        four_bar(tmp_path, rows=rows)
+    assert kept in str(error.value.hint)
+
+
+def test_what_cannot_be_assembled_or_holds_no_angle_is_refused(tmp_path: Path) -> None:
+    far = {"link": "rocker", "xyz": [4.0, 0.0, 0.0]}
+    with pytest.raises(
+        InputError, match="loop 'pin' cannot be assembled: in 256 tries, the smallest gap along x"
+    ):
+        four_bar(tmp_path, first=far)
+    with pytest.raises(InputError, match="both frames are on one body"):
+        four_bar(tmp_path, first="coupler")
+    with pytest.raises(InputError, match=r"loop 'pin': rows: found \['up'\], expected 3"):
+        four_bar(tmp_path, rows=["up"])
+    with pytest.raises(InputError, match="frame 'nowhere' is no link"):
+        four_bar(tmp_path, first="nowhere")
+    with pytest.raises(InputError, match="second is missing"):
+        psdmc.derive(tmp_path / "four_bar.urdf", loops=[{"rows": 3, "first": "rocker"}])
+
+
+def test_a_dead_point_names_the_loop(tmp_path: Path) -> None:
+    """Crank, coupler and rocker in one line hold the same motion twice."""
+    path = tmp_path / "flat.urdf"
+    path.write_text(FOUR_BAR.replace(f'xyz="{GROUND} 0 0"', 'xyz="0.3 0 0"'), encoding="utf-8")
+    model = psdmc.derive(path, loops=[PIN], expand=False)
+    state = (np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(len(model.contacts)))
+    with pytest.raises(InputError, match=f"{NAME}: loop 'pin': J M"):
+        model.constrained_forward_dynamics(*state)
+    with pytest.raises(InputError, match=f"{NAME}: loop 'pin': J M"):
+        psdmc.compile(model, functions=[NAME]).constrained_forward_dynamics(*state)
+    assert np.isfinite(model.constrained_forward_dynamics(*state, mu=1e-6).qdd).all()
+
+
+def test_functions_without_loops_are_refused(tmp_path: Path) -> None:
+    model = four_bar(tmp_path)
+    others = ("impulse", "delassus", "contact_inverse_dynamics", "contact_space_inertia", "constrained_rk4_step")
+    for name in (*others, f"{NAME}_derivatives", f"{NAME}_vjp", f"{NAME}_jvp"):
+        with pytest.raises(InputError, match=f"no {name}: for robots with closed loops"):
+            psdmc.compile(model, functions=[name])
+    with pytest.raises(InputError, match="no delassus: for robots with closed loops"):
+        model.delassus(np.zeros(3))
+    plain = psdmc.derive("examples/robots/scara.toml", expand=False)
+    assert plain.loops == {}
+    with pytest.raises(InputError, match="no loop_error: the robot has no closed loops"):
+        psdmc.compile(plain, functions=["loop_error"])
+    with pytest.raises(InputError, match="no loop_error: the robot has no closed loops"):
+        plain.loop_error(np.zeros(4))
+
+
+def test_a_saved_model_has_its_loops(tmp_path: Path) -> None:
+    model = four_bar(tmp_path)
+    model.save(tmp_path / "four_bar.npz")
+    again = psdmc.load(tmp_path / "four_bar.npz")
+    q = assembled(1.0)
+    assert again.loops == model.loops
+    assert again.content_hash == model.content_hash
+    assert np.array_equal(again.loop_jacobian(q), model.loop_jacobian(q))
