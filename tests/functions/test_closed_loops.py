@@ -230,7 +230,13 @@ def test_a_dead_point_names_the_loop(tmp_path: Path) -> None:
 
 def test_functions_without_loops_are_refused(tmp_path: Path) -> None:
     model = four_bar(tmp_path)
-    others = ("impulse", "delassus", "contact_inverse_dynamics", "contact_space_inertia", "constrained_rk4_step")
+    others = (
+        "impulse",
+        "delassus",
+        "contact_inverse_dynamics",
+        "contact_space_inertia",
+        "constrained_rk4_step",
+    )
     for name in (*others, f"{NAME}_derivatives", f"{NAME}_vjp", f"{NAME}_jvp"):
         with pytest.raises(InputError, match=f"no {name}: for robots with closed loops"):
             psdmc.compile(model, functions=[name])
