@@ -44,12 +44,12 @@ def draw() -> str:
         canvas.text(x, y + 4, f"{tau:g} N m", "small soft", "start" if tau < 0.0 else "end")
     canvas.line([_place(-FASTEST, 0.0), _place(FASTEST, 0.0)])
     canvas.line([_place(0.0, -LARGEST), _place(0.0, LARGEST)])
-    v = np.linspace(-FASTEST, FASTEST, 161)
+    speeds = np.linspace(-FASTEST, FASTEST, 161)
     for k, (speed, style) in enumerate(zip(SPEEDS, "ab", strict=True)):
         law = Friction(every_joint_s((1.0,), offset=False), np.array([[COULOMB, VISCOUS]]), speed)
-        torques = law.torque(v[:, None])[:, 0].round(6).tolist()
+        torques = law.torque(speeds[:, None])[:, 0].round(6).tolist()
         canvas.line(
-            [_place(*each) for each in zip(v.tolist(), torques, strict=True)],
+            [_place(*each) for each in zip(speeds.tolist(), torques, strict=True)],
             f"l{style}{' dash' if k else ''}",
         )
     canvas.text(14, 316, "speed v of the joint, rad/s; friction torque, N m", "small soft")
