@@ -1,14 +1,12 @@
-"""File formats in which robots' controllers take a planned motion."""
+"""What a file format for a robot's controller consists of, and a planned motion at the rate of such a format."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.wording import quoted
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.errors import InputError
@@ -74,61 +72,3 @@ def resampled(motion: Trajectory, rate: float) -> Trajectory:
     qd = v0 + x * (a0 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
     qdd = a0 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5))
     return Trajectory(motion.joint_names, time, q, qd / step, qdd / step**2, motion.sliding)
-
-
-def _ros2_lines(motion: Trajectory) -> Iterator[str]:
-    """A message trajectory_msgs/msg/JointTrajectory of ROS 2, in YAML, as `ros2 topic pub` takes it."""
-    yield "joint_names: " + json.dumps(motion.joint_names)
-    yield "points:"
-    for time, q, qd, qdd in zip(motion.time, motion.q, motion.qd, motion.qdd, strict=True):
-        seconds, rest = divmod(round(float(time) * 1e9), 10**9)
-        yield f"- positions: {_numbers(q)}"
-        yield f"  velocities: {_numbers(qd)}"
-        yield f"  accelerations: {_numbers(qdd)}"
-        yield f"  time_from_start: {{sec: {seconds}, nanosec: {rest}}}"
-
-
-def _numbers(values: Array) -> str:
-    return f"[{', '.join(f'{value:.9f}' for value in values)}]"
-
-
-URSCRIPT_RATE = 125.0
-"""Steps per second of the controllers CB3; those of the e-Series run 500 and interpolate."""
-
-
-def _urscript_lines(motion: Trajectory) -> Iterator[str]:
-    """A program in URScript, which the robots of Universal Robots run."""
-    yield "def psdmc_motion():"
-    yield f"  movej({_pose(motion, 0)}, a=0.5, v=0.3)"
-    for k in range(1, len(motion.time)):
-        yield f"  servoj({_pose(motion, k)}, t={1.0 / URSCRIPT_RATE:g}, lookahead_time=0.03, gain=300)"
-    yield "  stopj(2.0)"
-    yield "end"
-
-
-def _pose(motion: Trajectory, k: int) -> str:
-    return f"[{', '.join(f'{value:.6f}' for value in motion.q[k])}]"
-
-
-def _rsi_lines(motion: Trajectory) -> Iterator[str]:
-    """Axis corrections for KUKA's RobotSensorInterface (RSI): one XML element per cycle of 4 ms. Corrections are absolute,
-    in degrees from the first row's position."""
-    for row in np.degrees(motion.q - motion.q[0]):
-        axes = " ".join(f'A{k + 1}="{value:.5f}"' for k, value in enumerate(row))
-        yield f"<AKorr {axes}/>"
-
-
-def _franka_lines(motion: Trajectory) -> Iterator[str]:
-    """Joint positions for a 1 kHz control loop, such as a motion generator of libfranka: rows of angles."""
-    for row in motion.q:
-        yield ",".join(f"{value:.9f}" for value in row)
-
-
-_FORMATS = (
-    MotionFormat("ros2", ".ros2.yaml", 100.0, _ros2_lines, slides=True),
-    MotionFormat("urscript", ".script", URSCRIPT_RATE, _urscript_lines, joints=6),
-    MotionFormat("rsi", ".rsi.xml", 250.0, _rsi_lines, joints=6),
-    MotionFormat("franka", ".franka.csv", 1000.0, _franka_lines, joints=7),
-)
-FORMATS = {each.name: each for each in _FORMATS}
-"""Formats by their names on the command line."""
