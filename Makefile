@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-learning bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -154,6 +154,9 @@ bench: $(READY) ## time the standard robots against other programs, on an idle m
 LEGS ?=
 bench-legged: $(READY) ## time derivatives and matrices of seven legged robots, on an idle machine; LEGS='hyq go1' for some
 	$(RUN)/python -m psdmc.bench.legged $(LEGS) --json $(GENERATED)/bench-legged.json
+
+bench-contacts: $(READY) ## time dynamics with contacts of four legged robots beside Pinocchio, on an idle machine; LEGS='hyq' for some
+	$(RUN)/python benchmarks/contacts.py $(LEGS)
 
 LEARNING := .venv-learning
 ONLY ?=

@@ -1,0 +1,106 @@
+"""Time forward dynamics with contacts, alone and with its derivatives: psdmc's C beside Pinocchio's C++.
+
+`make bench-contacts` runs this on an idle machine. Pinocchio's functions `constraintDynamics` and
+`computeConstraintDynamicsDerivatives` are compiled from headers, with the flags of psdmc's C. Their proximal method makes
+one step without regularisation, which is exact. A figure is the median time of a call with one state, over blocks of 512
+random states, on one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.package_files import library_files
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
+from psdmc.bench.build import built, cxx, native_flags
+from psdmc.bench.case import robot_as_numbers
+from psdmc.bench.cases import LEGGED, robot_data
+from psdmc.bench.contestant import source
+from psdmc.bench.machine import this_machine, version_of
+from psdmc.bench.rivals.pinocchio_cpp import DEFINES, includes, pinocchio_prefix
+from psdmc.derivation.derive import derive_model
+from psdmc.lower.kernels import lower, wanted
+from psdmc.model.random_states import states_of
+from psdmc.robot.load import load_robot
+from psdmc.target.flags import GCC_ONLY
+
+CONTACTS = {
+    "hyq": ("lf_foot", "rf_foot", "lh_foot", "rh_foot"),
+    "solo12": ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"),
+    "b1-z1": ("FL_foot", "FR_foot", "RL_foot", "RR_foot"),
+    "talos_reduced": ("left_sole_link:6", "right_sole_link:6"),
+}
+"""The robots, paths in LEGGED, with points (3 rows each) or surfaces (6)."""
+
+FUNCTIONS = ("constrained_forward_dynamics", "constrained_forward_dynamics_derivatives")
+STATES, ROUNDS, SEED = 4096, 9, 4
+MASKS = ("all contacts", "every second", "none")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(CONTACTS)}; all where none is named")
+    found = this_machine()
+    print(f"{found.processor}, {found.compiler}, {found.flags}")
+    print(
+        "ns per call; x: Pinocchio's time over psdmc's; error: largest relative difference of qdd and dqdd_dq"
+    )
+    print(f"{'robot':<15}{'active':<15}{'values':>8}{'x':>7}{'derivatives':>13}{'x':>7}{'errors':>20}")
+    for name in parser.parse_args().names or CONTACTS:
+        for line in _measured(name):
+            mask, worst, slope, ours, theirs, own, other = line
+            errors = f"{worst:.0e}, {slope:.0e}"
+            times = f"{ours:>8.0f}{theirs / ours:>7.1f}{own:>13.0f}{other / own:>7.1f}"
+            print(f"{name:<15}{MASKS[int(mask)]:<15}{times}{errors:>20}", flush=True)
+    return 0
+
+
+def _measured(name: str) -> list[list[float]]:
+    """Return a line of figures for each mask."""
+    loaded = load_robot(robot_data() / LEGGED[name], floating=True, contacts=list(CONTACTS[name]))
+    robot = loaded.mechanism
+    model = derive_model(robot, expand=False)
+    with tempfile.TemporaryDirectory() as folder:
+        kernels = lower(model, functions=wanted(FUNCTIONS, robot), theta_variants=False)
+        program = _compiled(package_view(package_info(model, "robot"), kernels, EmitOptions()))
+        lines = [robot_as_numbers(robot), str(len(robot.contacts))]
+        for each in robot.contacts:
+            places = (*each.placement.rotation.ravel(), *each.placement.translation)
+            lines.append(f"{each.joint + 1} {each.rows} {' '.join(map(repr, map(float, places)))}")
+        lines.append(f"{STATES} {ROUNDS}")
+        states = states_of(robot, np.random.default_rng(SEED), STATES)
+        lines += [" ".join(map(repr, np.concatenate(row).tolist())) for row in zip(*states, strict=True)]
+        given = Path(folder, "robot.txt")
+        given.write_text("\n".join(lines))
+        text = subprocess.run([program, given], check=True, capture_output=True, text=True).stdout
+    return [list(map(float, line.split())) for line in text.splitlines()]
+
+
+def _compiled(package: PackageView) -> Path:
+    """The program: the package's sources by the C compiler, and Pinocchio's headers by the C++ compiler, once for all
+    robots."""
+    flags = native_flags()
+    theirs = [flag for flag in flags if not flag.startswith(GCC_ONLY)]
+    compile_theirs = [cxx(), "-std=c++17", *theirs, "-DNDEBUG", *DEFINES, *includes(pinocchio_prefix())]
+    sources = {
+        "contacts.cpp": Path(__file__).with_name("contacts.cpp").read_text(encoding="utf-8"),
+        "pinocchio_model.hpp": source("pinocchio_model.hpp"),
+    }
+    command = [*compile_theirs, "-c", "contacts.cpp", "-o", "contacts.o"]
+    rival = built("contacts.o", command, sources, [version_of("pin")])
+    compile_ours = ["cc", "-std=c99", *flags, "-Iinclude", "-c", *package.sources]
+    link = [cxx(), "*.o", str(rival), "-o", "contacts", "-lm"]
+    script = f"{' '.join(compile_ours)} && {' '.join(link)}"
+    return built("contacts", ["sh", "-c", script], library_files(package), [version_of("pin")])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
