@@ -130,9 +130,10 @@ RECIPE = Recipe(
             FORCES,
         ),
         theta=True,
-        summary="Compute the contact forces of a motion, and its joint torques tau = M qdd + h - J^T forces. No motor acts "
-        "on a floating base: the forces minimise |tau[:6]|^2 + mu |forces|^2. If several forces do, they have the smallest "
-        "norm. Without a floating base, they are zero.",
+        summary="Compute the contact forces of a motion, and the joint torques tau = M qdd + h - J^T forces. M is the "
+        "mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, and J the Jacobian of the contacts. "
+        "No motor acts on a floating base, so the forces minimise |tau[:6]|^2 + mu |forces|^2. If several forces do, "
+        "psdmc returns those with the smallest norm. Without a floating base, the forces are zero.",
         factorises=(MASK,),
     ),
     "inverse dynamics with contacts",
