@@ -172,8 +172,8 @@ RECIPE = Recipe(
             replace(FORCES, means=f"mean over the step of {FORCES.means}"),
         ),
         theta=True,
-        summary="Compute the state of a robot with contacts after one step of the classical fourth-order Runge-Kutta "
-        "method, with constant torques. Also compute the mean contact forces of the step.",
+        summary="Compute the state of a robot with contacts after one classical fourth-order Runge-Kutta step with "
+        "constant torques. Also compute the mean contact forces.",
         factorises=ACCELERATIONS.signature.factorises,
         stages=4,
         calls=(ACCELERATIONS.name,),

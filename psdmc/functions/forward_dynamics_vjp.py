@@ -62,7 +62,7 @@ RECIPE = Recipe(
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics. Also compute the gradients by q, qd and tau of a "
-        "weighted sum, the sum of cotangent[i] * qdd[i].",
+        "weighted sum of qdd. The weighted sum is the sum of cotangent[i] * qdd[i].",
         factorises=(MASS_MATRIX,),
     ),
     "gradient of forward dynamics",

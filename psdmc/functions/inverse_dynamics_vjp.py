@@ -47,7 +47,7 @@ RECIPE = Recipe(
         (TAU, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD),
         theta=True,
         summary="Compute the torques tau of inverse dynamics. Also compute the gradients by q, qd and qdd of a "
-        "weighted sum, the sum of cotangent[i] * tau[i].",
+        "weighted sum of tau. The weighted sum is the sum of cotangent[i] * tau[i].",
     ),
     "gradient of inverse dynamics",
     trace,
