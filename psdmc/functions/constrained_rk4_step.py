@@ -39,7 +39,7 @@ At = Callable[[Mapping[str, Array]], Arrays]
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The displacements of the contacts, `error`, move with the contacts between the stages, as entries of the state."""
+    """Between the stages, the displacements `error` change as the contacts move: they are entries of the state."""
     nv, forces, pivots = len(g.still), [], []
 
     def rates(q: Sequence[Scalar], v: Sequence[Scalar]) -> State:

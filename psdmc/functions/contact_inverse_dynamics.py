@@ -72,7 +72,7 @@ def _values(frames: Sequence[Frame], without: Sequence[Scalar], jacobian: Rows, 
 def _forces(without: Sequence[Scalar], jacobian: Rows, mask: Held) -> list[Scalar]:
     """Return the forces f that minimise |tau - J^T f|^2 + mu |f|^2, with the base's rows of tau and of J^T.
 
-    All equations are in newtons: a moment counts as the force that has this moment at a distance of 1 m.
+    A moment is treated as the force that has this moment at a distance of 1 m, so all terms are forces in newtons.
     """
     metre, per_metre = mask.si(1.0, "m"), mask.si(1.0, "1/m")
     active, angular = mask.rows[0], [k >= LINEAR for count in mask.counts for k in range(count)]
