@@ -28,8 +28,8 @@ def generalized_momentum(
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Compute the generalized momentum p = M(q) qd, and its rate without joint torques, C(q, qd)^T qd - g(q).
 
-    With the joint torques tau, dp/dt = tau + C^T qd - g. The formula contains no acceleration. C is the Coriolis matrix of the
-    Christoffel symbols, g the torques of gravity.
+    With the joint torques tau, dp/dt = tau + C^T qd - g. The formula contains no acceleration. C is the Coriolis matrix
+    of the Christoffel symbols, g the torques of gravity.
 
     Joint i's entries are s . h and (v x s) . h + s . w. s is the joint's twist per unit rate and v the twist of frame i.
     h is the momentum of the bodies that joint i carries and w gravity's wrench on them, both about the origin of frame i.

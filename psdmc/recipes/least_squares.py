@@ -31,7 +31,7 @@ class _Orthogonal(NamedTuple):
 
 
 def least_squares(rows: Sequence[Row], right: Sequence[Scalar], shift: Scalar) -> Row:
-    """Return the x that minimises |A x - b|^2 + shift |x|^2. If several x are minima, return the x with the smallest norm |x|.
+    """Return the x that minimises |A x - b|^2 + shift |x|^2. Of several minima x, return the one with the smallest |x|.
 
     rows   rows of A, whose entries have no unit
     right  b, an entry per row
