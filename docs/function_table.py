@@ -89,9 +89,10 @@ def table() -> str:
 def _row(recipe: Recipe) -> str:
     function = recipe.signature
     default = "yes" if recipe.default else "floating base" if recipe.default_where_wide else ""
+    first, *further = function.summary.removesuffix(".").split(". ")
     cells = (
         f"`{recipe.name}`",
-        function.summary.partition(". ")[0].removesuffix(".") + ".",
+        ". ".join([first, *(each for each in further if each.startswith("Also "))]) + ".",
         ", ".join(map(_shape, function.inputs)),
         _outputs(function.outputs),
         "yes" if function.theta else "",

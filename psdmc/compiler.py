@@ -173,15 +173,15 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   how psdmc generates the arithmetic. With "expanded", the code sums the monomials of the model (E and P).
-               With "factored", the code is a recursion over the links. "auto" selects the code with fewer operations
+    lowering   form of the generated arithmetic. "expanded": sums of products of sines, cosines and rates; "factored": a
+               recursion from link to link; "auto": the form with fewer operations
     functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
     trig       how the code computes sines. "inline": by its own code, with libm only for angles over 1e5 rad;
                "freestanding": without libm; "libm": always with libm; None: the method of the target
     name       name of the robot in C, with which all symbols begin; None: the name of the model
-    force      True: also write into a folder with files of other programs, and over edited package files. psdmc deletes
-               no file of other programs. If such a file has the name of a package file, psdmc renames it to NAME.orig
+    force      True: write even if the folder contains other files, or package files that you edited. psdmc overwrites
+               edited package files. It keeps other files, and renames one with the name of a package file to NAME.orig
     progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change theta_b for a load
     adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"
@@ -191,8 +191,9 @@ def emit_c(
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
     estimator  "mass" or "inertia": add functions that estimate a load at the tip while the robot moves. "mass" finds
                mass and centre of mass, "inertia" also the inertia
-    smoothing_speed  rad/s (m/s for sliding joints), the speed near which the sign of the motion changes smoothly in
-               friction in the dynamics; None: that of the calibration, usually 0.03 rad/s
+    smoothing_speed  for friction="in-dynamics": friction contains a smooth function, tanh(v / smoothing_speed), instead
+               of the sign of a joint's speed v. The unit is rad/s, or m/s for sliding joints. None: the value of the
+               calibration, usually 0.03
 
     Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises
     InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.

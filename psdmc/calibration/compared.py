@@ -93,14 +93,14 @@ class OnLog:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """The result of comparing two models of one robot.
+    """The result of comparing two models, a and b, of one robot.
 
     a, b        names of the models
-    doubts      warnings that a user should read first
+    doubts      reasons why the comparison may be wrong; a user should read them first
     parameters  base parameters of both models, with the numbering and equations of model a
     friction    friction values of both models
     chi2        statistic of a chi-squared test that all base parameters are equal; NaN without standard deviations
-    freedom     degrees of freedom of this test
+    freedom     degrees of freedom of the chi-squared test
     chance      probability that equal robots would give a chi2 of at least this size; NaN without standard deviations
     joints      differences of torques for each joint
     curves      friction torque against speed for each joint

@@ -37,8 +37,8 @@ CURVE = 81
 class Side:
     """One of two models that are compared.
 
-    covariance  (l, l) of the base parameters; None: they count as exact
-    found       what its calibration found; None: not calibrated
+    covariance  (l, l) covariance matrix of the l base parameters; None: they are treated as exact
+    found       result of the model's calibration; None: the model was not calibrated
     """
 
     name: str
@@ -90,7 +90,7 @@ def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
 def joint_differences(a: Side, b: Side, both: bool) -> tuple[JointDifference, ...]:
     """Return how the torques of two models differ for each joint over the workspace.
 
-    both  whether both were calibrated, so that friction is compared, too
+    both  True: both models were calibrated, so friction is compared, too
     """
     chain = a.model.mechanism
     q, qd, qdd = _states(chain)

@@ -1,5 +1,5 @@
-"""The generalized momentum p = M(q) qd of a robot, the joint forces that change it besides the joint torques, and both as
-linear functions of a load's ten parameters."""
+"""Compute the generalized momentum p = M(q) qd of a robot, its rate without joint torques, and the parts of both that a load
+adds. These parts are linear in the load's ten parameters."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def generalized_momentum(
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Compute the generalized momentum p = M(q) qd, and its rate without joint torques, C(q, qd)^T qd - g(q).
 
-    With the joint torques tau, dp/dt = tau + C^T qd - g. No acceleration occurs. C is the Coriolis matrix of the
-    Christoffel symbols, g the torques of gravity.
+    With the joint torques tau, dp/dt = tau + C^T qd - g. The formula contains no acceleration. C is the Coriolis matrix
+    of the Christoffel symbols, g the torques of gravity.
 
     Joint i's entries are s . h and (v x s) . h + s . w. s is the joint's twist per unit rate and v the twist of frame i.
     h is the momentum of the bodies that joint i carries and w gravity's wrench on them, both about the origin of frame i.
@@ -67,8 +67,8 @@ def load_momentum(
     base_acceleration: Vector,
     count: int,
 ) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
-    """Compute how p and its rate of `generalized_momentum` grow with the parameters of a load: two matrices, with a row
-    for each of the load's first `count` parameters and a column for each joint rate.
+    """Compute the derivatives of the two results of `generalized_momentum` by the parameters of a load. Returns two
+    matrices, with a row for each of the load's first `count` parameters and a column for each joint rate.
 
     place    placement of the load's frame in the joint frame `carrier`
     count    4: mass and first moments about the load's frame; 10: also the six inertias

@@ -6,8 +6,8 @@ elimination of its rates and then of its forces needs no larger matrix than
 
     D = J_l M_ll^-1 J_l^T + shift
 
-Nothing but a matrix with the rows of the core (such as a trunk) is summed over limbs. This elimination loses digits where
-D is much smaller than J M^-1 J^T + shift, as at a straight knee.
+Only a matrix with the rows of the core (such as a trunk) is a sum over limbs. This elimination loses digits if D is much
+smaller than J M^-1 J^T + shift, as at a straight knee.
 
 Source: Featherstone 2008, sections 6.5 and 8.
 """

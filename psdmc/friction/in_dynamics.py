@@ -29,8 +29,8 @@ class FrictionInDynamics:
     """The friction torque of a robot's nv joint rates at q and qd, and its derivatives. The motor torque is the sum of
     this torque and the torque of the rigid bodies. Each joint's friction depends on the joint's own q and qd only.
 
-    friction  of k joints
-    places    for each of them, its place in q and its place in qd; all other rates have no friction
+    friction  friction of k joints
+    places    for each of these k joints, its index in q and its index in qd; all other rates have no friction
     nv        number of joint rates
     values    PROGRAM of the torque of one joint; inputs: p, v and q, as those of `Friction.program`
     first     PROGRAM of its derivatives by q and by v
@@ -46,7 +46,7 @@ class FrictionInDynamics:
 
     @staticmethod
     def of(friction: Friction, places: Sequence[tuple[int, int]], nv: int) -> FrictionInDynamics:
-        """Return the friction of a robot whose joints with friction have these places in q and qd."""
+        """Return the friction of a robot. `places` has the indices in q and in qd of each joint with friction."""
         value, first, second = _derivatives(friction.program())
         at_rest = {"q": np.array([0.3]), "v": np.zeros(1)}
         p = dict(enumerate(np.ones(friction.values.shape[1]).tolist()))
@@ -62,7 +62,7 @@ class FrictionInDynamics:
 
     @property
     def key(self) -> str:
-        """A text that is equal for two frictions of one model with equal torques."""
+        """A text that identifies the friction: two frictions of one model with the same text have equal torques."""
         return f"friction in dynamics, sign speed {self.friction.sign_speed!r}"
 
     def torques(self, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Scalar]:
@@ -71,7 +71,7 @@ class FrictionInDynamics:
         return found
 
     def slopes(self, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[list[Scalar]]:
-        """Return the derivatives of each rate's friction torque by its own q and by its own qd, nv each."""
+        """Return the derivatives of each rate's friction torque by its joint's q and by its qd, nv each."""
         return self._rows(self.first, q, qd)
 
     def bends(self, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[list[Scalar]]:

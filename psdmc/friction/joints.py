@@ -28,7 +28,7 @@ class Friction:
     terms       each a friction law and, if the law has one, its exponent or velocity
     values      (n, k) fitted values, such as coefficients: a row for each joint, columns in the order of the terms;
                 zero if a joint lacks a term
-    sign_speed  speed, rad/s (m/s), near which the sign of the motion changes smoothly
+    sign_speed  V in tanh(v / V), which replaces the sign of a joint's speed v; rad/s (m/s)
     beyond      what else the calibration found in addition to rigid bodies, in words without names
     """
 
@@ -44,7 +44,7 @@ class Friction:
 
     @property
     def formula(self) -> str:
-        """Return the friction torque of a joint as a formula for people; s is the smooth sign of the speed."""
+        """Return the friction torque of a joint as a formula in text, with s = tanh(speed / sign_speed) as smooth sign."""
         against = " + ".join(term.formula for term in self.terms if term.law.against)
         others = (term.formula for term in self.terms if not term.law.against)
         return " + ".join((*((f"s ({against})",) if against else ()), *others))

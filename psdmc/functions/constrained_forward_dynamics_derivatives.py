@@ -227,8 +227,8 @@ RECIPE = Recipe(
         WITHOUT.signature.inputs,
         (*WITHOUT.signature.outputs, *BLOCKS),
         theta=True,
-        summary="Compute the joint accelerations and the contact forces that torques cause, and their derivatives by q, "
-        "qd, tau and error. The derivatives by q hold error constant.",
+        summary="Compute the joint accelerations and the contact forces that torques cause. Also compute the "
+        "derivatives of both by q, qd, tau and error. The derivatives by q hold error constant.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, FREE.name),
         thin=thin_blocks("qdd", "forces", ("q", "qd", "tau", "error")),

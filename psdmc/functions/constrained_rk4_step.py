@@ -39,7 +39,7 @@ At = Callable[[Mapping[str, Array]], Arrays]
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The displacements of the contacts, `error`, move with the contacts between the stages, as entries of the state."""
+    """Between the stages, the displacements `error` change as the contacts move: they are entries of the state."""
     nv, forces, pivots = len(g.still), [], []
 
     def rates(q: Sequence[Scalar], v: Sequence[Scalar]) -> State:
@@ -172,8 +172,8 @@ RECIPE = Recipe(
             replace(FORCES, means=f"mean over the step of {FORCES.means}"),
         ),
         theta=True,
-        summary="Compute the state after one step of the classical fourth-order Runge-Kutta method with contacts, and the "
-        "mean contact forces of the step, with constant torques.",
+        summary="Compute the state of a robot with contacts after one classical fourth-order Runge-Kutta step with "
+        "constant torques. Also compute the mean contact forces.",
         factorises=ACCELERATIONS.signature.factorises,
         stages=4,
         calls=(ACCELERATIONS.name,),

@@ -74,7 +74,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, DT, *HELD),
         (Q_NEXT, QD_NEXT, FORCES),
         theta=True,
-        summary="Compute the state after one step of semi-implicit Euler with contacts, and the contact forces of the step.",
+        summary="Compute the state of a robot with contacts after one step of semi-implicit Euler. Also compute the "
+        "contact forces of the step.",
         factorises=ACCELERATIONS.signature.factorises,
         calls=(ACCELERATIONS.name,),
     ),

@@ -116,8 +116,8 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B, B_ERROR, *OF_FORCES),
         theta=True,
-        summary="Compute the state after one step of semi-implicit Euler with contacts, the contact forces, and the "
-        "derivatives of both by q, qd, tau and error. The derivatives by q hold error constant.",
+        summary="Compute the state after one semi-implicit Euler step with contacts, and the contact forces. Also "
+        "compute derivatives of both by q, qd, tau and error. The derivatives by q hold error constant.",
         factorises=STEP.signature.factorises,
         calls=(ACCELERATIONS.name, *ACCELERATIONS.signature.calls),
     ),

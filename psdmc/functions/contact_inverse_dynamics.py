@@ -72,7 +72,7 @@ def _values(frames: Sequence[Frame], without: Sequence[Scalar], jacobian: Rows, 
 def _forces(without: Sequence[Scalar], jacobian: Rows, mask: Held) -> list[Scalar]:
     """Return the forces f that minimise |tau - J^T f|^2 + mu |f|^2, with the base's rows of tau and of J^T.
 
-    All equations are in newtons: a moment counts as the force that has this moment at a distance of 1 m.
+    A moment is treated as the force that has this moment at a distance of 1 m, so all terms are forces in newtons.
     """
     metre, per_metre = mask.si(1.0, "m"), mask.si(1.0, "1/m")
     active, angular = mask.rows[0], [k >= LINEAR for count in mask.counts for k in range(count)]
@@ -130,9 +130,10 @@ RECIPE = Recipe(
             FORCES,
         ),
         theta=True,
-        summary="Compute the contact forces of a motion, and its joint torques tau = M qdd + h - J^T forces. No motor acts "
-        "on a floating base: the forces minimise |tau[:6]|^2 + mu |forces|^2. If several forces do, they have the smallest "
-        "norm. Without a floating base, they are zero.",
+        summary="Compute the contact forces of a motion, and the joint torques tau = M qdd + h - J^T forces. M is the "
+        "mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, and J the Jacobian of the contacts. "
+        "No motor acts on a floating base, so the forces minimise |tau[:6]|^2 + mu |forces|^2. If several forces do, "
+        "psdmc returns those with the smallest norm. Without a floating base, the forces are zero.",
         factorises=(MASK,),
     ),
     "inverse dynamics with contacts",

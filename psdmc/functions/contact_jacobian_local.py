@@ -44,8 +44,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of all contacts along their own axes: J qd are the velocities of the contacts along "
-        "these axes. J^T times contact forces along these axes are joint torques.",
+        summary="Compute the Jacobian J of all contacts along their own axes: J qd are the velocities of the contacts "
+        "along these axes. If f are contact forces along these axes, J^T f are their joint torques.",
     ),
     "contact Jacobian along the contacts' axes",
     *on_both(values, INPUTS),

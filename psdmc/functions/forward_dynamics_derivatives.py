@@ -139,7 +139,8 @@ RECIPE = Recipe(
         (Q, QD, TAU),
         (QDD, *(jacobian_of("qdd", by) for by in ("q", "qd", "tau"))),
         theta=True,
-        summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
+        summary="Compute the accelerations qdd of forward dynamics. Also compute the derivatives of qdd by q, qd and "
+        "tau.",
         factorises=(MASS_MATRIX,),
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
         thin=(Thin("dqdd_dq", KNOWN_BY_Q), Thin("dqdd_dqd", KNOWN_BY_QD), Thin("dqdd_dtau")),

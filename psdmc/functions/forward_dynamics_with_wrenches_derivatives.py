@@ -137,8 +137,8 @@ RECIPE = Recipe(
         ACCELERATIONS.signature.inputs,
         (QDD, *BLOCKS),
         theta=True,
-        summary="Compute the accelerations qdd that torques cause under external wrenches, and their derivatives by "
-        "q, qd, tau and wrenches.",
+        summary="Compute the accelerations qdd that torques cause under external wrenches. Also compute the "
+        "derivatives of qdd by q, qd, tau and wrenches.",
         factorises=ACCELERATIONS.signature.factorises,
         products=WITHOUT.products,
         calls=(WITHOUT.name,),

@@ -44,8 +44,8 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.inputs, *DIRECTIONS),
         (*ACCELERATIONS.signature.outputs, along_direction(QDD)),
         theta=True,
-        summary="Compute the accelerations qdd that torques cause under external wrenches, and their derivative "
-        "dqdd along the direction (dq, dqd, dtau, dwrenches).",
+        summary="Compute the accelerations qdd that torques cause under external wrenches. Also compute dqdd, the "
+        "derivative of qdd along the direction (dq, dqd, dtau, dwrenches).",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "forward dynamics with wrenches along a direction",

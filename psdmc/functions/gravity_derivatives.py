@@ -49,7 +49,7 @@ RECIPE = Recipe(
             jacobian_of("g", "q"),
         ),
         theta=True,
-        summary="Compute the gravity torques g(q) and their derivatives by q.",
+        summary="Compute the gravity torques g(q). Also compute the derivatives of g by q.",
     ),
     "derivatives of gravity",
     trace,

@@ -140,8 +140,8 @@ RECIPE = Recipe(
         (Q, BEFORE, ACTIVE, RESTITUTION, MU),
         (AFTER, IMPULSES),
         theta=True,
-        summary="Compute the joint rates after an impact, and the impulses that stop the active contacts or reverse "
-        "their velocity.",
+        summary="Compute qd_after, the joint rates after an impact, and the contact impulses. The impulses stop the "
+        "active contacts or reverse their velocity.",
         factorises=(MASS_MATRIX, TOUCHING),
     ),
     "impulses of an impact",

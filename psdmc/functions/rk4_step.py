@@ -45,11 +45,11 @@ def runge_kutta_step(
     unit: Callable[[Sequence[Scalar]], Sequence[Scalar]],
     dt: Scalar,
 ) -> State:
-    """Return the state after dt. Slopes at the start, twice in the middle and at the end: weights 1/6, 2/6, 2/6, 1/6.
+    """Return the state after a step of dt: the start plus dt times a weighted mean of four slopes. The slopes are those
+    at the start, twice in the middle and at the end of the step, with the weights 1/6, 2/6, 2/6 and 1/6.
 
-    `rates` are those of q's coordinates and of qd, `unit` makes quaternions of length one. The slopes are of the
-    coordinates, and quaternions leave their sphere by the second order of dt between stages: taken back to it at each,
-    the method keeps its order, as it is the classical one for rates that are constant across the sphere.
+    `rates` returns the rates of the entries of q and of qd, and `unit` scales quaternions to length one. Between stages,
+    the length of a quaternion changes by the second order of dt. Scaling it at each stage keeps the method's order.
     """
     q, qd = start
     half = 0.5 * dt
@@ -87,8 +87,8 @@ def step_of_arrays(
     rates: Callable[[Array, Array], tuple[Array, Array]],
     unit: Callable[[Array], Array],
 ) -> Arrays:
-    """Return the state after dt from arrays (k, nq) and (k, nv), in NumPy. Entries of q and qd have rates of their own;
-    those of q are coordinates of joints."""
+    """Compute the state after a step of dt in NumPy, from arrays q (k, nq) and qd (k, nv) of k states. `rates` returns the
+    rates of the entries of q and of qd, and `unit` scales quaternions to length one."""
     dt = step_on_arrays(given)
     q, qd = given["q"], given["qd"]
     first = rates(q, qd)

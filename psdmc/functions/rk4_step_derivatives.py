@@ -266,8 +266,8 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B),
         theta=True,
-        summary="Compute the state after one step of the classical fourth-order Runge-Kutta method, and "
-        "that state's derivatives by q, qd and tau.",
+        summary="Compute the state after one step of the classical fourth-order Runge-Kutta method. Also compute the "
+        "derivatives of this state by q, qd and tau.",
         factorises=STEP.signature.factorises,
         spoilt=STEP.signature.spoilt,
         calls=(ACCELERATIONS.name,),

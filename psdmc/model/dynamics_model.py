@@ -199,18 +199,19 @@ class DynamicsModel(Answers):
     def pivots(self) -> tuple[int, ...]:
         """Return, for each of the l base parameters, the index of its pivot in the vector of standard parameters, (11n,).
 
-        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. Each base
-        parameter is a sum of standard parameters with factors. Its pivot is the first standard parameter that has the
-        factor one in this sum and is in no other base parameter.
+        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. A base
+        parameter is a linear combination of standard parameters. Its pivot is the first standard parameter that has the
+        coefficient 1 in it and is in no other base parameter.
         """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """True if each base parameter contains, with factor one, a standard parameter that no other base parameter contains.
+        """True if each base parameter has a pivot, as in every model that psdmc derives.
 
-        Such a standard parameter is called the pivot of the base parameter (see `pivots`). In every model that psdmc
-        derives, each base parameter has a pivot.
+        A base parameter is a linear combination of standard parameters (masses, first moments and inertias of links).
+        Its pivot is a standard parameter that has the coefficient 1 in it, and is in no other base parameter. The
+        attribute `pivots` lists the pivots.
         """
         return bool(self._leads.any(axis=1).all())
 

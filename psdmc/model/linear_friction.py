@@ -46,8 +46,8 @@ def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = N
     """Return the friction that the model's calibration found, as a part of the dynamics. Joints of several coordinates,
     such as a floating base, and mimic joints have no friction of their own.
 
-    smoothing_speed  rad/s (m/s), the speed near which the sign of the motion changes smoothly; None: that of the
-                     calibration
+    smoothing_speed  V in tanh(v / V), which replaces the sign of a joint's speed v; rad/s, or m/s for sliding joints.
+                     None: the value of the calibration
 
     Raises InputError as `linear_friction` does, and if the smoothing speed is not a positive number.
     """

@@ -91,8 +91,8 @@ class LimbProgram:
 
     least     the smallest number of lanes with which this is cheaper than the function's straight-line code
     products  matrix products after the stages
-    checked   whether a pivot that is not positive says only that the limbs cannot be eliminated one by one. C then
-              computes the state with the function's straight-line code
+    checked   True: if a pivot is not positive, only the elimination limb by limb is impossible. The C function then
+              computes the state with its straight-line code
     """
 
     groups: tuple[LimbGroup, ...]

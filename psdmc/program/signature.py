@@ -196,7 +196,7 @@ class Signature:
     thin      outputs (nv, nv) that are computed as factors if a robot has equal limbs, such as legs, and multiplied
               last (thin_products.py)
     normalizes  whether quaternions in q may have any length but zero
-    summary   a sentence on what it computes, for Python and the table of docs/functions.md
+    summary   one or two sentences on what it computes, for Python and the table of docs/functions.md
     calls     names of the functions that the C code calls, such as one for each stage of an integration step
     spoilt    name of its outputs in sentences about failure, such as "accelerations"
     """
@@ -328,7 +328,8 @@ TAU = Quantity(
 
 OF_Q = (
     "q[j]. If the robot has a ball joint or a floating base, q is replaced by integrate(q, x), and the derivative is by "
-    "x[j] at x = 0"
+    "x[j] at x = 0. Here x moves a joint with one coordinate by x[j], and a ball joint or floating base along and about "
+    "its own axes"
 )
 """What an entry of a derivative by q belongs to."""
 

@@ -31,15 +31,15 @@ class _Orthogonal(NamedTuple):
 
 
 def least_squares(rows: Sequence[Row], right: Sequence[Scalar], shift: Scalar) -> Row:
-    """Return the x that minimises |A x - b|^2 + shift |x|^2. If several x do, return that of the smallest norm |x|.
+    """Return the x that minimises |A x - b|^2 + shift |x|^2. Of several minima x, return the one with the smallest |x|.
 
     rows   rows of A, whose entries have no unit
     right  b, an entry per row
     shift  0 or more, without unit
 
-    A row counts as dependent on those before it if the square of its part orthogonal to them is lost in rounding when
-    it is added to the square of the row. The part is then shorter than about 1e-8 of the row in float64, or 2e-4 in
-    float32. Every rank executes the same operations.
+    A row is treated as dependent on the rows before it if its part orthogonal to them is too short: shorter than about
+    1e-8 of the row in float64, or 2e-4 in float32. Then rounding loses the square of the part in the square of the
+    row. For every rank of A, the code executes the same operations.
 
     A = L Q, with orthogonal rows of Q. Then y = Q x minimises |L y - b|. L is lower triangular with ones on its diagonal,
     except for a zero column for each dependent row. If there is none, y follows by substitution. To include the shift,

@@ -1,5 +1,5 @@
-"""The function that the load estimator of a C package calls: momentum of the robot and of a load at its tip. It has no
-header of its own, so it is none of psdmc.functions."""
+"""The function that the load estimator of a C package calls. It computes the momentum of the robot and of a load at its tip.
+Users cannot call it, so it is not among psdmc.functions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FUNCTION = "load_momentum"
 
 
 def load_recipe(kind: str) -> Recipe:
-    """Return the recipe of momenta for an estimator of this kind, a key of LOADS."""
+    """Return the recipe of the function that computes momenta for an estimator. `kind` is a key of LOADS."""
     count = LOADS[kind]
 
     def trace(g: Ingredients) -> Outputs:

@@ -49,7 +49,7 @@ class Ingredients:
     one robot.
 
     Each symbol and constant is a quantity with a dimension and a value in units that lowering chooses (lower/units.py).
-    A sum of unlike quantities is an error.
+    Adding quantities with different dimensions is an error.
 
     frames             n joint frames
     base_acceleration  minus gravity, along the base's axes (see base_axes)
@@ -57,7 +57,7 @@ class Ingredients:
                        but have other masses. Empty for functions that do not use theta_b
     drives             n inertias of the joints' drives, computed from theta_b. Empty for functions that do not use
                        theta_b
-    choices            which of several equal ways each recursion along the robot is computed in
+    choices            which of several equivalent forms each recursion along the robot has
     base_axes          axes in which the placement of the first joint is given: columns, in the base frame
     base_origin        origin from which the placement of the first joint is given, in the base frame
     link_frames        placements of the n link frames of the robot file in the joint frames

@@ -29,8 +29,8 @@ class CompiledRobot(CompiledFunctions):
 
     All methods have the argument `out`, and most have `theta_b`:
 
-    theta_b  base parameters that replace those in the code; optional. The shape is (l,) for all states, or (..., l) for one
-             set per state. Batch axes (...) broadcast with those of the other inputs
+    theta_b  base parameters that replace those in the code; optional. With l base parameters, the shape is (l,) for all
+             states, or (..., l) for one set per state. Batch axes (...) broadcast with those of the other inputs
     out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
              the shape and dtype of the result, and may be an input array
 

@@ -18,9 +18,9 @@ WIDEST = 16
 
 @dataclass(frozen=True, slots=True)
 class EstimatorView:
-    """The load estimator of one package.
+    """The functions of one C package that estimate a load, as data for the templates.
 
-    momentum  the function of momenta that the estimator calls; no header declares it
+    momentum  the function that computes momenta for the estimator; no header declares it
     """
 
     robot: str

@@ -30,7 +30,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Robot:
-    """What the steps of a four-step calibration know of the robot.
+    """The robot, as the steps of a four-step calibration use it.
 
     chain      the joints, with their limits
     regressor  object that computes the robot's regressor

@@ -69,7 +69,7 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looked:
-    """What the checks of a log read: the log, its statistics, the robot, the cut-off of the filter (Hz) that will be
+    """The inputs of the checks of a log: the log, its statistics, the robot, the cut-off of the filter (Hz) that will be
     applied to the log, and the limits."""
 
     log: AnyLog
