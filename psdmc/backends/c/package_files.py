@@ -110,17 +110,16 @@ def library_files(package: PackageView) -> dict[str, str]:
                 "regions.c.jinja" if unit.is_regions else "function.c.jinja", package=shown, function=unit
             )
         for kernel in function.kernels:
-            if kernel.limbs:
-                files[f"src/{kernel.limbs.file}"] = render("limbs.inc.jinja", limbs=kernel.limbs)
-            if kernel.regions:
-                continue
-            bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
+            own = not kernel.regions
+            bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body} if own else {}
             for file, body in bodies.items():
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
-            parts = {kernel.single_parts: kernel.single_body, kernel.lanes_parts: kernel.lanes_body}
+            parts = {kernel.single_parts: kernel.single_body, kernel.lanes_parts: kernel.lanes_body} if own else {}
             for file, body in parts.items():
                 if body.parts:
                     files[f"src/{file}"] = render("parts.inc.jinja", body=body)
+            if kernel.limbs:
+                files[f"src/{kernel.limbs.file}"] = render("limbs.inc.jinja", limbs=kernel.limbs)
     if package.info.payload:
         files["src/payload.c"] = render("payload.c.jinja", package=package)
     if package.info.bodies:
