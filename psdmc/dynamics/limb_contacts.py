@@ -15,7 +15,7 @@ Source: Featherstone 2008, sections 6.5 and 8.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import accumulate
+from itertools import islice
 
 from psdmc.dynamics.arrow import Arrow, Matrix, eliminated, limbs_of
 from psdmc.dynamics.contacts import pushed_slopes
@@ -25,7 +25,7 @@ from psdmc.dynamics.kinematics import AT_BASE
 from psdmc.dynamics.named_frames import Root
 from psdmc.dynamics.scalar import Matrix as Axes
 from psdmc.dynamics.scalar import Scalar, Vector, transform, transpose
-from psdmc.dynamics.slices import first_rates, joints_of_rates, positions
+from psdmc.dynamics.slices import first_rates, positions
 from psdmc.dynamics.solve import is_zero
 from psdmc.robot.mechanism import NamedFrame
 
@@ -83,20 +83,23 @@ def pushed_slopes_of_limbs(
 ) -> list[list[Scalar]]:
     """Compute the derivatives of J^T f by q, as `pushed_slopes` (contacts.py), with contacts on equal limbs only. In the
     rows and columns of the core, they are sums over limbs."""
-    core, groups = limbs_of(frames)
-    first, owner = first_rates(frames), {rate: k for k, (rates, _) in enumerate(groups) for rate in rates}
-    found: list[list[Scalar]] = [[0.0] * first[-1] for _ in range(first[-1])]
-    ends = list(accumulate(each.rows for each in named))
-    numbers = joints_of_rates(frames)
-    of_joint = {joint: owner[rate] for rate, joint in enumerate(numbers) if rate in owner}
-    for number, (_, total) in enumerate(groups):
-        own = [k for k, each in enumerate(named) if of_joint[each.joint] == number]
-        pushed = [x for k in own for x in forces[ends[k] - named[k].rows : ends[k]]]
-        slopes = pushed_slopes(frames, [named[k] for k in own], q, pushed, root)
+    core, nv = limbs_of(frames)[0], first_rates(frames)[-1]
+    found: list[list[Scalar]] = [[0.0] * nv for _ in range(nv)]
+    left = iter(forces)
+    for each in named:
+        total = _sum_over_limbs(frames, each.joint)
+        slopes = pushed_slopes(frames, [each], q, list(islice(left, each.rows)), root)
         for i, row in enumerate(slopes):
             for j, value in enumerate(row):
                 found[i][j] = found[i][j] + (total(value) if i in core and j in core else value)
     return found
+
+
+def _sum_over_limbs(frames: Sequence[Frame], joint: int) -> Callable[[Scalar], Scalar]:
+    """The function that sums over the limbs to which a joint belongs."""
+    while (total := frames[joint].limbs) is None:
+        joint = frames[joint].parent
+    return total
 
 
 class Trunk:

@@ -129,8 +129,8 @@ class LimbContact(NamedTuple):
 
 
 def merged_contacts(named: Sequence[NamedFrame], among: Sequence[Place]) -> tuple[LimbContact, ...] | None:
-    """Return the contacts of one limb of each group. Return None if a contact is not on a limb, if the limbs of a group
-    have other contacts, or if a limb has less joints than rows of contacts."""
+    """Return the contacts of one limb of each group. Return None if a contact is not on a limb, or if the limbs of a
+    group have other contacts."""
     contacts = [each for each in named if each.rows]
     found = []
     for place, own in enumerate(among):
@@ -142,10 +142,6 @@ def merged_contacts(named: Sequence[NamedFrame], among: Sequence[Place]) -> tupl
             frames = [contacts[k] for k in numbers]
             merged = replace(frames[0], joint=place, placement=own.placed([f.placement for f in frames]))
             found.append(LimbContact(own.group or 0, numbers, merged))
-    for group in {each.group for each in found}:
-        joints = sum(place.group == group for place in among)
-        if joints < sum(each.frame.rows for each in found if each.group == group):
-            return None
     return tuple(sorted(found, key=lambda each: each.numbers))
 
 

@@ -10,9 +10,12 @@ from itertools import accumulate, product
 
 import numpy as np
 
+from psdmc.dynamics.contacts import contact_jacobian
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.free_root import has_free_root
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import joints_of_rates, leading
+from psdmc.dynamics.solve import SingularMatrix, factorize, inner_product
 from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
 from psdmc.lower.limb_frames import Place, merged_contacts, one_limb, places
@@ -87,11 +90,37 @@ def has_contacts(signature: Signature) -> bool:
 
 
 def have_contacts_alike(recipe: Recipe, frames: Reframed, groups: Sequence[Limbs]) -> bool:
-    """Return whether the function has no contacts, or all contacts are at corresponding places of equal limbs, without
-    closed loops."""
+    """Return whether the function has no contacts, or all contacts are at corresponding places of equal limbs that can
+    hold them alone, without closed loops. A limb can hold them if its rates move them in all directions of their rows."""
     if not has_contacts(recipe.signature):
         return True
-    return not frames.loops and merged_contacts(frames.named, places(len(frames.frames), groups)) is not None
+    merged = merged_contacts(frames.named, places(len(frames.frames), groups))
+    if merged is None or frames.loops:
+        return False
+    contacts = [each for each in frames.named if each.rows]
+    owners = joints_of_rates(frames.frames)
+    q = [
+        value if frame.joint.nq > frame.joint.nv else 0.3 + 0.37 * k
+        for k, frame in enumerate(leading(frames.frames))
+        for value in frame.joint.neutral
+    ]
+    for group, limbs in enumerate(groups):
+        held = [contacts[each.numbers[0]] for each in merged if each.group == group]
+        rates = [rate for rate, joint in enumerate(owners) if joint in limbs[0]]
+        jacobian = contact_jacobian(frames.frames, held, q)
+        if not _are_independent([[row[rate] for rate in rates] for row in jacobian]):
+            return False
+    return True
+
+
+def _are_independent(rows: Sequence[Sequence[float]]) -> bool:
+    """Whether no row is a linear combination of the others, by the pivots of the products of rows."""
+    products = [[inner_product(a, b) for b in rows] for a in rows]
+    try:
+        pivots = factorize(products).pivots
+    except SingularMatrix:
+        return False
+    return all(pivot > 1e-9 * products[k][k] for k, pivot in enumerate(pivots))
 
 
 def has_columns(recipe: Recipe) -> bool:
@@ -337,6 +366,8 @@ class _Trace:
                 if any(found[Slot(THIN, (first + row) * wide + column)] != 0.0 for row in rows)
             ]
             whole = tuple(entries[row][1][limb] for limb in range(group.count) for row in rows)
+            if first and not used:
+                continue
             name = f"{group.vectors.name}_{'pushes' if first else 'shares'}"
             yield Shares(name, whole, tuple(used), bool(first))
 

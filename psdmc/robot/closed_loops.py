@@ -94,7 +94,12 @@ def _loop(
     problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:] if key not in table.table]
     first, second = (
         _frame(
-            table.read(key, as_it_is, {}), f"{table.where}: {key}", f"{name} {key}", frame_of, snap, problems
+            table.read(key, as_it_is, None),
+            f"{table.where}: {key}",
+            f"{name} {key}",
+            frame_of,
+            snap,
+            problems,
         )
         for key in LOOP_KEYS[2:]
     )
@@ -144,7 +149,8 @@ def _frame(
     snap: float,
     problems: list[str],
 ) -> NamedFrame:
-    table = CheckedTable({"link": value} if isinstance(value, str) else value, where, FRAME_KEYS, problems)
+    given = {"link": value} if isinstance(value, str) else {} if value is None else value
+    table = CheckedTable(given, where, FRAME_KEYS, problems)
     link = table.read("link", plain_text, "")
     turn = roll_pitch_yaw(table.read("rpy", triple_of(angle), (0.0, 0.0, 0.0)), snap)
     if "quaternion" in table.table:
@@ -153,7 +159,7 @@ def _frame(
         problems.append(f"{where}: rpy and quaternion are both given")
     place = Placement(turn, np.array(table.read("xyz", triple_of(LENGTH), (0.0, 0.0, 0.0))))
     if not link:
-        problems += [] if "link" in table.table or not table.table else [f"{where}: link is missing"]
+        problems += [] if "link" in table.table or value is None else [f"{where}: link is missing"]
         return NamedFrame(name, BASE, place, 0)
     own = frame_of(link)
     return NamedFrame(name, own.joint, own.placement @ place, 0)

@@ -111,10 +111,16 @@ def library_files(package: PackageView) -> dict[str, str]:
             )
         for kernel in function.kernels:
             own = not kernel.regions
-            bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body} if own else {}
+            bodies = (
+                {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body} if own else {}
+            )
             for file, body in bodies.items():
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
-            parts = {kernel.single_parts: kernel.single_body, kernel.lanes_parts: kernel.lanes_body} if own else {}
+            parts = (
+                {kernel.single_parts: kernel.single_body, kernel.lanes_parts: kernel.lanes_body}
+                if own
+                else {}
+            )
             for file, body in parts.items():
                 if body.parts:
                     files[f"src/{file}"] = render("parts.inc.jinja", body=body)
