@@ -193,7 +193,7 @@ class Signature:
                 one is not, the outputs are NaN and the function returns its number; none: the function cannot fail
     stages    how often the code factorises these matrices, one time after the other
     products  matrix products that compute outputs after the traced arithmetic, in C loops
-    thin      outputs (nv, nv) that are computed as factors if a robot has equal limbs, such as legs, and multiplied
+    thin      matrices that are computed as factors if a robot has equal limbs, such as legs, and multiplied
               last (thin_products.py)
     normalizes  whether quaternions in q may have any length but zero
     summary   one or two sentences on what it computes, for Python and the table of docs/functions.md

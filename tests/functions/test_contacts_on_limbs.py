@@ -23,7 +23,7 @@ from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.limb_program import unpacked
 from psdmc.program.signature import Sizes
-from psdmc.robot.load import LoadedRobot, load_robot
+from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.reference import reference
 
 Array = np.ndarray
@@ -153,3 +153,89 @@ def test_c_takes_the_dense_system_where_it_must(name: str) -> None:
     inputs[[each.name for each in signature.inputs].index("active")][2] = 0.5
     assert call(name, *inputs, *outputs.values()) == 1 + model.nv + 2
     assert all(np.isnan(found).all() for found in outputs.values())
+
+
+BODY = (
+    '<inertial><origin xyz="{place}"/><mass value="{mass}"/>'
+    '<inertia ixx="{i}" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+AXES = ("1 0 0", "0 1 0", "0 1 0", "0 0.6 0.8")
+
+
+def branches(*groups: tuple[str, int, int], follows: bool = False, planar: bool = False) -> LoadedRobot:
+    """A body with groups of equal limbs (name, joints, limbs). The last joint may follow the one before; in planar limbs all
+    axes are parallel. The limbs whose names begin with `leg` touch the world at their ends."""
+    text = [f'<robot name="r"><link name="body">{BODY.format(place="0.01 0 0.02", mass=8, i=0.2)}</link>']
+    feet = []
+    for name, joints, limbs in groups:
+        for limb in range(limbs):
+            parent = "body"
+            for k in range(joints):
+                link = f"{name}{limb}_{k}"
+                place = (
+                    f"{0.3 - 0.6 * (limb % 2)} {0.2 - 0.4 * (limb // 2)} 0.05" if k == 0 else "0 0.06 -0.25"
+                )
+                leader = f'<mimic joint="to_{name}{limb}_{k - 1}" multiplier="0.8" offset="0.1"/>'
+                leader = leader if follows and k == joints - 1 else ""
+                text.append(
+                    f'<link name="{link}">{BODY.format(place="0.01 0.02 -0.1", mass=1 + k, i=0.02)}</link>'
+                    f'<joint name="to_{link}" type="revolute"><parent link="{parent}"/><child link="{link}"/>'
+                    f'<origin xyz="{place}"/><axis xyz="{AXES[1] if planar else AXES[k]}"/>'
+                    f'<limit lower="-2" upper="2" effort="9" velocity="9"/>{leader}</joint>'
+                )
+                parent = link
+            feet.append(f"{name}{limb}_end")
+            text.append(
+                f'<link name="{feet[-1]}"/><joint name="to_{feet[-1]}" type="fixed"><parent link="{parent}"/>'
+                f'<child link="{feet[-1]}"/><origin xyz="0.02 0.01 -0.3"/></joint>'
+            )
+    contacts = [foot for foot in feet if foot.startswith("leg")]
+    return load_robot_text("".join(text) + "</robot>", "urdf", floating=True, contacts=contacts)
+
+
+@pytest.mark.parametrize(
+    ("joints", "options"), [(3, {"planar": True}), (3, {"follows": True}), (2, {})], ids=str
+)
+def test_limbs_that_cannot_hold_a_contact_alone(joints: int, options: dict[str, bool]) -> None:
+    """Parallel axes, a joint that follows another, and two joints: fewer than three directions."""
+    model = derive_model(branches(("leg", joints, 4), **options).mechanism, expand=False)
+    assert lower(model, functions=FUNCTIONS[2:3], theta_variants=False)[FUNCTIONS[2]].limbs is None
+
+
+def test_contacts_on_links_that_mimic() -> None:
+    """Four joints of three rates, against the code without limbs."""
+    model = derive_model(branches(("leg", 4, 4), follows=True).mechanism, expand=False)
+    given = given_to(model, FUNCTIONS[3])
+    kernel = lower(model, functions=FUNCTIONS[3:], theta_variants=False)[FUNCTIONS[3]]
+    assert kernel.limbs is not None
+    sizes = kernel.function.sizes(sizes_of(model))
+    found, expected = (
+        interpret(program, given, sizes) for program in (unpacked(kernel.limbs), kernel.single)
+    )
+    settled = (found["pivot"] > 0.0).all(axis=1)
+    assert settled.mean() > 0.5
+    for output in expected.keys() - {"pivot"}:
+        error, size = (
+            np.abs(each).max(axis=1) for each in (found[output] - expected[output], expected[output])
+        )
+        assert (error <= 1e-9 * size)[settled].all(), output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_group_without_contacts_in_c(name: str) -> None:
+    loaded = branches(("leg", 3, 2), ("arm", 2, 2))
+    model, signature = derive_model(loaded.mechanism, expand=False), RECIPES[name].signature
+    kernels = lower(model, functions=(name, *signature.calls), theta_variants=False)
+    assert kernels[name].limbs is not None
+    package = package_view(package_info(model, "two"), kernels, EmitOptions())
+    call, given = Direct(package, compiled(package, False)), given_to(model, name)
+    expected, sizes = RECIPES[name].pinocchio(reference(loaded), given), signature.sizes(sizes_of(model))
+    for row in range(COUNT):
+        outputs = {each.name: np.empty(sizes[each.name]) for each in signature.outputs}
+        assert (
+            call(name, *(given[each.name][row].copy() for each in signature.inputs), *outputs.values()) == 0
+        )
+        for output, found in outputs.items():
+            values = expected[output][row].ravel()
+            assert np.abs(found - values).max() <= 1e-8 * np.abs(values).max(), output

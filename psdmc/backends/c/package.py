@@ -248,6 +248,12 @@ class PackageView:
         return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self._all_kernels)
 
     @property
+    def has_calls_apart(self) -> bool:
+        """Return whether the code calls static functions that must not be inlined: parts of long functions, or a second
+        code for states that limbs (such as legs) in lanes cannot compute."""
+        return self.has_parts or any(each.limbs and each.limbs.checked for each in self._all_kernels)
+
+    @property
     def has_thin_products(self) -> bool:
         """Whether products follow some kernel's limbs."""
         return any(kernel.limbs and kernel.limbs.products for kernel in self.kernels)
