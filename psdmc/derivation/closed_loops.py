@@ -46,6 +46,11 @@ def require_closable(robot: Mechanism) -> None:
     """
     if not robot.loops:
         return
+    if len(robot.loops) > robot.nv:
+        raise InputError(
+            f"'{robot.name}': {len(robot.loops)} loops close a robot with {robot.nv} joint rates: some are redundant",
+            "describe each closed loop once; each one needs a rate of its own",
+        )
     unit = length_unit(robot)
     rows = [row for loop in robot.loops for row in loop.rows]
     scales = np.array([1.0 / unit if row < 3 else 1.0 for row in rows])

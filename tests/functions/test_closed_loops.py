@@ -199,6 +199,14 @@ def test_redundant_rows_are_named(tmp_path: Path, rows: object, lost: str, kept:
     assert kept in str(error.value.hint)
 
 
+def test_more_loops_than_rates_are_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "four_bar.urdf"
+    path.write_text(FOUR_BAR, encoding="utf-8")
+    loops = [PIN | {"name": f"pin{k}", "rows": ["x"]} for k in range(2000)]
+    with pytest.raises(InputError, match="2000 loops close a robot with 3 joint rates"):
+        psdmc.derive(path, loops=loops, expand=False)
+
+
 def test_what_cannot_be_assembled_or_holds_no_angle_is_refused(tmp_path: Path) -> None:
     far = {"link": "rocker", "xyz": [4.0, 0.0, 0.0]}
     with pytest.raises(
