@@ -520,6 +520,11 @@ def _emission(
         lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
     )
     shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    if estimator and law is not None:
+        raise InputError(
+            "an estimator beside friction in the dynamics: its torques contain no friction",
+            "write --friction, and subtract the torques of R_friction from those of the motors",
+        )
     if estimator:
         shown["estimator"] = estimator
     momenta = None if estimator is None else lower_estimator(model, estimator, costs)

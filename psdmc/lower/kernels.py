@@ -107,7 +107,7 @@ def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Ke
 
     kind  "mass" or "inertia": which parameters of a load the estimator finds
 
-    Raises InputError for another kind, for unknown base parameters, and for joints of several coordinates.
+    Raises InputError for another kind, unknown base parameters, closed loops, and joints of several coordinates.
     """
     robot = model.mechanism
     if kind not in LOADS:
@@ -115,6 +115,10 @@ def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Ke
     if model.theta_b is None:
         raise InputError(
             f"{robot.name}: no estimator: the base parameters are unknown", "calibrate the model first"
+        )
+    if robot.loops:
+        raise InputError(
+            f"{robot.name}: no estimator: it knows no forces of closed loops", "leave the loops out"
         )
     if robot.nq > robot.nv or not all(kind.about_z for kind in robot.types):
         raise InputError(

@@ -3,7 +3,6 @@ that have an internal state."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -42,6 +41,14 @@ def linear_friction(model: DynamicsModel) -> Friction:
     return _friction_of(model, model.joint_names)
 
 
+SLOWEST, FASTEST = 1e-9, 1e9
+"""rad/s or m/s: bounds of the smoothing speed."""
+
+
+def _is_speed(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and SLOWEST <= value <= FASTEST
+
+
 def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = None) -> FrictionInDynamics:
     """Return the friction that the model's calibration found, as a part of the dynamics. Joints of several coordinates,
     such as a floating base, and mimic joints have no friction of their own.
@@ -49,11 +56,12 @@ def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = N
     smoothing_speed  V in tanh(v / V), which replaces the sign of a joint's speed v; rad/s, or m/s for sliding joints.
                      None: the value of the calibration
 
-    Raises InputError as `linear_friction` does, and if the smoothing speed is not a positive number.
+    Raises InputError as `linear_friction` does, and if the smoothing speed is not a number within its bounds.
     """
-    if smoothing_speed is not None and not 0.0 < smoothing_speed < math.inf:
+    if smoothing_speed is not None and not _is_speed(smoothing_speed):
         raise InputError(
-            f"the smoothing speed is {smoothing_speed}, expected a positive number of rad/s", "such as 0.03"
+            f"the smoothing speed is {smoothing_speed!r}, expected a number of rad/s from {SLOWEST:g} to {FASTEST:g}",
+            "such as 0.03",
         )
     chain, name = model.mechanism, shown(model.mechanism.name)
     places: dict[str, tuple[int, int]] = {}

@@ -131,13 +131,16 @@ def merged_loops(found: Tables, given: Tables) -> tuple[Mapping[str, Any], ...]:
     """Return the tables of a file, with the keys that given tables of the same name replace, then the other given
     tables."""
     own = {table["name"]: dict(table) for table in found}
-    others = []
+    others, changed = [], set[str]()
     for table in given:
-        known = own.get(str(table.get("name")))
-        if known is None:
+        name = str(table.get("name"))
+        if (
+            name not in own or name in changed
+        ):  # a second table of the name is a fault, which closed_loops names
             others.append(table)
         else:
-            known.update(table)
+            own[name].update(table)
+            changed.add(name)
     return (*own.values(), *others)
 
 

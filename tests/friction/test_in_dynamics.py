@@ -406,7 +406,9 @@ def test_a_log_s_residual_is_its_noise(tmp_path: Path, capsys: pytest.CaptureFix
     [
         (("--friction=x",), "type --friction or --friction=in-dynamics"),
         (("--smoothing-speed", "0.1"), "add --friction=in-dynamics"),
-        (("--friction=in-dynamics", "--smoothing-speed", "0"), "expected a positive number of rad/s"),
+        (("--friction=in-dynamics", "--smoothing-speed", "0"), "expected a number of rad/s from 1e-09"),
+        (("--friction=in-dynamics", "--smoothing-speed", "1e-310"), "expected a number of rad/s from 1e-09"),
+        (("--friction=in-dynamics", "--estimator", "mass"), "write --friction, and subtract"),
         (("--friction=in-dynamics", "--trig", "freestanding"), "friction needs tanh, which is libm's"),
         (("--friction=in-dynamics", "--functions", f"{HESSIANS[0]}_packed"), f"emit {HESSIANS[0]}, or leave"),
     ],
@@ -426,6 +428,9 @@ def test_models_without_such_friction_are_refused() -> None:
     with pytest.raises(InputError, match="not calibrated"):
         psdmc.compile(bundled_model("scara"), friction=True)
     known = case("arm").model
+    for speed in ("0.1", [0.1], True, 10**400):
+        with pytest.raises(InputError, match="expected a number of rad/s"):
+            psdmc.compile(known, friction=True, smoothing_speed=speed)  # type: ignore[arg-type]
     assert known.calibrated is not None
     state = from_json(
         {"friction": [], "prediction": {"law": "lugre", "exponents": [1.0], "sign_speed": 0.03}}

@@ -199,6 +199,12 @@ def test_redundant_rows_are_named(tmp_path: Path, rows: object, lost: str, kept:
     assert kept in str(error.value.hint)
 
 
+def test_a_load_estimator_knows_no_loops(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it knows no forces of closed loops"):
+        psdmc.emit_c(four_bar(tmp_path), tmp_path / "package", functions="gravity", estimator="mass")
+    assert not (tmp_path / "package").exists()
+
+
 def test_more_loops_than_rates_are_refused_at_once(tmp_path: Path) -> None:
     path = tmp_path / "four_bar.urdf"
     path.write_text(FOUR_BAR, encoding="utf-8")

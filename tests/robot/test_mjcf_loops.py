@@ -112,6 +112,8 @@ def test_tables_change_constraints_by_name(tmp_path: Path) -> None:
     assert again.mechanism.rows_of_loops == ((0,),)
     more = load_robot(path, loops=[{"name": "other", "rows": 3, "first": "l1", "second": "r3"}])
     assert [loop.name for loop in more.mechanism.loops] == ["hook", "other"]
+    with pytest.raises(InputError, match="2 loops are called 'hook'"):
+        load_robot(path, loops=[{"name": "hook", "rows": ["x"]}, {"name": "hook", "rows": ["z"]}])
 
 
 def test_a_floating_robot_is_held_to_the_world(tmp_path: Path) -> None:
