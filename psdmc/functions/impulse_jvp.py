@@ -6,5 +6,5 @@ RECIPE = FUNCTION.along(
     356,
     "qd_after and impulses of an impact, and their derivatives along (dq, dqd_before)",
     "Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute the derivatives of "
-    "both along the direction (dq, dqd_before).",
+    "qd_after and impulses along the direction (dq, dqd_before): the inputs q and qd_before change together.",
 )

@@ -60,14 +60,15 @@ RECIPE = Recipe(
             Quantity(
                 "drift",
                 ("loop_rows",),
-                means=f"accelerations (m/s^2, rad/s^2). {ROW_WORDS}",
+                means="accelerations (m/s^2, rad/s^2) at constant qd of each loop's second frame seen from its first frame, "
+                f"{ROW_WORDS.format('entry')}",
                 unit="1/s^2",
                 powers=(1,),
             ),
         ),
         theta=False,
-        summary="Compute the product (dJ/dt) qd with the Jacobian J of the closed loops. Motions of the mechanism have "
-        "J qdd + (dJ/dt) qd = 0.",
+        summary="Compute the product (dJ/dt) qd with the Jacobian J of the closed loops. A motion that keeps the loops "
+        "closed has J qdd + (dJ/dt) qd = 0.",
     ),
     "loop drift",
     trace,
