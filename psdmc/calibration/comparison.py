@@ -45,7 +45,8 @@ def compare(
                       differ
     progress          function, such as print, that psdmc calls with the name of each stage
 
-    Raises InputError if a file is missing, the parameters of a model have no numerical values, or the models are of different robots.
+    Raises InputError if a file is missing, if the parameters of a model have no numerical values, or if the models are of
+    different robots.
     """
     progress("reading models")
     first = model_of(a)

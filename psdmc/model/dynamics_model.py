@@ -138,9 +138,9 @@ class DynamicsModel(Answers):
 
     @property
     def loops(self) -> dict[str, tuple[str, ...]]:
-        """Return a dictionary from the name of each closed loop to the directions of relative motion that the loop blocks:
-        'x', 'y' and 'z' along the axes of the loop's first frame, 'rx', 'ry' and 'rz' about them.
+        """Return a dictionary from each closed loop's name to the directions of relative motion that the loop blocks.
 
+        A direction is 'x', 'y' or 'z' (along an axis of the loop's first frame), or 'rx', 'ry' or 'rz' (about an axis).
         In arrays of contact forces, the entries of the loops come after those of the contacts, in the order of this
         dictionary.
         """
