@@ -1,4 +1,5 @@
-"""The drift of the closed loops: the accelerations of their closed rows at constant joint rates, dJ/dt qd."""
+"""The drift of the closed loops, dJ/dt qd: accelerations at constant joint rates, in the directions that the loops
+block."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Jacobian of the closed loops: the velocities of their closed rows per unit joint rate."""
+"""The Jacobian of the closed loops: velocities per unit joint rate, in the directions that the loops block."""
 
 from __future__ import annotations
 
