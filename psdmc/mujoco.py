@@ -44,11 +44,12 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
     The order of the joints can differ. Quaternions are x, y, z, w in q, and w, x, y, z in qpos.
 
     model     the model that q belongs to, or the path of its file
-    mj_model  MuJoCo's MjModel of the robot, whose joints have the names of the model's. Joints that only the MjModel has
-              get their values from its qpos0. None: MuJoCo has the joints of the model, in the model's order
+    mj_model  the robot's MjModel (MuJoCo's model). Its joints are matched with the joints of `model` by name. Joints
+              that `model` does not have get their values from qpos0 of the MjModel. None: MuJoCo has the same joints
+              as `model`, in the same order
 
-    Raises InputError if q has another shape, or if MuJoCo cannot have a joint of the model, such as a planar joint.
-    Raises InputError also if `mj_model` lacks a joint of the model.
+    Raises InputError if q has another shape, if `mj_model` lacks a joint of `model`, or if `model` has a joint that does
+    not exist in MuJoCo, such as a planar joint.
     """
     layout = _Layout.of("to_qpos", model, mj_model)
     values = layout.checked("q", q, layout.nq)

@@ -37,7 +37,7 @@ def compare(
 
     a                 a model, or the path of its file
     b                 another model of the robot, the path of its file, or the path of a robot file (URDF, MJCF, DH table)
-    logs              logs on which psdmc tests both models; at least one of them must then be calibrated
+    logs              logs on which psdmc tests both models; at least one of the models must then be calibrated
     torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the
                       models
     naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
@@ -45,7 +45,8 @@ def compare(
                       differ
     progress          function, such as print, that psdmc calls with the name of each stage
 
-    Raises InputError if a file is missing, a model has no values, or the models are of different robots.
+    Raises InputError if a file is missing, if the parameters of a model have no numerical values, or if the models are of
+    different robots.
     """
     progress("reading models")
     first = model_of(a)

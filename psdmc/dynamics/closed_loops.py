@@ -41,11 +41,11 @@ ANGULAR = 3
 def loop_error(
     frames: Sequence[Frame], loops: Sequence[Loop], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[Scalar]:
-    """Compute for each closed row how far its loop is from closed, along the axes of its first frame.
+    """Compute for each direction that a loop blocks how far the loop is from closed, along the axes of its first frame.
 
-    Rows 0 to 2 are the position of the second frame. The rows from 3 on are 2 tan(angle / 2) times the axis of a
-    rotation. If three of them are closed, or one, this is the rotation from the first frame to the second. If two are
-    closed, it is the smallest rotation that makes the two frames' third axes parallel.
+    Directions 0 to 2 have the position of the second frame. Directions 3 to 5 have 2 tan(angle / 2) times the axis of a
+    rotation. If the loop blocks one or three of them, this is the rotation from the first frame to the second. If it
+    blocks two, this is the smallest rotation that makes the two frames' axes of the third direction parallel.
     """
     found: list[Scalar] = []
     for loop in loops:
@@ -76,7 +76,7 @@ def _angles(rows: Sequence[int], turn: Matrix) -> list[Scalar]:
 def loop_jacobian(
     frames: Sequence[Frame], loops: Sequence[Loop], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[Scalar]]:
-    """Compute the Jacobian of all closed rows, nv entries each: the loops' velocities per unit joint rate."""
+    """Compute the Jacobian of all loops, one row of nv entries per blocked direction: velocities per unit joint rate."""
     found: list[list[Scalar]] = []
     nv = sum(frame.joint.nv for frame in frames)
     for loop in loops:
@@ -98,7 +98,7 @@ def loop_drift(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[Scalar]:
-    """Compute the accelerations of all closed rows at constant joint rates, the product dJ/dt qd.
+    """Compute the accelerations in all directions that loops block, at constant joint rates: the product dJ/dt qd.
 
     They are R^T (a2 - a1 - z1 x d - w1 x (w1 x d) - 2 w1 x u) and R^T (z2 - z1 - w1 x w), with the accelerations a of the
     origins, the angular accelerations z, and the velocity (u, w) of the second frame seen from the first one.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from psdmc.dynamics import closed_loops, contacts
@@ -60,6 +62,10 @@ FORCES = Quantity(
     "A point has a force (N); a surface has a force and then a moment (N m) about the contact's origin",
     unit="J",
     powers=(-1,),
+)
+OF_LOOPS = (
+    "Then come the forces (N) and moments (N m) that keep the closed loops closed: loop_rows entries, along and about the "
+    "axes of each loop's first frame; none without closed loops"
 )
 
 
@@ -182,7 +188,7 @@ RECIPE = Recipe(
         "J qdd + dJ/dt qd + kd J qd + kp error + mu forces = 0 for each active contact, and forces = 0 for each other one; "
         "active is 0 or 1 for each contact, mu is not negative",
         (Q, QD, TAU, ACTIVE, MU, KP, KD, ERROR),
-        (QDD, FORCES),
+        (QDD, replace(FORCES, means=f"first {FORCES.means}. {OF_LOOPS}")),
         theta=True,
         summary="Compute the joint accelerations and the contact forces that torques cause. The active contacts "
         "accelerate by -kp * error - kd * J qd - mu * forces, with the Jacobian J of the contacts. This is 0 by default.",

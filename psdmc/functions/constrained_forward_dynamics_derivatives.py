@@ -225,10 +225,11 @@ RECIPE = Recipe(
         "qdd and forces of constrained_forward_dynamics, and their derivatives by q, qd, tau and error; row i: derivatives "
         "of qdd[i] or forces[i]; those by q hold error constant",
         WITHOUT.signature.inputs,
-        (*WITHOUT.signature.outputs, *BLOCKS),
+        (QDD, FORCES, *BLOCKS),
         theta=True,
         summary="Compute the joint accelerations and the contact forces that torques cause. Also compute the "
-        "derivatives of both by q, qd, tau and error. The derivatives by q hold error constant.",
+        "derivatives of qdd and forces by q, qd, tau and error. The input `error` is the displacement of the "
+        "contacts. The derivatives by q treat `error` as an independent input.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, FREE.name),
         thin=thin_blocks("qdd", "forces", ("q", "qd", "tau", "error")),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
 from psdmc.functions import constrained_forward_dynamics
+from psdmc.functions.constrained_forward_dynamics import FORCES
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, Signature
 from psdmc.recipes.contact_derivatives import Counts
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 ACCELERATIONS = constrained_forward_dynamics.RECIPE
 Q, QD, TAU, *HELD = ACCELERATIONS.signature.inputs
-QDD, FORCES = ACCELERATIONS.signature.outputs
 
 
 def trace(g: Ingredients) -> Outputs:

@@ -36,7 +36,8 @@ LINEAR = 3
 
 MU = replace(
     held.MU,
-    means="regularisation, 0 or more: the weight of the squared contact forces (N; N m) in the least squares",
+    means="regularisation (not a friction coefficient), 0 or more: the weight of the squared contact forces (N; N m) in the "
+    "least squares",
     unit="1",
 )
 

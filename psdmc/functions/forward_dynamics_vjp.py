@@ -61,8 +61,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, COTANGENT_OF_QDD),
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
-        summary="Compute the accelerations qdd of forward dynamics. Also compute the gradients by q, qd and tau of a "
-        "weighted sum of qdd. The weighted sum is the sum of cotangent[i] * qdd[i].",
+        summary="Compute the accelerations qdd of forward dynamics. Also compute gradients, by q, qd and tau, of a "
+        "weighted sum of qdd's entries. The weighted sum is the sum of cotangent[i] * qdd[i].",
         factorises=(MASS_MATRIX,),
     ),
     "gradient of forward dynamics",

@@ -35,8 +35,8 @@ RECIPE = with_parameter_gradient(
     STATE,
     186,
     "qdd, and the gradient of cotangent . qdd by q, qd, tau and theta_b",
-    "Compute the accelerations qdd of forward dynamics. Also compute the gradients by q, qd, tau and theta_b of a "
-    "weighted sum of qdd. The weighted sum is the sum of cotangent[i] * qdd[i].",
+    "Compute the accelerations qdd of forward dynamics. Also compute gradients, by q, qd, tau and theta_b, of a "
+    "weighted sum of qdd's entries. The weighted sum is the sum of cotangent[i] * qdd[i].",
     trace,
     reference,
     pinocchio,

@@ -57,8 +57,9 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.inputs, COTANGENT_OF_QDD),
         (*ACCELERATIONS.signature.outputs, *GRADIENTS),
         theta=True,
-        summary="Compute the accelerations qdd that torques cause under external wrenches. Also compute gradients by "
-        "q, qd, tau and wrenches of a weighted sum of qdd. The weighted sum is the sum of cotangent[i] * qdd[i].",
+        summary="Compute accelerations qdd that torques cause under external wrenches. Also compute gradients, by "
+        "q, qd, tau and wrenches, of a weighted sum of qdd's entries. The weighted sum is the sum of cotangent[i] "
+        "* qdd[i].",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "gradient of forward dynamics with wrenches",

@@ -46,8 +46,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, COTANGENT),
         (TAU, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD),
         theta=True,
-        summary="Compute the torques tau of inverse dynamics. Also compute the gradients by q, qd and qdd of a "
-        "weighted sum of tau. The weighted sum is the sum of cotangent[i] * tau[i].",
+        summary="Compute the torques tau of inverse dynamics. Also compute gradients, by q, qd and qdd, of a "
+        "weighted sum of tau's entries. The weighted sum is the sum of cotangent[i] * tau[i].",
     ),
     "gradient of inverse dynamics",
     trace,

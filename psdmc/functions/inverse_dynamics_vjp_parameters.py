@@ -38,8 +38,8 @@ RECIPE = with_parameter_gradient(
     STATE,
     182,
     "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
-    "Compute the torques tau of inverse dynamics. Also compute the gradients by q, qd, qdd and theta_b of a weighted "
-    "sum of tau. The weighted sum is the sum of cotangent[i] * tau[i].",
+    "Compute the torques tau of inverse dynamics. Also compute gradients, by q, qd, qdd and theta_b, of a weighted "
+    "sum of tau's entries. The weighted sum is the sum of cotangent[i] * tau[i].",
     trace,
     reference,
     pinocchio,

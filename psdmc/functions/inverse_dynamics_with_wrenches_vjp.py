@@ -43,8 +43,8 @@ RECIPE = Recipe(
         (*TORQUES.signature.inputs, COTANGENT),
         (*TORQUES.signature.outputs, *GRADIENTS),
         theta=True,
-        summary="Compute the torques tau of a motion under external wrenches. Also compute gradients by q, qd, qdd "
-        "and wrenches of a weighted sum of tau. The weighted sum is the sum of cotangent[i] * tau[i].",
+        summary="Compute torques tau of a motion under external wrenches. Also compute gradients, by q, qd, qdd "
+        "and wrenches, of a weighted sum of tau's entries. The weighted sum is the sum of cotangent[i] * tau[i].",
     ),
     "gradient of inverse dynamics with wrenches",
     trace,

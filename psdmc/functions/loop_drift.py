@@ -1,4 +1,5 @@
-"""The drift of the closed loops: the accelerations of their closed rows at constant joint rates, dJ/dt qd."""
+"""The drift of the closed loops, dJ/dt qd: accelerations at constant joint rates, in the directions that the loops
+block."""
 
 from __future__ import annotations
 
@@ -60,14 +61,15 @@ RECIPE = Recipe(
             Quantity(
                 "drift",
                 ("loop_rows",),
-                means=f"accelerations (m/s^2, rad/s^2). {ROW_WORDS}",
+                means="accelerations (m/s^2, rad/s^2) at constant qd of each loop's second frame seen from its first frame, "
+                f"{ROW_WORDS.format('entry')}",
                 unit="1/s^2",
                 powers=(1,),
             ),
         ),
         theta=False,
-        summary="Compute the product (dJ/dt) qd with the Jacobian J of the closed loops. Motions of the mechanism have "
-        "J qdd + (dJ/dt) qd = 0.",
+        summary="Compute the product (dJ/dt) qd with the Jacobian J of the closed loops. A motion that keeps the loops "
+        "closed has J qdd + (dJ/dt) qd = 0.",
     ),
     "loop drift",
     trace,

@@ -57,14 +57,16 @@ RECIPE = Recipe(
             Quantity(
                 "error",
                 ("loop_rows",),
-                means=f"{ROW_WORDS}. Linear rows are a displacement (m); angular rows are 2 tan(angle / 2) times the "
-                "axis of rotation, which is close to the rotation vector (rad)",
+                means="displacement of each loop's second frame from its first frame, "
+                f"{ROW_WORDS.format('entry')}. A linear entry is in m. The angular entries are 2 tan(angle / 2) times "
+                "the axis of the rotation, which is close to the rotation vector (rad)",
                 unit="1",
                 powers=(1,),
             ),
         ),
         theta=False,
-        summary="Compute how far the closed loops of a mechanism are from closed.",
+        summary="Compute how far the closed loops of a mechanism are from closed. A closed loop keeps two frames together; "
+        "the result is the displacement between the frames in the directions that the loop blocks.",
     ),
     "loop error",
     trace,

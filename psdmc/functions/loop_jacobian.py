@@ -1,4 +1,4 @@
-"""The Jacobian of the closed loops: the velocities of their closed rows per unit joint rate."""
+"""The Jacobian of the closed loops: velocities per unit joint rate, in the directions that the loops block."""
 
 from __future__ import annotations
 
@@ -60,13 +60,14 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("loop_rows", "nv"),
-                means=f"Jacobian. Its column j is for qd[j]. {ROW_WORDS}",
+                means="Jacobian: J qd is the velocity of each loop's second frame seen from its first frame, "
+                f"{ROW_WORDS.format('row')}. Column j is for qd[j]",
                 unit="1",
                 powers=(1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of the closed loops. Motions of the mechanism have J qd = 0.",
+        summary="Compute the Jacobian J of the closed loops. A motion that keeps the loops closed has J qd = 0.",
     ),
     "loop Jacobian",
     trace,

@@ -138,9 +138,11 @@ class DynamicsModel(Answers):
 
     @property
     def loops(self) -> dict[str, tuple[str, ...]]:
-        """Return, by name of closed loop, the rows that it closes: 'x', 'y', 'z', 'rx', 'ry' or 'rz'.
+        """Return a dictionary from each closed loop's name to the directions of relative motion that the loop blocks.
 
-        The forces of loops follow those of contacts, in the order of this dictionary.
+        A direction is 'x', 'y' or 'z' (along an axis of the loop's first frame), or 'rx', 'ry' or 'rz' (about an axis).
+        In arrays of contact forces, the entries of the loops come after those of the contacts, in the order of this
+        dictionary.
         """
         return {
             name: tuple(ROW_NAMES[row] for row in rows)
@@ -200,18 +202,18 @@ class DynamicsModel(Answers):
         """Return, for each of the l base parameters, the index of its pivot in the vector of standard parameters, (11n,).
 
         Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. A base
-        parameter is a linear combination of standard parameters. Its pivot is the first standard parameter that has the
-        coefficient 1 in it and is in no other base parameter.
+        parameter is a linear combination of standard parameters. Its pivot is the first standard parameter that appears
+        in that base parameter only, with the coefficient 1.
         """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """True if each base parameter has a pivot, as in every model that psdmc derives.
+        """Return whether every base parameter has a pivot. In every model that psdmc derives, this is true.
 
         A base parameter is a linear combination of standard parameters (masses, first moments and inertias of links).
-        Its pivot is a standard parameter that has the coefficient 1 in it, and is in no other base parameter. The
-        attribute `pivots` lists the pivots.
+        A pivot of a base parameter is a standard parameter that appears in that base parameter only, with the
+        coefficient 1. The attribute `pivots` lists the pivots.
         """
         return bool(self._leads.any(axis=1).all())
 

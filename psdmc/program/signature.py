@@ -326,10 +326,15 @@ TAU = Quantity(
 )
 """Those of q, qd and qdd if states are drawn."""
 
+SMALL_CHANGE = (
+    "Here x is a small change of q, with nv numbers: x moves a joint with one coordinate by x[j], and a ball joint or "
+    "floating base along and about its own axes"
+)
+"""What x is in integrate(q, x)."""
+
 OF_Q = (
     "q[j]. If the robot has a ball joint or a floating base, q is replaced by integrate(q, x), and the derivative is by "
-    "x[j] at x = 0. Here x moves a joint with one coordinate by x[j], and a ball joint or floating base along and about "
-    "its own axes"
+    f"x[j] at x = 0. {SMALL_CHANGE}"
 )
 """What an entry of a derivative by q belongs to."""
 

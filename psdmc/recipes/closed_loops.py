@@ -12,7 +12,10 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-ROW_WORDS = "The rows are those that the loops close: linear ones (x, y, z), then angular ones (rx, ry, rz), loop by loop"
+ROW_WORDS = (
+    "along and about the axes of the loop's first frame. There is one {} for each blocked direction, loop by loop: linear "
+    "directions (x, y, z), then angular ones (rx, ry, rz)"
+)
 
 
 def of_loops(robot: Reference, values: Callable[[int, int, tuple[int, ...]], Array]) -> Array:

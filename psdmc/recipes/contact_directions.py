@@ -48,7 +48,7 @@ class ContactFunction:
     @property
     def outputs(self) -> tuple[Quantity, ...]:
         """The motion and the contact forces."""
-        return self.values.signature.outputs
+        return self.derivatives.signature.outputs[:2]
 
     @property
     def weights(self) -> tuple[Quantity, ...]:
@@ -100,7 +100,7 @@ class ContactFunction:
                 order,
                 meaning,
                 (*required, *inputs, *optional),
-                (*signature.outputs, *outputs),
+                (*self.outputs, *outputs),
                 theta=True,
                 summary=summary,
                 factorises=signature.factorises,

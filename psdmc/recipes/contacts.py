@@ -40,8 +40,8 @@ MU = Quantity(
     "mu",
     largest=1.0,
     least=0.1,
-    means="regularisation, 0 or more: added to the diagonal of J M^-1 J^T, with the Jacobian J and the mass matrix M; "
-    "unit 1/kg in linear rows, 1/(kg m^2) in angular rows",
+    means="regularisation (not a friction coefficient), 0 or more: added to the diagonal of J M^-1 J^T, with the Jacobian "
+    "J and the mass matrix M; unit 1/kg in linear rows, 1/(kg m^2) in angular rows",
     unit="1/kg",
     default=0.0,
 )

@@ -14,7 +14,7 @@ from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program import dimensions
 from psdmc.program.replay import substituted
-from psdmc.program.signature import OF_Q, QD, QDD, TAU, Q, Quantity, Signature
+from psdmc.program.signature import OF_Q, QD, QDD, SMALL_CHANGE, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
@@ -73,7 +73,7 @@ def hessian_of(last: Quantity, axis: str) -> Quantity:
     means = (
         "symmetric matrix of the second derivatives of the weighted sum. The first nv rows and columns are for q, the next "
         f"nv for qd, the last nv for {last.name}. If the robot has a ball joint or a floating base, q is replaced by "
-        "integrate(q, x), and the first nv are for x at x = 0"
+        f"integrate(q, x), and the first nv are for x at x = 0. {SMALL_CHANGE}"
     )
     return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
 

@@ -114,9 +114,11 @@ class RobotFacts:
 
     @property
     def loops(self) -> dict[str, tuple[str, ...]]:
-        """Return, by name of closed loop, the rows that it closes: 'x', 'y', 'z', 'rx', 'ry' or 'rz'.
+        """Return a dictionary from each closed loop's name to the directions of relative motion that the loop blocks.
 
-        The forces of loops follow those of contacts, in the order of this dictionary.
+        A direction is 'x', 'y' or 'z' (along an axis of the loop's first frame), or 'rx', 'ry' or 'rz' (about an axis).
+        In arrays of contact forces, the entries of the loops come after those of the contacts, in the order of this
+        dictionary.
         """
         return {name: tuple(ROW_NAMES[row] for row in rows) for name, rows in self._interface.loops}
 

@@ -8,8 +8,8 @@ import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
-from psdmc.functions import SIGNATURES
-from psdmc.program.signature import Quantity, Signature
+from psdmc.functions import SIGNATURES, recipe_of
+from psdmc.program.signature import SMALL_CHANGE, Quantity, Signature
 
 STUB = Path(__file__).with_name("call.pyi")
 MODEL = Path(__file__).parents[1] / "model"
@@ -77,8 +77,11 @@ def documentation(function: Signature) -> str:
     made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
     axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
     axes |= {"l"} if function.theta else set()
+    closes = recipe_of(function.name).closes
+    axes |= {"contact_rows", *(("loop_rows",) if closes else ())} if "constraint_rows" in axes else set()
+    sizes = _SIZES if closes else {**_SIZES, "constraint_rows": _WITHOUT_LOOPS}
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
-    lengths = [(size, meaning) for size, meaning in _SIZES.items() if size in {*axes, *lead}]
+    lengths = [(size, meaning) for size, meaning in sizes.items() if size in {*axes, *lead}]
     parts = [_rows(given), returned, _rows(made), *_failures(function), "In these shapes:", _rows(lengths)]
     return "\n\n".join([function.summary, *parts])
 
@@ -87,18 +90,24 @@ _SIZES = {
     "...": "batch axes, if the call computes many states; none for one state",
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
-    "nx": "2 nv: the first nv for q, the last nv for qd. If the robot has a ball joint or a floating base, q is replaced by "
-    "integrate(q, x), and the first nv are for x at x = 0",
+    "nx": "2 nv, the length of a small change of the state: the first nv for q, the last nv for qd. If the robot has a "
+    "ball joint or a floating base, q is replaced by integrate(q, x), and the first nv are for x at x = 0. "
+    f"{SMALL_CHANGE}",
     "nxa": "3 nv: nv for q, nv for qd and nv for qdd",
     "nxu": "3 nv: nv for q, nv for qd and nv for tau",
     "l": "number of base parameters, the entries of theta_b",
     "frames": "number of named frames; `frame_names` lists them",
     "contacts": "number of contacts: links or frames that can touch the world; `contacts` lists them",
     "contact_rows": "number of rows of all contacts: 3 for each point, 6 for each surface, in the order of `contacts`",
-    "loop_rows": "number of rows of all closed loops, in the order of `loops`",
-    "constraint_rows": "contact_rows + loop_rows: the rows of all contacts, then those of all closed loops",
+    "loop_rows": "number of directions that all closed loops block, in the order of `loops`; 0 without closed loops",
+    "constraint_rows": "contact_rows + loop_rows: first the rows of all contacts, then those of all closed loops",
     "nonzeros": "number of matrix entries that can differ from zero",
 }
+
+_WITHOUT_LOOPS = (
+    "here equal to contact_rows, because psdmc does not generate this function for robots with "
+    "closed loops yet"
+)
 
 
 def _failures(function: Signature) -> list[str]:
