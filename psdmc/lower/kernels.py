@@ -183,7 +183,11 @@ class _Lowered:
     """One model's programs. Functions that run the same recursion share one search."""
 
     def __init__(
-        self, model: DynamicsModel, lowering: Lowering, costs: Costs, friction: FrictionInDynamics | None
+        self,
+        model: DynamicsModel,
+        lowering: Lowering,
+        costs: Costs,
+        friction: FrictionInDynamics | None = None,
     ) -> None:
         self.model, self.lowering, self.costs, self.friction = model, lowering, costs, friction
         self.single, self.batch = for_one_state(costs), for_lanes(costs)

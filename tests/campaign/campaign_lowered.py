@@ -68,7 +68,7 @@ def _lowered_once() -> Iterator[None]:
     do it anew, three times a robot."""
     first: dict[int, kernels._Lowered] = {}
 
-    def lowered(model: DynamicsModel, lowering: Lowering, costs: Costs) -> kernels._Lowered:
+    def lowered(model: DynamicsModel, lowering: Lowering, costs: Costs, _: None = None) -> kernels._Lowered:
         one = _LOWERED(model, lowering, costs)
         known = first.setdefault(id(model), one)
         if known.costs == costs:

@@ -246,7 +246,7 @@ def compared(name: str, expected: dict[str, Array], found: dict[str, Array], lim
 WITHOUT_STEPS = tuple(
     name
     for name in MOTORS
-    if not any(word in name for word in ("euler", "rk4", "wrenches", "constrained", "second"))
+    if not any(word in name for word in ("euler", "rk4", "wrenches", "constrained", "contact", "second"))
 )
 """What Pinocchio can say of a robot with a mimic joint."""
 

@@ -56,7 +56,9 @@ MOVES = ("neutral", "integrate", "difference", "tangent_map")
 
 def program_text(package: PackageView) -> str:
     """C: calls every function CALLS times at random states of a size that the command line gives."""
-    sizes = {q.name: q.size for kernel in package.kernels for q in (*kernel.inputs, *kernel.outputs)}
+    sizes: dict[str, int] = {}
+    for vector in (each for kernel in package.kernels for each in (*kernel.inputs, *kernel.outputs)):
+        sizes[vector.name] = max(vector.size, sizes.get(vector.name, 0))
     lines = ["#include <stdlib.h>", f"#include <{package.robot}/{package.robot}.h>", ""]
     lines += [f"static double {name}[{size}];" for name, size in sizes.items()]
     lines += [

@@ -155,9 +155,9 @@ def test_lowering_is_given_the_targets_costs(
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
     given: list[Costs] = []
 
-    def recorded(*arguments: Any, costs: Costs = COSTS) -> dict[str, Kernel]:
+    def recorded(*arguments: Any, costs: Costs = COSTS, **further: Any) -> dict[str, Kernel]:
         given.append(costs)
-        return lower(*arguments, costs=costs)
+        return lower(*arguments, costs=costs, **further)
 
     monkeypatch.setattr(compiler, "lower", recorded)
     for name in ("native", "cortex-m4f"):

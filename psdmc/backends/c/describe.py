@@ -49,7 +49,7 @@ def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str
     headings = [name for term in law.terms for name in term.names]
     return (
         "Friction in the dynamics: tau are the torques of the motors, M(q) qdd + h(q, qd) + friction (N m; N if sliding).",
-        "Friction is positive where the motor must push in the positive direction: Coulomb and viscous friction have the",
+        "Friction is positive where the motor must push in the positive direction. Friction that brakes has the",
         f"sign of the joint's rate v (rad/s; m/s if sliding). With s = tanh(v / {law.sign_speed!r}), a smooth sign, it is",
         f"  {law.formula}",
         f"Values per joint ({', '.join(headings)}):",
