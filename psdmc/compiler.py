@@ -522,7 +522,7 @@ def _emission(
     shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     if estimator and law is not None:
         raise InputError(
-            "an estimator beside friction in the dynamics: its torques contain no friction",
+            "an estimator cannot have friction in the dynamics: its torques contain no friction",
             "write --friction, and subtract the torques of R_friction from those of the motors",
         )
     if estimator:

@@ -49,7 +49,7 @@ def require_closable(robot: Mechanism) -> None:
     if len(robot.loops) > robot.nv:
         raise InputError(
             f"'{robot.name}': {len(robot.loops)} loops close a robot with {robot.nv} joint rates: some are redundant",
-            "describe each closed loop once; each one needs a rate of its own",
+            "describe each closed loop once; a robot has at most one loop per rate",
         )
     unit = length_unit(robot)
     rows = [row for loop in robot.loops for row in loop.rows]
