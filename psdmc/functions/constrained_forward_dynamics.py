@@ -101,8 +101,8 @@ def of_limbs(
     trunk  the axes along which the Jacobian is; None: those of the base
     """
     qd, error = g.inputs["qd"], g.inputs[ERROR.name]
-    (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
-    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
+    (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
+    mask = Held.of(g)
     on, shift, one = mask.rows
     arrow, margins = eliminated_with_forces(g.frames, mass, rows, on, shift, one)
     q, errors = (g.inputs["q"], error) if trunk is None else (trunk.q, trunk.rows_along(error))
@@ -117,7 +117,7 @@ def of_limbs(
 def solved(g: Ingredients) -> Solved:
     """Return the solution with a sign for each contact, the factors of the mass matrix, and the contact Jacobian."""
     q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
-    (mu,), (kp,), (kd,) = (g.inputs[each.name] for each in (MU, KP, KD))
+    (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     bias = torques(g, qd, g.still, g.base_acceleration)
     rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
@@ -132,7 +132,7 @@ def solved(g: Ingredients) -> Solved:
         for own, row, error in zip(drifts, rows, errors, strict=True)
     ]
     load = [given - h for given, h in zip(tau, bias, strict=True)]
-    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si, g.loops)
+    mask = Held.of(g, g.loops)
     return *mask.solved(factors, rows, load, wanted), factors, rows
 
 

@@ -37,7 +37,7 @@ from psdmc.recipes.contact_derivatives import (
     thin_blocks,
     thin_outputs,
 )
-from psdmc.recipes.contacts import ACTIVE, MU, Held
+from psdmc.recipes.contacts import Held
 from psdmc.recipes.loops import Block, copied
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torque_derivatives
@@ -56,13 +56,12 @@ def trace(g: Ingredients) -> Outputs:
         return _in_limbs(g)
     found, signs, factors, jacobian = constrained_forward_dynamics.solved(g)
     q, qd = g.inputs["q"], g.inputs["qd"]
-    (kp,), (kd,), (mu,) = (g.inputs[each.name] for each in (KP, KD, MU))
+    (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
     slopes = torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
     by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
-    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
-    own = response(inverse(factors), jacobian, mask.compliance(found.factors))
+    own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
     loads = (
         [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)],
         [[-x for x in row] for row in slopes.by_qd],

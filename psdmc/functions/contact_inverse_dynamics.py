@@ -19,7 +19,7 @@ from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature
 from psdmc.recipes import contacts as held
-from psdmc.recipes.contacts import ACTIVE, Held
+from psdmc.recipes.contacts import ACTIVE, Held, active_rows
 from psdmc.recipes.least_squares import least_squares
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -56,16 +56,16 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 def trace(g: Ingredients) -> Outputs:
-    (mu,) = g.inputs[MU.name]
     without = torques(g, g.inputs["qd"], g.inputs["qdd"], g.base_acceleration)
     rows = contacts.contact_jacobian(g.frames, g.named, g.inputs["q"], g.root)
-    return _values(g.frames, without, rows, Held(g.named, g.inputs[ACTIVE.name], mu, g.si))
+    return _values(g.frames, without, rows, Held.of(g))
 
 
 def _values(frames: Sequence[Frame], without: Sequence[Scalar], jacobian: Rows, mask: Held) -> Outputs:
     forces = _forces(without, jacobian, mask) if has_free_root(frames) else [0.0] * len(jacobian)
     turned = zip(*jacobian, strict=True)
     tau = [own - inner_product(column, forces) for own, column in zip(without, turned, strict=True)]
+    # NaN is no mu: all comparisons with it are false.
     signs = [Op.SELECT(-1.0, mask.mu, sign, -1.0) for sign in mask.allowed()]
     return {TAU.name: tau, FORCES.name: forces, PIVOTS: signs}
 
@@ -94,7 +94,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     without = list(robot.torques(q, qd, qdd, robot.base_acceleration).T)
     rows = contacts.contact_jacobian(robot.frames, robot.chain.frames, list(q.T))
-    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    mask = Held.on_arrays(robot, given)
     found = _values(robot.frames, without, rows, mask)
     return {name: columns(values, len(q)) for name, values in found.items()}
 
@@ -102,7 +102,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     tau = robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
-    masks = np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
+    masks = active_rows(robot, given)
     forces = np.zeros(masks.shape)
     if robot.model.joints[1].shortname() == "JointModelFreeFlyer":
         for k, (own, on, mu) in enumerate(zip(jacobian, masks, np.reshape(given[MU.name], -1), strict=True)):

@@ -14,7 +14,7 @@ from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.functions import delassus
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
-from psdmc.recipes.contacts import ACTIVE, CONTACTS, MU, ROW_WORDS, Held
+from psdmc.recipes.contacts import ACTIVE, CONTACTS, MU, ROW_WORDS, Held, active_rows
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    (mu,), q = g.inputs[MU.name], g.inputs["q"]
+    q = g.inputs["q"]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
-    return _values(factors, rows, Held(g.named, g.inputs[ACTIVE.name], mu, g.si))
+    return _values(factors, rows, Held.of(g))
 
 
 def _values(factors: Factors, jacobian: Sequence[Sequence[Scalar]], mask: Held) -> Outputs:
@@ -42,7 +42,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, count = list(given["q"].T), len(given["q"])
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     rows = contacts.contact_jacobian(robot.frames, robot.chain.frames, q)
-    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    mask = Held.on_arrays(robot, given)
     with np.errstate(all="ignore"):
         found = _values(factorize([list(row) for row in mass]), rows, mask)
         return {name: entries(value, count) for name, value in found.items()}
@@ -50,7 +50,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     found = delassus.RECIPE.pinocchio(robot, given)["D"]
-    masks = np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
+    masks = active_rows(robot, given)
     for matrix, on, mu in zip(found, masks, np.reshape(given[MU.name], -1), strict=True):
         own = np.ix_(on, on)
         inverse = np.linalg.inv(matrix[own] + mu * np.eye(on.sum()))

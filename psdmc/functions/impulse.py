@@ -74,8 +74,8 @@ def of_limbs(
 ) -> tuple[list[Scalar], list[Scalar], list[Scalar], Arrow]:
     """Return the change of the rates, the impulses, the pivots and signs, and the elimination limb by limb, from the mass
     matrix and the contact Jacobian."""
-    (mu,), (restitution,) = g.inputs[MU.name], g.inputs[RESTITUTION.name]
-    mask, count = Held(g.named, g.inputs[ACTIVE.name], mu, g.si), len(g.still)
+    (restitution,) = g.inputs[RESTITUTION.name]
+    mask, count = Held.of(g), len(g.still)
     on, shift, one = mask.rows
     arrow, margins = eliminated_with_forces(g.frames, mass, rows, on, shift, one)
     before = g.inputs[BEFORE.name]
@@ -100,12 +100,11 @@ def solved(g: Ingredients) -> Solved:
     """Return the change of the rates and the impulses with a sign for each contact, the factors of the mass matrix, and
     the contact Jacobian."""
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
-    (mu,), (restitution,) = g.inputs[MU.name], g.inputs[RESTITUTION.name]
+    (restitution,) = g.inputs[RESTITUTION.name]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
     wanted = [-(1.0 + restitution) * inner_product(row, before) for row in rows]
-    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
-    return *mask.solved(factors, rows, g.still, wanted), factors, rows
+    return *Held.of(g).solved(factors, rows, g.still, wanted), factors, rows
 
 
 def _within(restitution: Any, sign: Any) -> Any:

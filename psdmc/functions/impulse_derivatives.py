@@ -40,7 +40,7 @@ from psdmc.recipes.contact_derivatives import (
     thin_blocks,
     thin_outputs,
 )
-from psdmc.recipes.contacts import ACTIVE, MU, Held
+from psdmc.recipes.contacts import Held
 from psdmc.recipes.loops import Block, Product, added, filled, one_more
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.robot.mechanism import Array, NamedFrame
@@ -60,13 +60,12 @@ def trace(g: Ingredients) -> Outputs:
         return _in_limbs(g)
     found, _, factors, jacobian = impulse.solved(g)
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
-    (restitution,), (mu,) = (g.inputs[each.name] for each in (RESTITUTION, MU))
+    (restitution,) = g.inputs[RESTITUTION.name]
     slopes = _torque_derivatives(g, found.motion)
     turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
     seen = [x + (1.0 + restitution) * rate for x, rate in zip(found.motion, before, strict=True)]
     by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
-    mask = Held(g.named, g.inputs[ACTIVE.name], mu, g.si)
-    own = response(inverse(factors), jacobian, mask.compliance(found.factors))
+    own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
     load = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)]
     rates_q, impulses_q = changed(own, load, [[-x for x in row] for row in by_q])
     nothing = [[0.0] * len(before) for _ in before]
@@ -87,7 +86,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     turn = pushed_slopes_of_limbs(g.frames, g.named, q, impulses, g.root)
     seen = [x + (1.0 + restitution) * rate for x, rate in zip(change, before, strict=True)]
     by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
-    on = Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si).rows[0]
+    on = Held.of(g).rows[0]
     loads = [
         [x - y for x, y in zip(*rows, strict=True)]
         for rows in zip(_torque_derivatives(g, change).by_q, turn, strict=True)

@@ -213,7 +213,7 @@ def changed_on_arrays(
     """
     count = len(given["q"])
     rows = matrix(contact_jacobian(robot.frames, robot.chain.frames, list(given["q"].T)), count)
-    held = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1))
+    held = Held.on_arrays(robot, given)
     on, shift, unit = (matrix([values], count)[:, 0] for values in held.rows)
     turned = np.swapaxes(rows, -1, -2)
     free = inverse(robot.mass_matrix(given["q"]))

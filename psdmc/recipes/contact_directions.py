@@ -23,7 +23,7 @@ from psdmc.program.dimensions import dimension_of, times
 from psdmc.program.replay import substituted
 from psdmc.program.signature import PIVOTS, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.contacts import ACTIVE, MU, Held, Solved
+from psdmc.recipes.contacts import Held, Solved
 from psdmc.recipes.directions import along, along_direction, direction_of, gradient_by, weighted
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe
 
@@ -117,7 +117,7 @@ class ContactFunction:
     def _gradient_trace(self, g: Ingredients) -> Outputs:
         found, signs, factors, _ = self.solved(g)
         motion, forces = (g.inputs[each.name] for each in self.weights)
-        load, push = solved_again(factors, found, motion, [-each for each in forces], self._active(g))
+        load, push = solved_again(factors, found, motion, [-each for each in forces], Held.of(g).rows[0])
         inputs = [g.inputs[each.name] for each in self.by]
         free, values = self._free(g, found)
         parts = gradients(values, [*(-each for each in load), *push], inputs)
@@ -135,7 +135,7 @@ class ContactFunction:
         changes = substituted(slopes(values, inputs, way), free, [*found.motion, *found.forces])
         nv = len(found.motion)
         load, wanted = [-x for x in changes[:nv]], [-x for x in changes[nv:]]
-        blocks = solved_again(factors, found, load, wanted, self._active(g))
+        blocks = solved_again(factors, found, load, wanted, Held.of(g).rows[0])
         names = (replace(each, name=f"d{each.name}") for each in self.outputs)
         return self._named(g, found, signs, factors, names, blocks)
 
@@ -152,9 +152,6 @@ class ContactFunction:
         values = {motion: found.motion, forces: found.forces}
         values |= {quantity.name: block for quantity, block in zip(names, blocks, strict=True)}
         return {**values, PIVOTS: [*factors.pivots, *signs]}
-
-    def _active(self, g: Ingredients) -> list[Scalar]:
-        return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si).rows[0]
 
     def _free(self, g: Ingredients, found: Constrained) -> tuple[list[Scalar], list[Scalar]]:
         """Inputs in the place of the motion and the forces, and the residuals with them."""

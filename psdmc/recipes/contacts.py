@@ -7,6 +7,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.dynamics.closed_loops import loop_jacobian
 from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
@@ -20,6 +21,7 @@ from psdmc.recipes.pivots import regular
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 if TYPE_CHECKING:
+    from psdmc.recipes.recipe import Ingredients
     from psdmc.robot.reference import Reference
 
 _ROWS = "three linear for each point; three linear, then three angular for each surface; along"
@@ -84,6 +86,17 @@ class Held(NamedTuple):
     mu: Scalar
     si: Callable[[float, str], Scalar] = lambda value, unit: value
     loops: Sequence[Loop] = ()
+
+    @staticmethod
+    def of(g: Ingredients, loops: Sequence[Loop] = ()) -> Held:
+        """Return the contacts of a trace, by the inputs active and mu."""
+        return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si, loops)
+
+    @staticmethod
+    def on_arrays(robot: RobotOnArrays, given: Mapping[str, Array], loops: Sequence[Loop] = ()) -> Held:
+        """Return the contacts of many states, in NumPy."""
+        mu = np.reshape(given[MU.name], -1)
+        return Held(robot.chain.frames, list(given[ACTIVE.name].T), mu, loops=loops)
 
     @property
     def axes(self) -> list[Sequence[int]]:
@@ -185,7 +198,7 @@ def held_on_arrays(
     if loops:
         rows += loop_jacobian(robot.frames, loops, q)
     right = list(wanted(matrix(rows, count)).T)
-    mask = Held(robot.chain.frames, list(given[ACTIVE.name].T), np.reshape(given[MU.name], -1), loops=loops)
+    mask = Held.on_arrays(robot, given, loops)
     with np.errstate(all="ignore"):
         found, signs = mask.solved(factors, rows, [0.0] * robot.nv, right)
     return (
@@ -193,6 +206,11 @@ def held_on_arrays(
         columns(found.forces, count),
         columns([*factors.pivots, *signs], count),
     )
+
+
+def active_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Return which rows of the contacts are active, (k, rows)."""
+    return np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
 
 
 def dense_solution(
@@ -204,8 +222,7 @@ def dense_solution(
     Jacobian of the active contacts and mu the regularisation. Load and wanted may have columns, (k, nv, columns) and
     (k, rows, columns); the results then have them, too.
     """
-    counts = [rows for _, rows in robot.contacts]
-    masks = np.repeat(given[ACTIVE.name], counts, axis=1) > 0.5
+    masks = active_rows(robot, given)
     loops = jacobian.shape[1] - masks.shape[1]
     masks = np.pad(masks, ((0, 0), (0, loops)), constant_values=True)
     motion, forces = np.zeros(load.shape), np.zeros(wanted.shape)
