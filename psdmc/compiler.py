@@ -22,33 +22,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 from weakref import WeakValueDictionary
 
-from psdmc.backends.c.adapters import chosen, with_needed
-from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.c.adapters import chosen
+from psdmc.backends.c.package import PackageView
 from psdmc.backends.own_files import MANIFEST
-from psdmc.backends.protocol import Emission, back_end
+from psdmc.backends.protocol import back_end
 from psdmc.backends.recorded import Differences, differences, recorded_options
-from psdmc.backends.reference_load import reference_load
-from psdmc.backends.reference_states import reference_states
 from psdmc.backends.write import Changes, require_own_folder, write_package
+from psdmc.emission import emission, emit_options, functions_of, listed, package_of
 from psdmc.errors import InputError
-from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
-from psdmc.lower.admitted import require
-from psdmc.lower.kernels import Lowering, lower, lower_estimator, wanted
+from psdmc.lower.kernels import Lowering, wanted
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.linear_friction import friction_in_dynamics
 from psdmc.model.load import load_bytes, model_of
 from psdmc.model.store import file_bytes
 from psdmc.progress import Progress, silent
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.target.native import NATIVE
-from psdmc.target.presets import preset
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.toolchain.compile import compiled_once, lowered_once
+from psdmc.toolchain.compile import compiled_once
 from psdmc.toolchain.interface import Origin
 
 if TYPE_CHECKING:
@@ -135,17 +128,17 @@ def derive(
         tip=tip,
         gravity=gravity,
         drive_inertia=drive_inertia,
-        assume_zero=_names(assume_zero),
+        assume_zero=listed(assume_zero),
         snap=snap,
-        frames=_names(frames),
+        frames=listed(frames),
         tool=tool,
         lock=lock,
         floating=floating,
         root=root,
         xacro_args=xacro_args,
         packages=packages,
-        unknown=_names(unknown),
-        contacts=_names(contacts),
+        unknown=listed(unknown),
+        contacts=listed(contacts),
         loops=loops,
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
@@ -255,7 +248,7 @@ def compare_emitted(
     for option, value in (given or {}).items():
         if option in ("functions", "with"):
             value = (
-                chosen(_names(value)) if option == "with" else _functions_of(model, value, recorded["with"])
+                chosen(listed(value)) if option == "with" else functions_of(model, value, recorded["with"])
             )
         had = recorded.get(option)
         if value == had:
@@ -291,8 +284,8 @@ def _files(
 ) -> dict[str, str]:
     """Path -> text of every file of what `emit` writes."""
     language = back_end(backend)
-    options = _options(lowering, real, trig, target)
-    by_rows = any(name in BY_ROWS for name in _names(functions or ()))
+    options = emit_options(lowering, real, trig, target)
+    by_rows = any(name in BY_ROWS for name in listed(functions or ()))
     chosen_options = {"trig": trig, "target": options.target != NATIVE, "functions NAME_theta_rows": by_rows}
     for option in language.lacks:
         if {**chosen_options, **own}.get(option):
@@ -304,7 +297,7 @@ def _files(
             f"target {options.target.name} has no functions for many states, so no NAME_theta_rows",
             "leave --functions out: default functions take theta_b for one state as NAME_theta",
         )
-    adapters = _names(own.get("with", ()))
+    adapters = listed(own.get("with", ()))
     if adapters and not options.target.hosted:
         raise InputError(
             f"target {options.target.name} has no shared libraries, which {adapters[0]} loads",
@@ -313,7 +306,7 @@ def _files(
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
     further = (own.get("estimator"), own.get("smoothing-speed"))
-    return language.files(_emission(model, lowering, functions, options, name, progress, *facts, *further))
+    return language.files(emission(model, lowering, functions, options, name, progress, *facts, *further))
 
 
 @overload
@@ -440,7 +433,7 @@ class _Request:
 
     def compiled(self, progress: Progress = silent) -> CompiledRobot[Any]:
         """Compile the robot that this request describes, or get it from the cache."""
-        options = _options(self.lowering, self.real, self.trig, self.target)
+        options = emit_options(self.lowering, self.real, self.trig, self.target)
         machine = options.target
         if not machine.has_batches:
             raise InputError(
@@ -450,7 +443,7 @@ class _Request:
 
         def make() -> PackageView:
             given = (self.opened(), self.lowering, self.functions, options, None, progress)
-            package = _package(*given, False, (), self.friction, False, None, self.smoothing_speed)
+            package = package_of(*given, False, (), self.friction, False, None, self.smoothing_speed)
             progress("compiling")
             return package
 
@@ -487,95 +480,3 @@ _ROBOTS: WeakValueDictionary[str, CompiledRobot[Any]] = WeakValueDictionary()
 def _again(request: _Request) -> CompiledRobot[Any]:
     """The robot of a request that was pickled, here or in another process."""
     return _ROBOTS.get(request.key) or request.compiled()
-
-
-@collecting_rarely()
-def _package(*given: Any) -> PackageView:
-    """The C package of what `_emission` takes."""
-    made = _emission(*given)
-    return package_view(made.info, made.kernels, made.options, made.references, made.adapters)
-
-
-def _emission(
-    model: DynamicsModel,
-    lowering: Lowering,
-    functions: Sequence[str] | str | None,
-    options: EmitOptions,
-    name: str | None,
-    progress: Progress,
-    payload: bool = False,
-    adapters: Sequence[str] = (),
-    friction: bool | Literal["in-dynamics"] = False,
-    bodies: bool = False,
-    estimator: str | None = None,
-    smoothing_speed: float | None = None,
-) -> Emission:
-    names = _functions_of(model, functions, adapters)
-    law = _friction_in_dynamics(model, friction, smoothing_speed)
-    require(model, names)
-    costs = options.target.costs
-    key = (model.content_hash, lowering, repr(costs), *names)
-    kernels = lowered_once(
-        key if law is None else (*key, law.key),
-        lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
-    )
-    shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    if estimator and law is not None:
-        raise InputError(
-            "an estimator cannot have friction in the dynamics: its torques contain no friction",
-            "write --friction, and subtract the torques of R_friction from those of the motors",
-        )
-    if estimator:
-        shown["estimator"] = estimator
-    momenta = None if estimator is None else lower_estimator(model, estimator, costs)
-    if law is not None:
-        shown |= {"friction": "in-dynamics", "smoothing-speed": repr(law.friction.sign_speed)}
-    own = None if law is None else law.friction
-    info = package_info(model, name, shown, payload, friction is True, bodies, own)
-    references = reference_states(model, names, friction=law)
-    if payload:
-        references = replace(references, load=reference_load(model))
-    return Emission(info, kernels, options, references, tuple(adapters), momenta)
-
-
-def _friction_in_dynamics(
-    model: DynamicsModel, friction: bool | str, speed: float | None
-) -> FrictionInDynamics | None:
-    """The friction that motor torques contain, None without the option."""
-    if friction == "in-dynamics":
-        return friction_in_dynamics(model, speed)
-    if friction not in (True, False):
-        raise InputError(f"friction is {friction!r}", "choose --friction or --friction=in-dynamics")
-    if speed is not None:
-        raise InputError("a smoothing speed without friction in the dynamics", "add --friction=in-dynamics")
-    return None
-
-
-def _functions_of(
-    model: DynamicsModel, functions: Sequence[str] | str | None, adapters: Sequence[str]
-) -> tuple[str, ...]:
-    """The functions of a package, those that its adapters need included."""
-    named = wanted(functions, model.mechanism)
-    return wanted(with_needed(named, adapters, model.nq > model.nv), model.mechanism)
-
-
-def _options(
-    lowering: str, real: Real | None = None, trig: Trig | None = None, target: str | Target = NATIVE
-) -> EmitOptions:
-    """The options, with the target's own precision and sines where none are chosen; InputError for an unknown choice."""
-    machine = preset(target) if isinstance(target, str) else target
-    real, trig = real or machine.real, trig or machine.trig
-    _choose("lowering", lowering, ("auto", "expanded", "factored"))
-    _choose("real", real, ("float64", "float32"))
-    _choose("trig", trig, ("inline", "libm", "freestanding"))
-    return EmitOptions(real, trig, machine)
-
-
-def _names(given: Sequence[str] | str) -> Sequence[str]:
-    """Names where one may be given alone."""
-    return (given,) if isinstance(given, str) else given
-
-
-def _choose(option: str, value: str, allowed: Sequence[str]) -> None:
-    if value not in allowed:
-        raise InputError(f"{option} is {value!r}", f"choose one of {', '.join(allowed)}")

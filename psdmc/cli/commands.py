@@ -9,9 +9,10 @@ import typer
 from psdmc.cli.benchmarking import bench
 from psdmc.cli.calibrating import calibrate
 from psdmc.cli.campaigning import excite, simulate
+from psdmc.cli.emitting import EmitCommand, emit, emit_c
 from psdmc.cli.exporting import export_urdf
 from psdmc.cli.loads import payload
-from psdmc.cli.pipeline import EmitCommand, build, cache, check, derive, emit, emit_c
+from psdmc.cli.pipeline import build, cache, check, derive
 from psdmc.cli.sampling import sample
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc import compiler
+from psdmc import emission
 from psdmc.backends.c.package_files import package_files
+from psdmc.backends.options import EmitOptions
 from psdmc.cli.show import print_model
 from psdmc.model.load import load
 from psdmc.model.store import file_bytes
@@ -28,4 +29,4 @@ def model(data: bytes, folder: Path, deep: bool) -> None:
     if deep:
         file_bytes(found)
         check_model(found)
-        package_files(compiler._package(found, "auto", ["gravity"], compiler.EmitOptions(), None, silent))
+        package_files(emission.package_of(found, "auto", ["gravity"], EmitOptions(), None, silent))

@@ -14,7 +14,7 @@ import pytest
 from traced import arm_package
 
 import psdmc
-from psdmc import compiler
+from psdmc import emission
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError, InternalError
 from psdmc.toolchain import compile
@@ -186,8 +186,8 @@ def test_a_second_compile_of_a_model_neither_lowers_nor_renders(
     def never(*arguments: object) -> None:
         raise AssertionError("made again")
 
-    monkeypatch.setattr(compiler, "lowered_once", never)
-    monkeypatch.setattr(compiler, "package_view", never)
+    monkeypatch.setattr(emission, "lowered_once", never)
+    monkeypatch.setattr(emission, "package_view", never)
     second = psdmc.compile(model, functions=functions)
 
     states = np.random.default_rng(0).normal(size=(3, 7, 2))

@@ -19,7 +19,7 @@ from slow_cases import slow_but_for
 from traced import arm_package
 
 import psdmc
-from psdmc import compiler
+from psdmc import emission
 from psdmc.backends.options import EmitOptions
 from psdmc.errors import InputError, ToolchainError
 from psdmc.lower.kernels import lower
@@ -159,7 +159,7 @@ def test_lowering_is_given_the_targets_costs(
         given.append(costs)
         return lower(*arguments, costs=costs, **further)
 
-    monkeypatch.setattr(compiler, "lower", recorded)
+    monkeypatch.setattr(emission, "lower", recorded)
     for name in ("native", "cortex-m4f"):
         psdmc.emit_c(two_link, tmp_path / name, functions=["gravity"], target=name)
 

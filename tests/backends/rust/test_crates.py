@@ -17,7 +17,7 @@ from command_line import typed
 import psdmc
 from psdmc.backends.protocol import BACK_ENDS, back_end
 from psdmc.backends.rust.names import KEYWORDS, comment, identifier, text
-from psdmc.cli import pipeline
+from psdmc.cli import emitting
 from psdmc.compiler import emit
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, OF_TREES, RECIPES
@@ -222,5 +222,5 @@ def test_what_is_refused(words: tuple[str, ...], said: str, tmp_path: Path) -> N
 
 
 def test_the_command_line_names_all_back_ends() -> None:
-    assert pipeline.BACK_ENDS == BACK_ENDS
+    assert emitting.BACK_ENDS == BACK_ENDS
     assert all(back_end(name).files for name in BACK_ENDS)

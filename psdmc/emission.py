@@ -1,0 +1,122 @@
+"""What a back end receives, from a model and the options of `emit` and `compile`: kernels, facts and reference states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+from psdmc.backends.c.adapters import with_needed
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.protocol import Emission
+from psdmc.backends.reference_load import reference_load
+from psdmc.backends.reference_states import reference_states
+from psdmc.errors import InputError
+from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.garbage import collecting_rarely
+from psdmc.lower.admitted import require
+from psdmc.lower.kernels import Lowering, lower, lower_estimator, wanted
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.linear_friction import friction_in_dynamics
+from psdmc.progress import Progress
+from psdmc.target.native import NATIVE
+from psdmc.target.presets import preset
+from psdmc.target.target import Real, Target, Trig
+from psdmc.toolchain.compile import lowered_once
+
+
+@collecting_rarely()
+def package_of(*given: Any) -> PackageView:
+    """Return the C package of what `emission` takes."""
+    made = emission(*given)
+    return package_view(made.info, made.kernels, made.options, made.references, made.adapters)
+
+
+def emission(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    options: EmitOptions,
+    name: str | None,
+    progress: Progress,
+    payload: bool = False,
+    adapters: Sequence[str] = (),
+    friction: bool | Literal["in-dynamics"] = False,
+    bodies: bool = False,
+    estimator: str | None = None,
+    smoothing_speed: float | None = None,
+) -> Emission:
+    """Return what a back end receives for a model: the kernels of its functions, facts and reference states. The arguments
+    are those of `compiler.emit_c`. Raises InputError as that does."""
+    names = functions_of(model, functions, adapters)
+    law = _friction_in_dynamics(model, friction, smoothing_speed)
+    if estimator and law is not None:
+        raise InputError(
+            "an estimator cannot have friction in the dynamics: its torques contain no friction",
+            "write --friction, and subtract the torques of R_friction from those of the motors",
+        )
+    require(model, names)
+    costs = options.target.costs
+    key = (model.content_hash, lowering, repr(costs), *names)
+    kernels = lowered_once(
+        key if law is None else (*key, law.key),
+        lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
+    )
+    shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    if estimator:
+        shown["estimator"] = estimator
+    momenta = None if estimator is None else lower_estimator(model, estimator, costs)
+    if law is not None:
+        shown |= {"friction": "in-dynamics", "smoothing-speed": repr(law.friction.sign_speed)}
+    own = None if law is None else law.friction
+    info = package_info(model, name, shown, payload, friction is True, bodies, own)
+    references = reference_states(model, names, friction=law)
+    if payload:
+        references = replace(references, load=reference_load(model))
+    return Emission(info, kernels, options, references, tuple(adapters), momenta)
+
+
+def _friction_in_dynamics(
+    model: DynamicsModel, friction: bool | str, speed: float | None
+) -> FrictionInDynamics | None:
+    """The friction that motor torques contain, None without the option."""
+    if friction == "in-dynamics":
+        return friction_in_dynamics(model, speed)
+    if friction not in (True, False):
+        raise InputError(f"friction is {friction!r}", "choose --friction or --friction=in-dynamics")
+    if speed is not None:
+        raise InputError("a smoothing speed without friction in the dynamics", "add --friction=in-dynamics")
+    return None
+
+
+def functions_of(
+    model: DynamicsModel, functions: Sequence[str] | str | None, adapters: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the functions of a package, with those that its adapters need."""
+    named = wanted(functions, model.mechanism)
+    return wanted(with_needed(named, adapters, model.nq > model.nv), model.mechanism)
+
+
+def emit_options(
+    lowering: str, real: Real | None = None, trig: Trig | None = None, target: str | Target = NATIVE
+) -> EmitOptions:
+    """Return the options, with the target's precision and sines if none are chosen. Raises InputError for an unknown
+    choice."""
+    machine = preset(target) if isinstance(target, str) else target
+    real, trig = real or machine.real, trig or machine.trig
+    _choose("lowering", lowering, ("auto", "expanded", "factored"))
+    _choose("real", real, ("float64", "float32"))
+    _choose("trig", trig, ("inline", "libm", "freestanding"))
+    return EmitOptions(real, trig, machine)
+
+
+def listed(given: Sequence[str] | str) -> Sequence[str]:
+    """Return a sequence of names, from such a sequence or one name."""
+    return (given,) if isinstance(given, str) else given
+
+
+def _choose(option: str, value: str, allowed: Sequence[str]) -> None:
+    if value not in allowed:
+        raise InputError(f"{option} is {value!r}", f"choose one of {', '.join(allowed)}")
