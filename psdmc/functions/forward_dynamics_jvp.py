@@ -36,8 +36,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, DQ, DQD, DTAU),
         (QDD, along_direction(QDD)),
         theta=True,
-        summary="Compute the accelerations qdd of forward dynamics. Also compute dqdd, the derivative of qdd along "
-        "the direction (dq, dqd, dtau).",
+        summary="Compute the accelerations qdd of forward dynamics. Also compute dqdd, the derivative of qdd by a "
+        "number e, if q, qd and tau change by e dq, e dqd and e dtau.",
         factorises=(MASS_MATRIX,),
     ),
     "forward dynamics along a direction",

@@ -45,7 +45,8 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.outputs, along_direction(QDD)),
         theta=True,
         summary="Compute the accelerations qdd that torques cause under external wrenches. Also compute dqdd, the "
-        "derivative of qdd along the direction (dq, dqd, dtau, dwrenches).",
+        "derivative of qdd by a number e. The inputs q, qd, tau and wrenches change by e dq, e dqd, e dtau and e "
+        "dwrenches.",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "forward dynamics with wrenches along a direction",

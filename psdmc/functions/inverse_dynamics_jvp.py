@@ -48,8 +48,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, *DIRECTIONS),
         (TAU, along_direction(TAU)),
         theta=True,
-        summary="Compute the torques tau of inverse dynamics. Also compute dtau, the derivative of tau along the "
-        "direction (dq, dqd, dqdd).",
+        summary="Compute the torques tau of inverse dynamics. Also compute dtau, the derivative of tau by a "
+        "number e, if q, qd and qdd change by e dq, e dqd and e dqdd.",
     ),
     "inverse dynamics along a direction",
     trace,

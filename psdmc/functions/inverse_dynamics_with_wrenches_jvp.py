@@ -44,8 +44,9 @@ RECIPE = Recipe(
         (*TORQUES.signature.inputs, *DIRECTIONS),
         (*TORQUES.signature.outputs, along_direction(TAU)),
         theta=True,
-        summary="Compute the joint torques tau of a motion under external wrenches. Also compute dtau, the derivative "
-        "of tau along the direction (dq, dqd, dqdd, dwrenches).",
+        summary="Compute the joint torques tau of a motion under external wrenches. Also compute dtau, the "
+        "derivative of tau by a number e. The inputs q, qd, qdd and wrenches change by e dq, e dqd, e dqdd and e "
+        "dwrenches.",
     ),
     "inverse dynamics with wrenches along a direction",
     trace,
