@@ -116,9 +116,10 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B, B_ERROR, *OF_FORCES),
         theta=True,
-        summary="Compute the state of a robot with contacts after one step of semi-implicit Euler, and the "
-        "contact forces. Also compute the derivatives of state and forces by q, qd, tau and error. The input "
-        "`error` is the displacement of the contacts. The derivatives by q hold `error` constant.",
+        summary="Compute the state after a semi-implicit Euler step with contacts. Also compute the contact "
+        "forces, and derivatives by q, qd, tau and error. The derivatives are those of the next state and of the "
+        "forces. The input `error` is the displacement of the contacts. The derivatives by q hold `error` "
+        "constant.",
         factorises=STEP.signature.factorises,
         calls=(ACCELERATIONS.name, *ACCELERATIONS.signature.calls),
     ),

@@ -37,7 +37,7 @@ RECIPE = Recipe(
         (QDD, along_direction(QDD)),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics. Also compute dqdd, the derivative of qdd by a "
-        "number e, if q, qd and tau change by e dq, e dqd and e dtau.",
+        "number e. The inputs q, qd and tau change by e dq, e dqd and e dtau.",
         factorises=(MASS_MATRIX,),
     ),
     "forward dynamics along a direction",

@@ -49,7 +49,7 @@ RECIPE = Recipe(
             Quantity(
                 "dv_dq",
                 ("frames", "6", "nv"),
-                means=f"derivatives of v by q: entry [k, i, j] is the derivative of v[k, i] by q[j]",
+                means="derivatives of v by q: entry [k, i, j] is the derivative of v[k, i] by q[j]",
                 unit="1/s",
                 powers=(0, 1, -1),
                 by_q=True,

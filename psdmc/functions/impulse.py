@@ -140,7 +140,7 @@ RECIPE = Recipe(
         (Q, BEFORE, ACTIVE, RESTITUTION, MU),
         (AFTER, IMPULSES),
         theta=True,
-        summary="Compute the joint rates qd_after after an impact, and the contact impulses. The impulses stop "
+        summary="Compute qd_after, the joint rates after an impact, and the contact impulses. The impulses stop "
         "the active contacts or reverse their velocity.",
         factorises=(MASS_MATRIX, TOUCHING),
     ),

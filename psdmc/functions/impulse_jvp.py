@@ -6,5 +6,5 @@ RECIPE = FUNCTION.along(
     356,
     "qd_after and impulses of an impact, and their derivatives along (dq, dqd_before)",
     "Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute their derivatives "
-    "by a number e, if q and qd_before change by e dq and e dqd_before.",
+    "by a number e. The inputs q and qd_before change by e dq and e dqd_before.",
 )

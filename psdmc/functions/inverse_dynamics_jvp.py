@@ -49,7 +49,7 @@ RECIPE = Recipe(
         (TAU, along_direction(TAU)),
         theta=True,
         summary="Compute the torques tau of inverse dynamics. Also compute dtau, the derivative of tau by a "
-        "number e, if q, qd and qdd change by e dq, e dqd and e dqdd.",
+        "number e. The inputs q, qd and qdd change by e dq, e dqd and e dqdd.",
     ),
     "inverse dynamics along a direction",
     trace,

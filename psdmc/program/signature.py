@@ -334,10 +334,10 @@ TAU = Quantity(
 """Those of q, qd and qdd if states are drawn."""
 
 BY_Q = (
-    "If the robot has a ball joint or a floating base, q contains a quaternion and has more than nv entries. The derivatives "
-    "by q are then by the nv entries x[j] of a small displacement x, at x = 0. The displaced q is integrate(q, x). For a "
-    "joint with one coordinate, x[j] is the change of its position. For a ball joint or floating base, x is along and about "
-    "its own axes."
+    "If the robot has a ball joint or a floating base, q contains a quaternion and has more than nv entries. The "
+    "derivatives by q are then by the nv entries x[j] of a small displacement x, at x = 0. The displaced q is "
+    "integrate(q, x). For a joint with one coordinate, x[j] is the change of its position. For a ball joint or floating "
+    "base, x is along and about its own axes."
 )
 """Explains derivatives by q."""
 

@@ -42,7 +42,9 @@ def direction_of(quantity: Quantity) -> Quantity:
 def along_direction(quantity: Quantity) -> Quantity:
     """The derivative of this output along a direction of the inputs."""
     name = quantity.name
-    means = f"derivative of {name} by e at e = 0: for a small number e, the change of {name} is about e d{name}"
+    means = (
+        f"derivative of {name} by e at e = 0: for a small number e, the change of {name} is about e d{name}"
+    )
     return replace(quantity, name=f"d{name}", means=means)
 
 

@@ -82,7 +82,15 @@ def documentation(function: Signature) -> str:
     sizes = _SIZES if closes else {**_SIZES, "constraint_rows": _WITHOUT_LOOPS}
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
     lengths = [(size, meaning) for size, meaning in sizes.items() if size in {*axes, *lead}]
-    parts = [_rows(given), returned, _rows(made), *_note(function), *_failures(function), "In these shapes:", _rows(lengths)]
+    parts = [
+        _rows(given),
+        returned,
+        _rows(made),
+        *_note(function),
+        *_failures(function),
+        "In these shapes:",
+        _rows(lengths),
+    ]
     return "\n\n".join([function.summary, *parts])
 
 
@@ -98,7 +106,7 @@ _SIZES = {
     "contacts": "number of contacts: links or frames that can touch the world; `contacts` lists them",
     "contact_rows": "number of rows of all contacts (links or frames that can touch the world): 3 for each contact point, "
     "6 for each contact surface, in the order of `contacts`",
-    "loop_rows": "number of directions that all closed loops block, in the order of `loops`; 0 for a robot without closed loops",
+    "loop_rows": "number of directions that all closed loops block, in the order of `loops`; 0 without closed loops",
     "constraint_rows": "contact_rows + loop_rows: first the rows of all contacts, then those of all closed loops",
     "nonzeros": "number of matrix entries that can differ from zero at some state",
 }
