@@ -182,7 +182,8 @@ def emit_c(
     adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
     friction   for a model that was calibrated from logs. True: add the function that computes friction torques.
-               "in-dynamics": inverse dynamics, forward dynamics, their derivatives and steps, also with contacts, contain friction
+               "in-dynamics": inverse dynamics, forward dynamics, their derivatives and time steps, also with contacts,
+               contain friction
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
     estimator  "mass" or "inertia": add functions that estimate a load at the tip while the robot moves. "mass" finds
                mass and centre of mass, "inertia" also the inertia
@@ -372,8 +373,8 @@ def compile(
     model      a model, or the path of a model file
     functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
                now, and each other function when you first call it
-    friction   True: inverse dynamics, forward dynamics, their derivatives and time steps, also with contacts, contain the friction that a
-               calibration of the model found
+    friction   True: inverse dynamics, forward dynamics, their derivatives and time steps, also with contacts, contain the
+               friction that a calibration of the model found
 
     `emit_c` explains the other options. Raises InputError if `friction` is True and the model has no calibrated friction.
     Raises InputError also if the target is a microcontroller, because its code lacks the batch functions that Python calls.
