@@ -45,8 +45,8 @@ RECIPE = Recipe(
         (*TORQUES.signature.outputs, along_direction(TAU)),
         theta=True,
         summary="Compute the joint torques tau of a motion under external wrenches. Also compute dtau, the "
-        "derivative of tau by a number e. The inputs q, qd, qdd and wrenches change by e dq, e dqd, e dqdd and e "
-        "dwrenches.",
+        "derivative of tau along a direction (dq, dqd, dqdd, dwrenches). If each input changes by e times its "
+        "part of the direction, with a small number e, tau changes by about e dtau.",
     ),
     "inverse dynamics with wrenches along a direction",
     trace,
