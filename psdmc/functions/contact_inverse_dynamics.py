@@ -125,8 +125,8 @@ RECIPE = Recipe(
         (
             replace(
                 TAU,
-                means=f"{TAU.means}; of a floating base, the first six entries are what the active contacts cannot exert, "
-                "zero within rounding if they can exert all and mu = 0",
+                means=f"{TAU.means}; of a floating base, the first six entries are the part of the base's force and moment "
+                "that the active contacts cannot exert, zero within rounding if they can exert the whole and mu = 0",
             ),
             FORCES,
         ),
