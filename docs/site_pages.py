@@ -62,6 +62,7 @@ MENU = {
         "how-to/jax",
         "how-to/pytorch",
         "how-to/adapters",
+        "how-to/matlab",
         "how-to/contacts",
         "how-to/loops",
         "how-to/whole-body",

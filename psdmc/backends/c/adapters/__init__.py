@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from psdmc.backends.c.adapters import casadi, fmu, wheel
+from psdmc.backends.c.adapters import casadi, fmu, mex, wheel
 from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
@@ -22,6 +22,7 @@ ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
     casadi.HESSIANS: casadi.files_of(casadi.HESSIANS),
     "wheel": wheel.files,
     "fmu": fmu.files,
+    "mex": mex.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -42,6 +43,11 @@ class BatchArray:
     batched: bool
 
     @property
+    def size(self) -> int:
+        """Real numbers per state."""
+        return math.prod(self.tail)
+
+    @property
     def python_shape(self) -> str:
         lead = ("...",) if self.batched else ()
         return f"({', '.join(map(str, (*lead, *self.tail)))})"
@@ -68,6 +74,12 @@ class BatchFunction:
     baked: str | None
     theta: str | None
     positions: tuple[int, ...]
+
+    @property
+    def usage(self) -> str:
+        """Return the names of the arguments, with brackets around one that is optional."""
+        theta = [] if not self.theta else ["[theta_b]" if self.baked else "theta_b"]
+        return ", ".join([*(array.name for array in self.inputs), *theta])
 
     @property
     def result(self) -> str:
@@ -121,5 +133,6 @@ def _arrays(
     quantities: Sequence[Quantity], shapes: Sequence[tuple[int, ...]], batched: bool = True
 ) -> tuple[BatchArray, ...]:
     return tuple(
-        BatchArray(q.name, shape, plain(q.means), batched) for q, shape in zip(quantities, shapes, strict=True)
+        BatchArray(q.name, shape, plain(q.means), batched)
+        for q, shape in zip(quantities, shapes, strict=True)
     )

@@ -44,4 +44,3 @@ def files(package: PackageView) -> dict[str, str]:
     }
     made = {path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES.items()}
     return {**made, "wheel/py.typed": ""}
-
