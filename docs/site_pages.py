@@ -63,6 +63,7 @@ MENU = {
         "how-to/pytorch",
         "how-to/adapters",
         "how-to/matlab",
+        "how-to/ros2",
         "how-to/contacts",
         "how-to/loops",
         "how-to/whole-body",

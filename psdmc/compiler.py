@@ -177,7 +177,8 @@ def emit_c(
                edited package files. It keeps other files, and renames one with the name of a package file to NAME.orig
     progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change theta_b for a load
-    adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python), "fmu" or "mex" (MATLAB)
+    adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python), "fmu", "mex" (MATLAB) or
+               "ros2"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
     friction   for a model that was calibrated from logs. True: add the function that computes friction torques.
                "in-dynamics": inverse dynamics, forward dynamics and all functions made from them contain friction

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from psdmc.backends.c.adapters import casadi, fmu, mex, wheel
+from psdmc.backends.c.adapters import casadi, fmu, mex, ros2, wheel
 from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
@@ -23,6 +23,7 @@ ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
     "wheel": wheel.files,
     "fmu": fmu.files,
     "mex": mex.files,
+    "ros2": ros2.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
@@ -31,6 +32,7 @@ NEEDS = {
     casadi.BY_THETA: casadi.needed_by_theta,
     casadi.HESSIANS: casadi.needed,
     "fmu": fmu.needed,
+    "ros2": ros2.needed,
 }
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
