@@ -62,6 +62,7 @@ class BatchFunction:
     """One function of another program's module.
 
     meaning      description in one line of ASCII without quotation marks
+    note         explanation of derivatives by q, in one line; empty if the outputs contain none
     baked        name of the C function without the input theta_b (base parameters); None if the package lacks it
     theta        name of the C function with the input theta_b; None if the package lacks it
     positions    indices of the inputs that contain quaternions, which must have length one
@@ -69,6 +70,7 @@ class BatchFunction:
 
     name: str
     meaning: str
+    note: str
     inputs: tuple[BatchArray, ...]
     outputs: tuple[BatchArray, ...]
     baked: str | None
@@ -112,6 +114,7 @@ def batch_function(function: FunctionView) -> BatchFunction:
     return BatchFunction(
         name=function.name,
         meaning=plain(function.meaning),
+        note=plain(signature.note),
         inputs=_arrays(signature.inputs, [vector.shape for vector in first.inputs]),
         outputs=_arrays(
             signature.outputs, [vector.shape for vector in first.outputs], bool(signature.inputs)
