@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from psdmc.backends.c.adapters import casadi, fmu, mex, ros2, wheel
 from psdmc.backends.c.function_view import FunctionView
@@ -22,6 +23,7 @@ ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
     casadi.HESSIANS: casadi.files_of(casadi.HESSIANS),
     "wheel": wheel.files,
     "fmu": fmu.files,
+    "fmu2": partial(fmu.files, version=2),
     "mex": mex.files,
     "ros2": ros2.files,
 }
@@ -32,6 +34,7 @@ NEEDS = {
     casadi.BY_THETA: casadi.needed_by_theta,
     casadi.HESSIANS: casadi.needed,
     "fmu": fmu.needed,
+    "fmu2": fmu.needed,
     "ros2": ros2.needed,
 }
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
