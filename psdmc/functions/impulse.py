@@ -36,8 +36,8 @@ RESTITUTION = Quantity(
     "restitution",
     largest=1.0,
     least=0.0,
-    means="coefficient of restitution, 0 to 1. If it is e, the velocity of active contacts after the impact is -e "
-    "times that before",
+    means="coefficient of restitution, 0 to 1. If mu = 0, the velocity of active contacts after the impact is "
+    "-restitution times that before",
     unit="1",
     default=0.0,
 )
