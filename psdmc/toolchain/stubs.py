@@ -8,9 +8,8 @@ import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
-from psdmc.functions import SIGNATURES, recipe_of
+from psdmc.functions import OF_FILE_MASSES, SIGNATURES, recipe_of
 from psdmc.program.signature import Quantity, Signature
-from psdmc.recipes.recipe import Needs
 
 STUB = Path(__file__).with_name("call.pyi")
 MODEL = Path(__file__).parents[1] / "model"
@@ -131,7 +130,7 @@ def _note(function: Signature) -> list[str]:
 
 def _masses(function: Signature) -> list[str]:
     """Return a paragraph that says which masses a function without theta_b uses, if it needs any."""
-    return [_filled(_FIXED_MASSES)] if recipe_of(function.name).needs is Needs.STANDARD else []
+    return [_filled(_FIXED_MASSES)] if function.name in OF_FILE_MASSES else []
 
 
 def _failures(function: Signature) -> list[str]:
