@@ -87,7 +87,10 @@ def _tree_to_json(chain: Mechanism) -> dict[str, Any]:
     """What each joint hangs on and follows, and where the tip is."""
     if is_plain_chain(chain):
         return {}
-    followed = [[c.leader, c.ratio, c.offset] for c in chain.coordinates]
+    followed = [
+        [c.leader, c.ratio, c.offset, *(value for other in c.others for value in other)]
+        for c in chain.coordinates
+    ]
     return {"parents": list(chain.parents), "tip_body": chain.tip_body, "coordinates": followed}
 
 
@@ -107,14 +110,18 @@ def _tree_from_json(data: object, n: int) -> dict[str, Any]:
 
 
 def _coordinate_from_json(data: object, n: int) -> Coordinate:
-    values = entries(data, "a coordinate", 3)
-    if len(values) != 3:
+    values = entries(data, "a coordinate", 1 + 2 * n)
+    if len(values) < 3 or len(values) % 2 == 0:
         raise ValueError(f"a coordinate has {len(values)} values, expected leader, ratio and offset")
-    leader, ratio, offset = values
+    leader, ratio, offset, *others = values
     return Coordinate(
         None if leader is None else whole(leader, "a coordinate's leader", 0, n - 1),
         number(ratio, "a coordinate's ratio"),
         number(offset, "a coordinate's offset"),
+        tuple(
+            (whole(leader, "a coordinate's leader", 0, n - 1), number(ratio, "a coordinate's ratio"))
+            for leader, ratio in zip(others[::2], others[1::2], strict=True)
+        ),
     )
 
 

@@ -32,7 +32,7 @@ from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.snap import snap_rotation
 
 FORMAT = "see the format of loops in docs/how-to/loops.md"
-LOOP_KEYS = ("name", "rows", "first", "second")
+LOOP_KEYS = ("name", "rows", "first", "second", "follows")
 FRAME_KEYS = ("link", "xyz", "rpy", "quaternion")
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
@@ -91,7 +91,7 @@ def _loop(
     name = given if isinstance(given, str) and given else f"loop{number}"
     table = CheckedTable(value, f"loop {shown(name)}", LOOP_KEYS, problems)
     table.read("name", plain_text, "")
-    problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:] if key not in table.table]
+    problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:4] if key not in table.table]
     first, second = (
         _frame(
             table.read(key, as_it_is, None),
@@ -101,9 +101,14 @@ def _loop(
             snap,
             problems,
         )
-        for key in LOOP_KEYS[2:]
+        for key in LOOP_KEYS[2:4]
     )
+    table.read("follows", _names, [])
     return name, first, second, table.read("rows", _rows, CLOSED[6])
+
+
+def _names(value: object) -> list[str]:
+    return [plain_text(name) for name in any_list(value)]
 
 
 def _rows(value: object) -> tuple[int, ...]:

@@ -13,11 +13,12 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.reading import in_words, read_file
 from psdmc.robot import limits
-from psdmc.robot.closed_loops import closed_loops, loop_tables
+from psdmc.robot.closed_loops import Tables, closed_loops, loop_tables
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
+from psdmc.robot.linear_loops import with_linear_loops
 from psdmc.robot.load_options import DEFAULT_SNAP, TOOL, LoadOptions, checked_options, parsed_contact
 from psdmc.robot.mechanism import DRIVE, ROW_NAMES, Array, Loop, Mechanism, NamedFrame
 from psdmc.robot.missing_inertia import with_massless_warning
@@ -162,7 +163,8 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in draft.snaps
     )
     frames = _with_contacts(_frames(draft, options, source), options)
-    loops = _loops(draft, options, frames, source)
+    tables = (*draft.loops, *options.loops)
+    loops = _loops(draft, tables, options, frames, source)
     mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
@@ -173,7 +175,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         parameter_span=block_diagonal([link_span(zero) for zero in zeros]),
         gravity=draft.gravity,
         tip=draft.tip,
-        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values), *map(_loop_note, loops)),
+        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values)),
         frames=frames,
         parents=draft.parents,
         tip_body=draft.tip_body,
@@ -181,6 +183,10 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         massless=draft.massless,
         loops=loops,
     )
+    if loops:
+        mechanism = with_linear_loops(mechanism, [table.get("follows") for table in tables], source)
+        notes = (*mechanism.notes, *map(_loop_note, mechanism.loops))
+        mechanism = replace(mechanism, notes=notes)
     return with_massless_warning(mechanism)
 
 
@@ -203,11 +209,12 @@ def _with_contacts(frames: tuple[NamedFrame, ...], options: LoadOptions) -> tupl
     return tuple(replace(frame, rows=rows.get(frame.name, 0)) for frame in frames)
 
 
-def _loops(draft: Draft, options: LoadOptions, frames: Sequence[NamedFrame], source: str) -> tuple[Loop, ...]:
+def _loops(
+    draft: Draft, tables: Tables, options: LoadOptions, frames: Sequence[NamedFrame], source: str
+) -> tuple[Loop, ...]:
     """The closed loops of the file, then those of the options."""
     named = {frame.name: frame for frame in frames}
     find = draft.frame_of
-    tables = (*draft.loops, *options.loops)
     if not tables or find is None:
         return ()
     return closed_loops(

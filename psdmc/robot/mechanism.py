@@ -296,6 +296,11 @@ class Mechanism:
     def has_followers(self) -> bool:
         return len(self.own_joints) < len(self)
 
+    @property
+    def has_sums(self) -> bool:
+        """Whether some joint follows the sum of several joints, as in parallelograms."""
+        return any(coordinate.others for coordinate in self.coordinates)
+
     def parent_link(self, body: int) -> str:
         """Return the name of the link to which the joint of a body is attached."""
         parent = self.parents[body]
