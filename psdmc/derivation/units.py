@@ -54,7 +54,8 @@ def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
         if frame.follows is not None:
             own, (shares, offset) = frame.joint.length_order, frame.follows
             shares = tuple(
-                (leader, ratio * unit ** (frames[leader].joint.length_order - own)) for leader, ratio in shares
+                (leader, ratio * unit ** (frames[leader].joint.length_order - own))
+                for leader, ratio in shares
             )
             scaled = replace(scaled, follows=Follows(shares, offset / unit**own))
         found.append(scaled)

@@ -83,10 +83,10 @@ class DynamicsModel(Answers):
         object.__setattr__(self, "certificate", frozen_array(self.certificate, (self.nv,), "certificate"))
         if self.theta_b is not None:
             object.__setattr__(self, "theta_b", frozen_array(self.theta_b, (l,), "theta_b"))
-        if self.expansion is not None and (self.expansion.n, self.expansion.l) != (n, l):
+        if self.expansion is not None and (self.expansion.n, self.expansion.l) != (self.nv, l):
             raise ValueError(
                 f"E and P are for {self.expansion.n} joints and {self.expansion.l} base parameters, "
-                f"expected {n} and {l}"
+                f"expected {self.nv} and {l}"
             )
 
     def __repr__(self) -> str:
@@ -173,8 +173,8 @@ class DynamicsModel(Answers):
     def E(self) -> NDArray[np.uint8] | None:
         """Return the matrix E, (5n, p) uint8 for n joints, whose columns are the exponents of the p monomials.
 
-        The rows are the exponents of q, sin q, cos q, qd and qdd, in this order, each with one row per joint. E is None if
-        the model was derived with `expand=False`.
+        The rows are the exponents of q, sin q, cos q, qd and qdd, in this order, each with one row per entry of q. E is None
+        if the model was derived with `expand=False`.
         """
         return None if self.expansion is None else self.expansion.E
 

@@ -164,7 +164,9 @@ def _travels(mechanism: Mechanism, travel: Array) -> list[Any]:
     """Of each joint how far its own coordinates go; a follower's is that of its leader by its ratio, and its offset."""
     own = dict(zip(mechanism.own_joints, positions(frames_of(mechanism), travel.tolist()), strict=True))
     return [
-        own[i] if i in own else sum(abs(ratio) * own[leader] for leader, ratio in other.shares) + abs(other.offset)
+        own[i]
+        if i in own
+        else sum(abs(ratio) * own[leader] for leader, ratio in other.shares) + abs(other.offset)
         for i, other in enumerate(mechanism.coordinates)
     ]
 

@@ -54,9 +54,7 @@ class Relations(NamedTuple):
     pivots: tuple[int, ...]
 
 
-def with_linear_loops(
-    robot: Mechanism, follows: Sequence[Sequence[str] | None], source: str
-) -> Mechanism:
+def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None], source: str) -> Mechanism:
     """Return the robot without the loops that close linearly. The joints of these loops follow other joints instead.
 
     Of the joints of a loop, those far from the base follow those near the base, where the motors usually are.
@@ -187,7 +185,9 @@ def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequenc
             continue  # a singular position: several ways lead from it
         whole = np.round(found.rows)
         if np.abs(found.rows - whole).max(initial=0.0) < WHOLE:
-            offsets = np.array([_wrapped(robot, columns[p], x) for p, x in zip(found.pivots, times(whole, q), strict=True)])
+            offsets = np.array(
+                [_wrapped(robot, columns[p], x) for p, x in zip(found.pivots, times(whole, q), strict=True)]
+            )
             relations = Relations(whole, offsets, found.pivots)
             if _stays_closed(gap, relations, mine, rng):
                 return relations
@@ -200,9 +200,7 @@ def _path(robot: Mechanism, end: NamedFrame) -> tuple[int, ...]:
     return () if end.joint == BASE else robot.path_to(end.joint)
 
 
-def _placed(
-    robot: Mechanism, end: NamedFrame, path: Sequence[int], values: Mapping[int, float]
-) -> Placement:
+def _placed(robot: Mechanism, end: NamedFrame, path: Sequence[int], values: Mapping[int, float]) -> Placement:
     """The end of a loop, seen from the last body that carries both ends."""
     found = Placement.identity()
     for i in path:
@@ -257,11 +255,12 @@ def _assembled(gap: Gap, start: Array, count: int, order: Sequence[int]) -> Arra
     q = start.copy()
     for _ in range(STEPS):
         error = gap(q)
-        if np.abs(error).max() < CLOSED:
-            return q
+        is_closed = np.abs(error).max() < CLOSED
         found = _eliminated(_slopes(gap, q, count), order, error[:count])
         step = found.offsets[: len(found.pivots)]
         q[list(found.pivots)] -= step * min(1.0, 0.5 / max(np.abs(step).max(initial=0.0), 1e-300))
+        if is_closed:  # and with this step to the last digits
+            return q
     return None
 
 

@@ -293,6 +293,11 @@ class Mechanism:
         return leaders(self.coordinates)
 
     @property
+    def own_types(self) -> tuple[JointType, ...]:
+        """Types of the joints that are not mimic joints, in order."""
+        return tuple(self.joints[i].type for i in self.own_joints)
+
+    @property
     def has_followers(self) -> bool:
         return len(self.own_joints) < len(self)
 
