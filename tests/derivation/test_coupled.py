@@ -61,8 +61,8 @@ def test_fingers_on_two_branches_have_e_and_p(tmp_path):
 
 
 def test_higher_powers_than_two_are_refused(tmp_path):
-    with pytest.raises(psdmc.DerivationError, match="with the power 4"):
-        derived(tmp_path, fingers(2))
+    with pytest.raises(psdmc.DerivationError, match="with the power 3"):
+        derived(tmp_path, fingers(3))
 
 
 def test_sliding_fingers_have_e_and_p(tmp_path):
