@@ -293,9 +293,14 @@ class Mechanism:
         return leaders(self.coordinates)
 
     @property
+    def leading_joints(self) -> tuple[Joint, ...]:
+        """The joints that are not mimic joints, in order."""
+        return tuple(self.joints[i] for i in self.own_joints)
+
+    @property
     def own_types(self) -> tuple[JointType, ...]:
         """Types of the joints that are not mimic joints, in order."""
-        return tuple(self.joints[i].type for i in self.own_joints)
+        return tuple(joint.type for joint in self.leading_joints)
 
     @property
     def has_followers(self) -> bool:

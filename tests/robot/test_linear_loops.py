@@ -57,7 +57,9 @@ def test_loops_of_the_palletiser_are_closed_in_pinocchio_in_random_positions():
         for first, one, second, other in ENDS:
             gap = place[first].act(np.array(one)) - place[second].act(np.array(other))
             assert np.abs(gap).max() < 1e-14
-        assert place["wrist"].rotation[2] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)  # the flange stays level
+        assert place["wrist"].rotation[2] == pytest.approx(
+            [0.0, 0.0, 1.0], abs=1e-14
+        )  # the flange stays level
 
 
 def configured(model: pinocchio.Model, own: dict[str, float]) -> np.ndarray:
@@ -66,7 +68,9 @@ def configured(model: pinocchio.Model, own: dict[str, float]) -> np.ndarray:
     for joint, name in zip(model.joints, model.names, strict=True):
         if name in own:
             angle = own[name]
-            q[joint.idx_q : joint.idx_q + joint.nq] = angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+            q[joint.idx_q : joint.idx_q + joint.nq] = (
+                angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+            )
     return q
 
 
@@ -103,7 +107,9 @@ def test_the_coupled_model_moves_as_the_tree_with_loops_that_stay():
         whole = np.zeros(10)
         whole[motors] = 1e3 * tau
         contacts = np.zeros(len(tree.contacts))
-        qdd, _ = tree.constrained_forward_dynamics(following.positions(q), following.rates(qd), whole, contacts)
+        qdd, _ = tree.constrained_forward_dynamics(
+            following.positions(q), following.rates(qd), whole, contacts
+        )
         expected = coupled.forward_dynamics(q, qd, 1e3 * tau)
         np.testing.assert_allclose(qdd, following.rates(expected), rtol=1e-9, atol=1e-9)
 
