@@ -72,12 +72,10 @@ def hold(model: mujoco.MjModel, data: mujoco.MjData, is_held: bool) -> None:
 
 def motion(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Positions, rates and accelerations of the motors at time t (polynomials of degree five), and if the box is held."""
-    for (_, start, held), (length, end, _) in zip(POSES, POSES[1:], strict=False):
-        if t < length:
-            break
-        t -= length
-    else:
-        t = length
+    ends = np.cumsum([length for length, _, _ in POSES])
+    k = min(int(np.searchsorted(ends, t, side="right")), len(POSES) - 1)
+    (_, start, held), (length, end, _) = POSES[k - 1 : k + 1]
+    t = min(t - ends[k - 1], length)
     s, way = t / length, np.subtract(end, start)
     by_s = [s**3 * (10 - 15 * s + 6 * s * s), 30 * s * s * (1 - s) ** 2, 60 * s * (1 - s) * (1 - 2 * s)]
     q, qd, qdd = (np.asarray(way * value / length**k) for k, value in enumerate(by_s))

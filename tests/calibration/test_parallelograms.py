@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+
 import psdmc
 
 ROBOTS = Path(__file__).parents[2] / "examples" / "robots"

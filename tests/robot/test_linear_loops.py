@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 import pytest
+from small_robots import EXAMPLES
 
 import psdmc
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import load_robot, load_robot_text
-from small_robots import EXAMPLES
 
 PALLETISER, LOOPS = EXAMPLES / "palletiser.urdf", EXAMPLES / "palletiser_loops.toml"
 ENDS = [
@@ -39,7 +39,7 @@ def linkage(lengths: Sequence[float], angles: Sequence[float] = (0.5, 0.0, 0.5),
     return 'name = "linkage"\nconvention = "modified"\ngravity = [0.0, -9.81, 0.0]\n' + "".join(tables) + loop
 
 
-def loaded(*arguments: object, **keywords: object):  # noqa: ANN201
+def loaded(*arguments: object, **keywords: object):
     return load_robot_text(linkage(*arguments, **keywords), "dh", source_name="linkage.toml").mechanism
 
 
