@@ -17,8 +17,8 @@ import numpy as np
 
 import psdmc
 
-ROBOTS = Path(__file__).resolve().parents[1] / "robots"
-URDF, LOOPS = ROBOTS / "palletiser.urdf", ROBOTS / "palletiser_loops.toml"
+HERE = Path(__file__).resolve().parent
+URDF, LOOPS = HERE / "palletiser.urdf", HERE / "palletiser_loops.toml"
 BOX, CENTRE, EDGE = 80.0, (0.0, 0.0, -0.3), (0.6, 0.4, 0.3)
 """kg, m in the flange's frame, m."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 import psdmc
 
-ROBOTS = Path(__file__).parents[2] / "examples" / "robots"
+ROBOTS = Path(__file__).parents[2] / "examples" / "palletiser"
 FRICTION, NOISE = (30.0, 40.0), 1.0
 """Viscous (N m s/rad) and Coulomb friction (N m) of each motor; noise, N m."""
 

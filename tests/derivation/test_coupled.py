@@ -9,7 +9,7 @@ import pytest
 
 import psdmc
 
-ROBOTS = Path(__file__).parents[2] / "examples" / "robots"
+ROBOTS = Path(__file__).parents[2] / "examples" / "palletiser"
 
 
 def gripper(joints: str) -> str:

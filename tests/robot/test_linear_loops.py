@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import EXAMPLES
 
 import psdmc
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import load_robot, load_robot_text
 
-PALLETISER, LOOPS = EXAMPLES / "palletiser.urdf", EXAMPLES / "palletiser_loops.toml"
+HERE = Path(__file__).parents[2] / "examples" / "palletiser"
+PALLETISER, LOOPS = HERE / "palletiser.urdf", HERE / "palletiser_loops.toml"
 ENDS = [
     ("upper_arm", (-0.25, 0.0, 0.0), "rod", (0.0, 0.0, 0.945)),
     ("triangle", (-0.11, 0.0, 0.16), "lower_link", (0.0, 0.0, 0.945)),
