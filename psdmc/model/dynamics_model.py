@@ -176,7 +176,7 @@ class DynamicsModel(Answers):
         """Return the matrix E of exponents: each column describes one of the p monomials in the robot's torques.
 
         A monomial is a product of powers of q, sin q, cos q, qd and qdd. E has the shape (5n, p) and the type uint8: n rows
-        of exponents of q (one row per entry of q), then n rows of sin q, and so on. E is None if the model was derived with
+        of exponents of q, one per entry of q, then n rows of sin q, and so on. E is None if the model was derived with
         `expand=False`.
         """
         return None if self.expansion is None else self.expansion.E

@@ -92,7 +92,15 @@ def test_feet_stick_or_slide_as_coulomb_says(landing: Any, world: Any) -> None:
 
 def test_the_program_prints_forces_within_friction(urdf: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    words = [sys.executable, str(EXAMPLE), str(urdf), "--seconds", "0.09", "--plot", str(tmp_path / "landing.png")]
+    words = [
+        sys.executable,
+        str(EXAMPLE),
+        str(urdf),
+        "--seconds",
+        "0.09",
+        "--plot",
+        str(tmp_path / "landing.png"),
+    ]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     rows = [line.replace("in the air", "0.0").split() for line in done.stdout.splitlines()[2:-1]]
