@@ -208,6 +208,11 @@ def held_on_arrays(
     )
 
 
+def joined(of_contacts: Array, of_loops: Array) -> Array:
+    """Return values for the rows of contacts and then of closed loops, (k, rows, ...)."""
+    return np.concatenate([of_contacts, of_loops], axis=1)
+
+
 def active_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Return which rows of the contacts are active, (k, rows)."""
     return np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5

@@ -24,7 +24,7 @@ from psdmc.toolchain.call import CompiledRobot
 
 Array = np.ndarray
 
-FUNCTIONS = ("loop_error", "loop_jacobian", "loop_drift", "constrained_forward_dynamics")
+FUNCTIONS = ("loop_error", "loop_jacobian", "loop_drift", "constrained_forward_dynamics", "impulse")
 COUNT = 16
 
 ROWS = (3, ["y", "rx", "rz"], ["x", "z", "ry", "rz"], ["x", "y", "rx", "ry", "rz"])
@@ -57,6 +57,8 @@ class LoopTree:
         return {
             "q": q,
             "qd": qd,
+            "qd_before": qd,
+            "restitution": rng.uniform(0.0, 1.0, COUNT),
             "tau": tau,
             "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_free_root,
             "mu": np.zeros(COUNT),

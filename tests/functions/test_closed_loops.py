@@ -76,16 +76,45 @@ def rates(q: Array, rate: float) -> Array:
     return np.array([rate, coupler - rate, rocker])
 
 
+@pytest.mark.parametrize("name", [NAME, "impulse"])
 @pytest.mark.parametrize(("seed", "floating"), TREES)
-def test_trees_with_loops_have_the_dense_systems_solution(seed: int, floating: bool) -> None:
+def test_trees_with_loops_have_the_dense_systems_solution(seed: int, floating: bool, name: str) -> None:
     """From Pinocchio's numbers of both frames, with the contact on and off, and mu = 0 or more."""
     own = loop_tree(seed, floating)
     for mu in (0.0, 0.3):
         other = {"mu": np.full(len(own.given["q"]), mu)}
-        expected = own.expected(NAME, **other)
-        for found in own.found(NAME, **other):
+        expected = own.expected(name, **other)
+        for found in own.found(name, **other):
             for value, array in zip(found, expected.values(), strict=True):
                 assert np.abs(value - array).max() < 1e-10 * np.abs(array).max()
+
+
+def test_an_impact_stops_loops_and_contacts_rebound() -> None:
+    """Loops hold still, whatever they did before; if they held before, an elastic impact keeps the energy."""
+    own = loop_tree(0, True)
+    model, q, qd = own.model, own.given["q"], own.given["qd"]
+    before = model.impulse(q, qd, [0.0]).qd_after
+    after = own.robot.impulse(q, before, [1.0], 1.0)
+    scale = np.abs(qd).max()
+    for rates in (before, after.qd_after):
+        assert np.abs(np.einsum("kij,kj->ki", model.loop_jacobian(q), rates)).max() < 1e-10 * scale
+    sums = np.einsum("kij,kj->ki", model.contact_jacobian(q), after.qd_after + before)
+    assert np.abs(sums).max() < 1e-10 * scale
+    assert np.abs(after.qd_after - before).max() > 0.1
+    energies = [model.kinetic_energy(q, rates) for rates in (before, after.qd_after)]
+    np.testing.assert_allclose(*energies, rtol=1e-10)
+
+
+def test_a_loop_that_closes_leaves_a_four_bar_the_rate_of_its_one_coordinate(tmp_path: Path) -> None:
+    """The momentum along the closed form's motion stays."""
+    model, before = four_bar(tmp_path), np.array([1.0, -2.0, 0.5])
+    for crank in (-2.0, 0.4, 1.5):
+        q = assembled(crank)
+        way, mass = rates(q, 1.0), model.mass_matrix(q)
+        found = model.impulse(q, before, np.zeros(len(model.contacts)))
+        expected = way * (way @ mass @ before) / (way @ mass @ way)
+        np.testing.assert_allclose(found.qd_after, expected, atol=1e-12)
+        assert found.impulses.shape == (sum(model.contacts.values()) + 2,)
 
 
 def test_rates_of_a_four_bar_are_in_closed_form(tmp_path: Path) -> None:
@@ -245,7 +274,6 @@ def test_a_dead_point_names_the_loop(tmp_path: Path) -> None:
 def test_functions_without_loops_are_refused(tmp_path: Path) -> None:
     model = four_bar(tmp_path)
     others = (
-        "impulse",
         "delassus",
         "contact_inverse_dynamics",
         "contact_space_inertia",
