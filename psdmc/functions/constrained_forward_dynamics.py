@@ -133,7 +133,7 @@ def solved(g: Ingredients) -> Solved:
         for own, row, error in zip(drifts, rows, errors, strict=True)
     ]
     load = [given - h for given, h in zip(tau, bias, strict=True)]
-    mask = Held.of(g, g.loops)
+    mask = Held.of(g)
     return *mask.solved(factors, rows, load, wanted), factors, rows
 
 

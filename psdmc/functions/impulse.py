@@ -115,7 +115,7 @@ def solved(g: Ingredients) -> Solved:
         own = closed_loops.loop_jacobian(g.frames, g.loops, q, g.root)
         wanted += [-inner_product(row, before) for row in own]
         rows += own
-    return *Held.of(g, g.loops).solved(factors, rows, g.still, wanted), factors, rows
+    return *Held.of(g).solved(factors, rows, g.still, wanted), factors, rows
 
 
 def _within(restitution: Any, sign: Any) -> Any:

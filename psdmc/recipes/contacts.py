@@ -88,9 +88,9 @@ class Held(NamedTuple):
     loops: Sequence[Loop] = ()
 
     @staticmethod
-    def of(g: Ingredients, loops: Sequence[Loop] = ()) -> Held:
-        """Return the contacts of a trace, by the inputs active and mu."""
-        return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si, loops)
+    def of(g: Ingredients) -> Held:
+        """Return the contacts and the loops of a trace, by the inputs active and mu."""
+        return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si, g.loops)
 
     @staticmethod
     def on_arrays(robot: RobotOnArrays, given: Mapping[str, Array], loops: Sequence[Loop] = ()) -> Held:

@@ -17,6 +17,7 @@ from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
+from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.reference import reference
@@ -24,7 +25,22 @@ from psdmc.toolchain.call import CompiledRobot
 
 Array = np.ndarray
 
-FUNCTIONS = ("loop_error", "loop_jacobian", "loop_drift", "constrained_forward_dynamics", "impulse")
+FUNCTIONS = (
+    "loop_error",
+    "loop_jacobian",
+    "loop_drift",
+    "constrained_forward_dynamics",
+    "constrained_forward_dynamics_derivatives",
+    "constrained_forward_dynamics_vjp",
+    "constrained_forward_dynamics_jvp",
+    "constrained_semi_implicit_euler",
+    "constrained_semi_implicit_euler_derivatives",
+    "constrained_rk4_step",
+    "impulse",
+    "impulse_derivatives",
+    "impulse_vjp",
+    "impulse_jvp",
+)
 COUNT = 16
 
 ROWS = (3, ["y", "rx", "rz"], ["x", "z", "ry", "rz"], ["x", "y", "rx", "ry", "rz"])
@@ -54,17 +70,27 @@ class LoopTree:
         rng = np.random.default_rng(5)
         q, qd, tau = states_of(robot, rng, COUNT)
         q[-1] = self.closed
-        return {
+        found = {
             "q": q,
             "qd": qd,
             "qd_before": qd,
             "restitution": rng.uniform(0.0, 1.0, COUNT),
             "tau": tau,
+            "dt": np.linspace(0.001, 0.02, COUNT),
             "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_free_root,
             "mu": np.zeros(COUNT),
             "kp": rng.uniform(0.0, 50.0, COUNT),
             "kd": rng.uniform(0.0, 10.0, COUNT),
             "error": 0.01 * rng.normal(size=(COUNT, sum(robot.rows_of_contacts))),
+        }
+        sizes = Sizes(
+            len(robot), robot.nq, robot.nv, 0, 1, 0, robot.rows_of_contacts, robot.rows_of_loops
+        )
+        others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
+        return found | {
+            name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))
+            for name, each in others.items()
+            if name not in found
         }
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
