@@ -74,7 +74,12 @@ def closed_loops(
     snap      rad; rotations that differ by at most this much from a right angle become exact
     """
     problems: list[str] = []
-    loops = [_loop(table, number, frame_of, snap, problems) for number, table in enumerate(tables, start=1)]
+    try:
+        loops = [
+            _loop(table, number, frame_of, snap, problems) for number, table in enumerate(tables, start=1)
+        ]
+    except InputError as error:
+        raise InputError(f"{source}: {error}", error.hint) from None
     problems += naming_faults([name for name, *_ in loops], "loop")
     for name, first, second, _ in loops:
         if first.joint == second.joint and not problems:
@@ -164,5 +169,8 @@ def _frame(
     if not link:
         problems += [] if "link" in table.table or value is None else [f"{where}: link is missing"]
         return NamedFrame(name, BASE, place, 0)
-    own = frame_of(link)
+    try:
+        own = frame_of(link)
+    except InputError as error:
+        raise InputError(f"{where}: {error}", error.hint) from None
     return NamedFrame(name, own.joint, own.placement @ place, 0)

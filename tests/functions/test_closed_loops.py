@@ -297,6 +297,24 @@ def test_what_cannot_be_assembled_or_holds_no_angle_is_refused(tmp_path: Path) -
         psdmc.derive(tmp_path / "four_bar.urdf", loops=[{"rows": 3, "first": "rocker"}])
 
 
+def test_faults_name_the_file_of_the_loops_and_the_key(tmp_path: Path) -> None:
+    four_bar(tmp_path)
+    path = tmp_path / "loops.toml"
+    for first, said in (('"rocker"', "loop 'loop1': rows: found 7"), ('"no"', "loop 'loop1': first: four_bar.urdf: frame 'no'")):
+        path.write_text(f'[[loop]]\nrows = 7\nfirst = {first}\nsecond = "coupler"\n', encoding="utf-8")
+        with pytest.raises(InputError, match=f"^loops.toml: {said}"):
+            psdmc.derive(tmp_path / "four_bar.urdf", loops=path, expand=False)
+    for wrong in (math.nan, object(), np.array([np.nan, 0.0, 0.0])):
+        with pytest.raises(InputError, match="^loops: table 1: first is "):
+            four_bar(tmp_path, first={"link": "rocker", "xyz": wrong})
+
+
+def test_loops_can_have_numbers_of_numpy(tmp_path: Path) -> None:
+    place = {"link": "rocker", "xyz": np.array([0.4, 0.0, 0.0])}
+    model = four_bar(tmp_path, first=place, rows=np.array(["x", "z"]))
+    assert model.content_hash == four_bar(tmp_path).content_hash
+
+
 def test_a_dead_point_names_the_loop(tmp_path: Path) -> None:
     """Crank, coupler and rocker in one line hold the same motion twice."""
     path = tmp_path / "flat.urdf"
