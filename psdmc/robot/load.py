@@ -213,7 +213,11 @@ def _loops(draft: Draft, options: LoadOptions, frames: Sequence[NamedFrame], sou
     if not tables or find is None:
         return ()
     return closed_loops(
-        tables, lambda name: named[name] if name in named else find(name), options.snap, source
+        tables,
+        lambda name: named[name] if name in named else find(name),
+        [joint.name for joint in draft.joints],
+        options.snap,
+        source,
     )
 
 

@@ -22,6 +22,7 @@ from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
+from psdmc.verification.source import with_passive_joints
 
 Array = np.ndarray
 
@@ -36,6 +37,8 @@ FUNCTIONS = (
     "constrained_semi_implicit_euler",
     "constrained_semi_implicit_euler_derivatives",
     "constrained_rk4_step",
+    "passive_motion",
+    "loop_inverse_dynamics",
     "impulse",
     "impulse_derivatives",
     "impulse_vjp",
@@ -76,6 +79,7 @@ class LoopTree:
             "qd_before": qd,
             "restitution": rng.uniform(0.0, 1.0, COUNT),
             "tau": tau,
+            "qdd": rng.normal(size=qd.shape),
             "dt": np.linspace(0.001, 0.02, COUNT),
             "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_free_root,
             "mu": np.zeros(COUNT),
@@ -95,7 +99,7 @@ class LoopTree:
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
         """The values from Pinocchio's own reading of the file and of the loops' frames."""
-        return RECIPES[function].pinocchio(reference(self.loaded, snapped=False), self.given | other)
+        return RECIPES[function].pinocchio(reference(with_passive_joints(self.model, self.loaded), snapped=False), self.given | other)
 
     def found(self, function: str, **other: Array) -> list[tuple[Array, ...]]:
         """The values of C for many states, of C for each state, and of the model in NumPy."""
