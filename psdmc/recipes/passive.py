@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from psdmc.dynamics.closed_loops import loop_drift, loop_jacobian
+from psdmc.dynamics.closed_loops import ANGULAR, loop_drift, loop_jacobian
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.kinematics import AT_BASE
 from psdmc.dynamics.named_frames import Root
@@ -66,14 +66,16 @@ class PassiveJoints(NamedTuple):
     ) -> PassiveJoints:
         """Return the equations at q. `si` returns a constant from its value and its unit."""
         jacobian = loop_jacobian(frames, loops, q, root)
-        numbers, scales = _passive_rates(frames, loops, si)
-        rows = [[scale * row[k] for k, scale in zip(numbers, scales, strict=True)] for row in jacobian]
+        numbers, every = _passive_rates(frames, loops, si)
+        scales = [every[k] for k in numbers]
+        whole = [[scale * x for scale, x in zip(every, row, strict=True)] for row in jacobian]
+        rows = [[row[k] for k in numbers] for row in whole]
         wide = [[inner_product(a, b) for b in rows] for a in rows]
         factors = factorize(wide)
         diagonal = inverse_diagonal(factors)
         signs = [
-            regular(1.0, pivot, wide[k][k], entry)
-            for k, (pivot, entry) in enumerate(zip(factors.pivots, diagonal, strict=True))
+            regular(1.0, pivot, size, entry)
+            for pivot, size, entry in zip(factors.pivots, _sizes(loops, whole), diagonal, strict=True)
         ]
         return PassiveJoints(jacobian, numbers, scales, rows, factors, signs)
 
@@ -129,10 +131,20 @@ def motion(
     return joints, rates, joints.completed(qdd, loop_drift(frames, loops, q, rates, root))
 
 
+def _sizes(loops: Sequence[Loop], rows: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+    """For each row the sum of the squares of all entries of the loop's linear rows, or of its angular rows. A row of J_p
+    can be zero, so its own size says nothing."""
+    kinds = [(number, row >= ANGULAR) for number, loop in enumerate(loops) for row in loop.rows]
+    sums: dict[tuple[int, bool], Scalar] = {}
+    for kind, row in zip(kinds, rows, strict=True):
+        sums[kind] = sums.get(kind, 0.0) + inner_product(row, row)
+    return [sums[kind] for kind in kinds]
+
+
 def _passive_rates(
     frames: Sequence[Frame], loops: Sequence[Loop], si: Callable[[float, str], Scalar]
 ) -> tuple[list[int], list[Scalar]]:
-    """Numbers of the passive rates, and a radian or a metre for each."""
+    """Numbers of the passive rates, and a radian or a metre for each rate."""
     passive = {joint for loop in loops for joint in loop.passive}
     own = [
         (j, order)
@@ -141,4 +153,4 @@ def _passive_rates(
         for order in frame.joint.v_orders
     ]
     numbers = [k for k, (joint, _) in enumerate(own) if joint in passive]
-    return numbers, [si(1.0, "m") if own[k][1] else 1.0 for k in numbers]
+    return numbers, [si(1.0, "m") if order else 1.0 for _, order in own]

@@ -97,6 +97,14 @@ class LoopTree:
             if name not in found
         }
 
+    @cached_property
+    def far(self) -> Array:
+        """Which states are far from those where rows of loops depend on each other: derivatives keep their digits there."""
+        q, counts = self.given["q"], []
+        for mass, rows in zip(self.model.mass_matrix(q), self.model.loop_jacobian(q), strict=True):
+            counts.append(np.linalg.cond(rows @ np.linalg.solve(mass, rows.T)))
+        return np.array(counts) < 1e5
+
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
         """The values from Pinocchio's own reading of the file and of the loops' frames."""
         return RECIPES[function].pinocchio(reference(with_passive_joints(self.model, self.loaded), snapped=False), self.given | other)
