@@ -41,9 +41,9 @@ DEPENDENT = 1e-7
 
 
 def require_closable(robot: Mechanism) -> Array:
-    """Return configurations (states, nq) in which all loops are closed. Raise InputError if loops of the robot cannot be assembled, or if rows of them are redundant.
+    """Return configurations (states, nq) in which all loops are closed.
 
-    Raises InputError also if a loop closes one rotation of several: this holds a rate to zero, but no angle.
+    Raises InputError if loops of the robot cannot be assembled, or if rows of them are redundant. Raises InputError also if a loop closes one rotation of several: this holds a rate to zero, but no angle.
     """
     if not robot.loops:
         return np.zeros((0, robot.nq))
@@ -71,7 +71,7 @@ def require_closable(robot: Mechanism) -> Array:
     _refuse_redundant(robot, q, scales)
     for loop in robot.loops:
         _refuse_one_rotation(robot, loop, q)
-    return q
+    return np.asarray(q)
 
 
 def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
@@ -97,10 +97,14 @@ def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
         joints = tuple(robot.rate_joints[k] for k in chosen)
         first, *others = robot.loops
         names = ", ".join(robot.joints[j].name for j in joints)
-        note = f"passive joints, chosen: {names}; to choose others, write passive = [...] into a table [[loop]]"
+        note = (
+            f"passive joints, chosen: {names}; to choose others, write passive = [...] into a table [[loop]]"
+        )
         loops = (replace(first, passive=joints), *others)
         return replace(robot, loops=loops, notes=(*robot.notes, note))
-    names = ", ".join(robot.joints[joint].name for joint in dict.fromkeys(robot.rate_joints[k] for k in declared))
+    names = ", ".join(
+        robot.joints[joint].name for joint in dict.fromkeys(robot.rate_joints[k] for k in declared)
+    )
     hint = "name others in [[loop]]"
     if share >= DEPENDENT:
         listed = ", ".join(f'"{robot.joints[robot.rate_joints[k]].name}"' for k in chosen)
@@ -113,7 +117,8 @@ def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
         )
     if _independent(rows, np.array(declared))[1] < DEPENDENT:
         raise InputError(
-            f"'{robot.name}': the motion of passive joints {names} does not follow from that of the other joints", hint
+            f"'{robot.name}': the motion of passive joints {names} does not follow from that of the other joints",
+            hint,
         )
     return robot
 

@@ -147,11 +147,8 @@ def loop_pushes(
         force, moment = (six[0], six[1], six[2]), (six[3], six[4], six[5])
         chain = _chain(part_of(frames, loop, q, (), root))
         for i, j, turns, (v, z), (along, about) in _pairs(chain):
-            if turns:
-                torque = dot(about, add(cross(v, force), cross(z, moment)))
-            else:
-                torque = dot(z, cross(along, force))
-            found[i][j] = found[i][j] + torque
+            bent = add(cross(v, force), cross(z, moment))
+            found[i][j] = found[i][j] + (dot(about, bent) if turns else dot(z, cross(along, force)))
     return found
 
 

@@ -241,7 +241,8 @@ def loop_slopes_by_pinocchio(robot: Reference, given: Given, forces: Array, kp: 
     by_q, by_qd = [], []
     for way in ways:
         near = [
-            weight * (all_at(robot.integrated(q, k * STEP * way)) - all_at(robot.integrated(q, -k * STEP * way)))
+            weight
+            * (all_at(robot.integrated(q, k * STEP * way)) - all_at(robot.integrated(q, -k * STEP * way)))
             for k, weight in enumerate(WEIGHTS, start=1)
         ]
         by_q.append(np.sum(near, axis=0) / STEP)
@@ -275,8 +276,7 @@ def pinocchio(robot: Reference, given: Given) -> Arrays:
         loops = loop_slopes_by_pinocchio(robot, moved, found["forces"][:, rows:], kp[..., 0])
         turn = turn + loops.pushes
         jacobian, by_q, by_qd = (
-            joined(*pair)
-            for pair in ((jacobian, loops.jacobian), (by_q, loops.by_q), (by_qd, loops.by_qd))
+            joined(*pair) for pair in ((jacobian, loops.jacobian), (by_q, loops.by_q), (by_qd, loops.by_qd))
         )
     unit = np.broadcast_to(np.eye(qd.shape[1]), slopes[0].shape)
     one = np.broadcast_to(np.eye(jacobian.shape[1], rows), (len(q), jacobian.shape[1], rows))

@@ -83,7 +83,9 @@ def trace(g: Ingredients) -> Outputs:
     return {**impulse.trace(g), **blocks}
 
 
-def _reversed(of: Constraints, jacobian: Sequence[Sequence[Scalar]], restitution: Scalar) -> list[list[Scalar]]:
+def _reversed(
+    of: Constraints, jacobian: Sequence[Sequence[Scalar]], restitution: Scalar
+) -> list[list[Scalar]]:
     """Derivatives of the prescribed change of the contacts' velocities by the rates before; loops do not rebound."""
     first = of.contact_rows
     return [

@@ -40,8 +40,8 @@ def trace(g: Ingredients) -> Outputs:
 def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     count, state = len(given["q"]), (list(given["q"].T), list(given["qd"].T), list(given["qdd"].T))
     joints, rates, accelerations = motion(robot.frames, robot.chain.loops, state)
-    whole = [columns(values, count) for values in (rates, accelerations)]
-    of_tree = list(robot.torques(given["q"], *whole, robot.base_acceleration).T)
+    qd, qdd = columns(rates, count), columns(accelerations, count)
+    of_tree = list(robot.torques(given["q"], qd, qdd, robot.base_acceleration).T)
     forces = joints.forces(of_tree)
     found = {"tau": joints.carried(of_tree, forces), "loop_forces": forces, PIVOTS: joints.signs}
     return {name: columns(values, count) for name, values in found.items()}

@@ -17,7 +17,9 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-CLOSED_QD = replace(QD, name="qd_closed", means="rates of all joints that keep the loops closed, rad/s or m/s")
+CLOSED_QD = replace(
+    QD, name="qd_closed", means="rates of all joints that keep the loops closed, rad/s or m/s"
+)
 CLOSED_QDD = replace(
     QDD, name="qdd_closed", means="accelerations of all joints that keep the loops closed, rad/s^2 or m/s^2"
 )

@@ -35,7 +35,11 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
         leave = f"without {name}: --functions {others}" if others else ""
         chain, remedy = model.mechanism, REMEDY[need] if need else ""
         if recipe_of(name).lack_of_loops(chain):
-            remedy = remedy if need in (Needs.LOOPS, Needs.PASSIVE) else "derive the model without loops for the open tree"
+            remedy = (
+                remedy
+                if need in (Needs.LOOPS, Needs.PASSIVE)
+                else "derive the model without loops for the open tree"
+            )
         if need is Needs.POSITIVE_MASS and chain.massless and idle_joints(chain):
             remedy = f"add <inertial>, or derive again with {unknown_option(chain)}"
         raise InputError(

@@ -73,8 +73,8 @@ def geometry(
     forces: str,
     kept: dict[str, list[tuple[int, ...]]],
 ) -> tuple[Rows, dict[str, Column]]:
-    """Return the Jacobian of contacts and loops, and what `Counts.arrays` calls J and turn. `kept` gets the entries of each row of
-    J, and of each column of turn, that are not zero."""
+    """Return the Jacobian of contacts and loops, and what `Counts.arrays` calls J and turn. `kept` gets the entries of each
+    row of J, and of each column of turn, that are not zero."""
     counts = Counts.of(of)
     q = read("q", counts.nq)
     jacobian, turn = of.jacobian(q), of.pushes(q, read(forces, counts.rows))
@@ -245,9 +245,7 @@ def slopes_on_arrays(
     """
     of, count, here = constraints_of(robot), len(q), list(q.T)
     turn = of.pushes(here, list(forces.T))
-    by_q, by_qd = of.slopes(
-        here, list(qd.T), list(motion.T), None if of_loops is None else list(of_loops.T)
-    )
+    by_q, by_qd = of.slopes(here, list(qd.T), list(motion.T), None if of_loops is None else list(of_loops.T))
     if kp is not None:
         by_q = of.drawn_closed(by_q, here, kp)
     return matrix(turn, count), matrix(by_q, count), matrix(by_qd, count)

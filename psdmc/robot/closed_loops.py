@@ -78,7 +78,8 @@ def closed_loops(
     problems: list[str] = []
     try:
         loops = [
-            _loop(table, number, frame_of, joints, snap, problems) for number, table in enumerate(tables, start=1)
+            _loop(table, number, frame_of, joints, snap, problems)
+            for number, table in enumerate(tables, start=1)
         ]
     except InputError as error:
         raise InputError(f"{source}: {error}", error.hint) from None

@@ -77,7 +77,7 @@ def load_robot(
     text = robot_text(file)
     text, source_format, found = as_source(file, text, checked_options(**options), checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
-    return _loaded(text, source_format, file.name, found, tables and tables.name)
+    return _loaded(text, source_format, file.name, found, tables.name if tables else None)
 
 
 def load_robot_text(
@@ -95,7 +95,9 @@ def _loaded(
     if not text.strip():
         raise InputError(f"{source}: the file is empty", "give a URDF or a DH .toml file")
     draft = _draft(text, source_format, source, options)
-    return LoadedRobot(_settled(draft, options, source, loops_file), text, source_format, source, draft.snaps, options)
+    return LoadedRobot(
+        _settled(draft, options, source, loops_file), text, source_format, source, draft.snaps, options
+    )
 
 
 def _refuse_size(size: int, source: str) -> None:
@@ -223,9 +225,7 @@ def _loops(draft: Draft, options: LoadOptions, frames: Sequence[NamedFrame], sou
 
 def _loop_note(loop: Loop) -> str:
     rows = ", ".join(ROW_NAMES[row] for row in loop.rows)
-    return (
-        f"loop '{loop.name}' closes {rows} in functions of contacts and loops; all other functions compute the open tree"
-    )
+    return f"loop '{loop.name}' closes {rows} in functions of contacts and loops; all other functions compute the open tree"
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:

@@ -87,9 +87,7 @@ class LoopTree:
             "kd": rng.uniform(0.0, 10.0, COUNT),
             "error": 0.01 * rng.normal(size=(COUNT, sum(robot.rows_of_contacts))),
         }
-        sizes = Sizes(
-            len(robot), robot.nq, robot.nv, 0, 1, 0, robot.rows_of_contacts, robot.rows_of_loops
-        )
+        sizes = Sizes(len(robot), robot.nq, robot.nv, 0, 1, 0, robot.rows_of_contacts, robot.rows_of_loops)
         others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
         return found | {
             name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))
@@ -107,7 +105,9 @@ class LoopTree:
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
         """The values from Pinocchio's own reading of the file and of the loops' frames."""
-        return RECIPES[function].pinocchio(reference(with_passive_joints(self.model, self.loaded), snapped=False), self.given | other)
+        return RECIPES[function].pinocchio(
+            reference(with_passive_joints(self.model, self.loaded), snapped=False), self.given | other
+        )
 
     def found(self, function: str, **other: Array) -> list[tuple[Array, ...]]:
         """The values of C for many states, of C for each state, and of the model in NumPy."""
