@@ -43,7 +43,8 @@ DEPENDENT = 1e-7
 def require_closable(robot: Mechanism) -> Array:
     """Return configurations (states, nq) in which all loops are closed.
 
-    Raises InputError if loops of the robot cannot be assembled, or if rows of them are redundant. Raises InputError also if a loop closes one rotation of several: this holds a rate to zero, but no angle.
+    Raises InputError if loops of the robot cannot be assembled, or if rows of them are redundant. Raises InputError also
+    if a loop closes one rotation of several: this holds a rate to zero, but no angle.
     """
     if not robot.loops:
         return np.zeros((0, robot.nq))

@@ -317,7 +317,7 @@ def test_faults_name_the_file_of_the_loops_and_the_key(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="^" + re.escape(f"loops.toml: {said}")):
             psdmc.derive(tmp_path / "four_bar.urdf", loops=path, expand=False)
     for wrong in (math.nan, object(), np.array([np.nan, 0.0, 0.0])):
-        with pytest.raises(InputError, match="^loops: table 1: first is "):
+        with pytest.raises(InputError, match=r"^loops: table 1: first is "):
             four_bar(tmp_path, first={"link": "rocker", "xyz": wrong})
 
 
