@@ -70,7 +70,7 @@ def trace(g: Ingredients) -> Outputs:
     of = Constraints(g.frames, g.named, g.loops, g.root)
     turn = of.pushes(q, found.forces)
     seen = [x + (1.0 + restitution) * rate for x, rate in zip(found.motion, before, strict=True)]
-    closed = [x + rate for x, rate in zip(found.motion, before, strict=True)]
+    closed = [x + rate for x, rate in zip(found.motion, before, strict=True)] if g.loops else None
     by_q, _ = of.slopes(q, g.still, seen, closed)
     own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
     load = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)]
