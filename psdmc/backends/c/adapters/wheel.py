@@ -65,6 +65,7 @@ class WheelFunction:
     """One function of the Python module.
 
     meaning      description in one line of ASCII without quotation marks
+    note         explanation of derivatives by q, in one line; empty if the outputs contain none
     result       name of the class that holds the outputs if there are several; else empty
     kernels      Python text of the two C functions, without and with the input theta_b; None for a missing function
     takes_theta  whether the package has the function with the input theta_b (base parameters)
@@ -74,6 +75,7 @@ class WheelFunction:
 
     name: str
     meaning: str
+    note: str
     inputs: tuple[WheelArray, ...]
     outputs: tuple[WheelArray, ...]
     result: str
@@ -129,6 +131,7 @@ def _function(function: FunctionView) -> WheelFunction:
     return WheelFunction(
         name=function.name,
         meaning=_plain(function.meaning),
+        note=_plain(signature.note),
         inputs=_arrays(signature.inputs, [vector.shape for vector in first.inputs]),
         outputs=_arrays(signature.outputs, shapes, bool(signature.inputs)),
         result="".join(map(str.capitalize, function.name.split("_"))) if len(shapes) > 1 else "",
