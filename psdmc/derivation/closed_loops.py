@@ -76,12 +76,11 @@ def require_closable(robot: Mechanism) -> Array:
 
 
 def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
-    """Return the robot with passive joints, whose motion follows from that of the others: one rate for each row of its
-    loops.
+    """Return the robot with passive joints, whose motion follows from that of the others.
 
-    If no table [[loop]] names passive joints, psdmc chooses joints of one coordinate whose columns of the loops' Jacobian
-    are as independent as possible in one of the closed configurations q (states, nq). If there are too few, no joint is
-    passive. Raises InputError if the motion of declared passive joints does not follow from that of the others.
+    They have one rate for each row of the loops. If no table [[loop]] names passive joints, psdmc chooses joints of one
+    coordinate. Their columns of the loops' Jacobian are as independent as possible in one of the closed configurations q
+    (states, nq). If there are too few such joints, no joint is passive. Raises InputError if the motion of declared passive joints does not follow from that of the others.
     """
     if not robot.loops:
         return robot
@@ -129,8 +128,10 @@ def _types(robot: Mechanism) -> list[JointType]:
 
 
 def _independent(rows: Array, candidates: NDArray[np.intp]) -> tuple[list[int], float]:
-    """Return as many columns of the matrices (states, rows, nv) as they have rows, and the smallest share of a column that
-    the others do not explain, in the state where this is largest. In each state, the column with the largest rest is next.
+    """Return as many independent columns of matrices (states, rows, nv) as they have rows, and a measure of independence.
+
+    The measure is the smallest share of a column that those before it do not explain. The columns are those of the state
+    where it is largest. In each state, the column with the largest unexplained rest is next.
     """
     best: tuple[list[int], float] = ([], 0.0)
     if len(candidates) < rows.shape[1]:

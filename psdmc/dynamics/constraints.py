@@ -1,4 +1,4 @@
-"""What contacts and closed loops have in common: rows of one Jacobian, those of the contacts and then those of the loops."""
+"""Contacts and closed loops are rows of one Jacobian: first the rows of the contacts, then those of the loops."""
 
 from __future__ import annotations
 

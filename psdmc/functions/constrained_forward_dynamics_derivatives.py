@@ -214,7 +214,7 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
 
 
 class LoopSlopes(NamedTuple):
-    """Of loops: the Jacobian, the derivatives of J^T f by q, and those of J qdd + dJ/dt qd + kp error by q and by qd."""
+    """The Jacobian J of loops, the derivatives of J^T f by q, and those of J qdd + dJ/dt qd + kp error."""
 
     jacobian: Array
     pushes: Array

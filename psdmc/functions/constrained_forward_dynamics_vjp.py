@@ -18,8 +18,9 @@ from psdmc.recipes.torques import torques
 
 
 def residuals(g: Ingredients, qdd: Sequence[Scalar], forces: Sequence[Scalar]) -> list[Scalar]:
-    """Return the torques of inverse dynamics less tau and J^T forces, and what the accelerations of contacts and loops are
-    too large by, without the part of the forces."""
+    """Return the torques of inverse dynamics less tau and J^T forces, and by how much accelerations are too large.
+
+    The accelerations are those of contacts and loops, without the part of the forces."""
     q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
     of = Constraints(g.frames, g.named, g.loops, g.root)
