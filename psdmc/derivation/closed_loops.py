@@ -80,7 +80,8 @@ def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
 
     They have one rate for each row of the loops. If no table [[loop]] names passive joints, psdmc chooses joints of one
     coordinate. Their columns of the loops' Jacobian are as independent as possible in one of the closed configurations q
-    (states, nq). If there are too few such joints, no joint is passive. Raises InputError if the motion of declared passive joints does not follow from that of the others.
+    (states, nq). If there are too few such joints, no joint is passive. Raises InputError if the motion of declared
+    passive joints does not follow from that of the others.
     """
     if not robot.loops:
         return robot

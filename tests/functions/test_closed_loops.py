@@ -371,4 +371,5 @@ def test_a_saved_model_has_its_loops(tmp_path: Path) -> None:
     q = assembled(1.0)
     assert again.loops == model.loops
     assert again.content_hash == model.content_hash
+    assert again.mechanism.passive_rates == model.mechanism.passive_rates == (1, 2)
     assert np.array_equal(again.loop_jacobian(q), model.loop_jacobian(q))
