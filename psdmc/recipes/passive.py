@@ -110,10 +110,9 @@ class PassiveJoints(NamedTuple):
 
     def carried(self, torques: Sequence[Scalar], forces: Sequence[Scalar]) -> list[Scalar]:
         """Return the torques less J^T f, and 0 for passive joints."""
-        columns = zip(torques, zip(*self.jacobian, strict=True), strict=True)
         return [
-            0.0 if k in self.numbers else torque - inner_product(column, forces)
-            for k, (torque, column) in enumerate(columns)
+            0.0 if k in self.numbers else torque - inner_product([row[k] for row in self.jacobian], forces)
+            for k, torque in enumerate(torques)
         ]
 
 
