@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from psdmc.derivation.certify import judged, measured
-from psdmc.derivation.closed_loops import require_closable
+from psdmc.derivation.closed_loops import require_closable, with_passive_joints
 from psdmc.derivation.expand import (
     EXTENDED,
     FINEST,
@@ -74,7 +74,7 @@ def derive_model(
     tell = progress or silent
     require_derivable(chain)
     _refuse_absurd(chain)
-    require_closable(chain)
+    chain = with_passive_joints(chain, require_closable(chain))
     if expand is None:
         expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)
     if expand:

@@ -146,17 +146,20 @@ def _frame_to_json(frame: NamedFrame) -> dict[str, Any]:
 
 def _loop_to_json(loop: Loop) -> dict[str, Any]:
     ends = {"first": _frame_to_json(loop.first), "second": _frame_to_json(loop.second)}
-    return {"name": loop.name, **ends, "rows": list(loop.rows)}
+    passive = {"passive": list(loop.passive)} if loop.passive else {}
+    return {"name": loop.name, **ends, "rows": list(loop.rows), **passive}
 
 
 def _loop_from_json(data: object, joints: int) -> Loop:
     first, second = (_frame_from_json(part(data, end, "a loop"), joints, BASE) for end in ("first", "second"))
     rows = entries(part(data, "rows", "a loop"), "a loop's rows", len(ROW_NAMES))
+    passive = entries(data.get("passive", []), "passive joints", joints) if isinstance(data, dict) else ()
     return Loop(
         text(part(data, "name", "a loop"), "a loop's name"),
         first,
         second,
         tuple(whole(row, "a loop's row", 0, len(ROW_NAMES) - 1) for row in rows),
+        tuple(whole(joint, "a passive joint", 0, joints - 1) for joint in passive),
     )
 
 

@@ -57,14 +57,15 @@ class Relations(NamedTuple):
 def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None], source: str) -> Mechanism:
     """Return the robot without the loops that close linearly. The joints of these loops follow other joints instead.
 
-    Of the joints of a loop, those far from the base follow those near the base, where the motors usually are.
+    Of the joints of a loop, those far from the base follow those near the base, where the motors usually are. Joints that
+    a loop calls passive follow before all others.
 
     follows  for each loop, the names of joints that must follow; empty: the loop stays; None: psdmc chooses
 
     Raises InputError if a joint cannot follow.
     """
     columns = tuple(i for i in robot.own_joints if robot.joints[i].type.about_z)
-    named = {name for names in follows for name in names or ()}
+    named = {name for names in follows for name in names or ()} | _passive(robot, robot.loops)
     depths = [len(robot.path_to(i)) for i in range(len(robot))]
     order = sorted(
         range(len(columns)),
@@ -96,10 +97,16 @@ def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None],
         for row, offset, pivot in zip(known.rows.tolist(), known.offsets.tolist(), known.pivots, strict=True)
         for row in (np.array(row),)
     }
+    if kept:  # a passive joint may belong to one of these
+        named = {name for names in follows for name in names or ()}
     _require_followers(robot, named, found, source)
     coordinates = tuple(_composed(coordinate, found) for coordinate in robot.coordinates)
     notes = (_note(robot, linear, coordinates),)
     return replace(robot, coordinates=coordinates, loops=tuple(kept), notes=(*robot.notes, *notes))
+
+
+def _passive(robot: Mechanism, loops: Sequence[Loop]) -> set[str]:
+    return {robot.joints[i].name for loop in loops for i in loop.passive}
 
 
 def _split(

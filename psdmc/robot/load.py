@@ -71,14 +71,14 @@ def load_robot(
     `packages` are folders of ROS packages, by name, that a xacro file uses. Raises InputError if the file or an option
     is wrong.
     """
-    file = Path(path)
+    file, tables = Path(path), None
     if isinstance(options.get("loops"), str | PathLike):
         tables = Path(options["loops"])
         options["loops"] = loop_tables(tables, robot_text(tables))
     text = robot_text(file)
     text, source_format, found = as_source(file, text, checked_options(**options), checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
-    return _loaded(text, source_format, file.name, found)
+    return _loaded(text, source_format, file.name, found, tables.name if tables else None)
 
 
 def load_robot_text(
@@ -90,11 +90,15 @@ def load_robot_text(
     return _loaded(text, source_format, source_name, checked_options(**options))
 
 
-def _loaded(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> LoadedRobot:
+def _loaded(
+    text: str, source_format: SourceFormat, source: str, options: LoadOptions, loops_file: str | None = None
+) -> LoadedRobot:
     if not text.strip():
         raise InputError(f"{source}: the file is empty", "give a URDF or a DH .toml file")
     draft = _draft(text, source_format, source, options)
-    return LoadedRobot(_settled(draft, options, source), text, source_format, source, draft.snaps, options)
+    return LoadedRobot(
+        _settled(draft, options, source, loops_file), text, source_format, source, draft.snaps, options
+    )
 
 
 def _refuse_size(size: int, source: str) -> None:
@@ -144,7 +148,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
 
-def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
+def _settled(draft: Draft, options: LoadOptions, source: str, loops_file: str | None) -> Mechanism:
     """The chain with drive inertias and assumed zeros applied."""
     link_names = [joint.link_name for joint in draft.joints]
     joint_names = [joint.name for joint in draft.joints]
@@ -163,8 +167,8 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in draft.snaps
     )
     frames = _with_contacts(_frames(draft, options, source), options)
-    tables = (*draft.loops, *options.loops)
-    loops = _loops(draft, tables, options, frames, source)
+    tables, file = (*draft.loops, *options.loops), loops_file or source
+    loops = _loops(draft, tables, options, frames, file)
     mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
@@ -184,7 +188,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         loops=loops,
     )
     if loops:
-        mechanism = with_linear_loops(mechanism, [table.get("follows") for table in tables], source)
+        mechanism = with_linear_loops(mechanism, [table.get("follows") for table in tables], file)
         notes = (*mechanism.notes, *map(_loop_note, mechanism.loops))
         mechanism = replace(mechanism, notes=notes)
     return with_massless_warning(mechanism)
@@ -218,16 +222,17 @@ def _loops(
     if not tables or find is None:
         return ()
     return closed_loops(
-        tables, lambda name: named[name] if name in named else find(name), options.snap, source
+        tables,
+        lambda name: named[name] if name in named else find(name),
+        [joint.name for joint in draft.joints],
+        options.snap,
+        source,
     )
 
 
 def _loop_note(loop: Loop) -> str:
     rows = ", ".join(ROW_NAMES[row] for row in loop.rows)
-    return (
-        f"loop '{loop.name}' closes {rows} in constrained_forward_dynamics; functions without contacts compute the open "
-        "tree"
-    )
+    return f"loop '{loop.name}' closes {rows} in functions of contacts and loops; all other functions compute the open tree"
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:

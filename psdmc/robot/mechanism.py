@@ -101,12 +101,14 @@ class Loop:
     name           untrusted text
     first, second  the frames; the joint is BASE for a frame on the base
     rows           axes of the first frame along which the frames cannot move apart (0 to 2) or turn (3 to 5), ascending
+    passive        joints without motor whose motion follows from that of the others, by number; empty: not declared
     """
 
     name: str
     first: NamedFrame
     second: NamedFrame
     rows: tuple[int, ...]
+    passive: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.rows or sorted({*self.rows} & {*range(len(ROW_NAMES))}) != list(self.rows):
@@ -245,6 +247,12 @@ class Mechanism:
     def rows_of_loops(self) -> tuple[tuple[int, ...], ...]:
         """For each loop the axes of its first frame that it closes."""
         return tuple(loop.rows for loop in self.loops)
+
+    @property
+    def passive_rates(self) -> tuple[int, ...]:
+        """The numbers of the rates of passive joints, whose motion follows from that of the other joints."""
+        passive = {joint for loop in self.loops for joint in loop.passive}
+        return tuple(k for k, joint in enumerate(self.rate_joints) if joint in passive)
 
     @property
     def types(self) -> tuple[JointType, ...]:

@@ -156,6 +156,7 @@ def test_follows_names_the_joints_without_motors_or_keeps_the_loop():
     shape = ((0.2, 0.5, 0.2, 0.5), (0.5, -0.5, 0.5))
     assert loaded(*shape).own_joints == (0,)
     assert loaded(*shape, more='follows = ["crank", "coupler"]').own_joints == (2,)
+    assert loaded(*shape, more='passive = ["crank", "coupler"]').own_joints == (2,)
     assert len(loaded(*shape, more="follows = []").loops) == 1
 
 
@@ -164,6 +165,8 @@ def test_joints_that_cannot_follow_are_an_error():
         loaded((0.2, 0.5, 0.4, 0.45), (0.5, 0.0, 1.2), more='follows = ["coupler"]')
     with pytest.raises(psdmc.InputError, match="joint 'crank' cannot follow: found followers"):
         loaded((0.2, 0.5, 0.2, 0.5), more='follows = ["crank", "coupler", "rocker"]')
+    with pytest.raises(psdmc.InputError, match="joint 'crank' cannot follow: found followers"):
+        loaded((0.2, 0.5, 0.2, 0.5), more='passive = ["crank", "coupler", "rocker"]')
 
 
 def test_a_model_file_keeps_sums_and_a_urdf_cannot(tmp_path):
