@@ -17,7 +17,8 @@ from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Re
 def trace(g: Ingredients) -> Outputs:
     arrow = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     if any_limbs(g.frames):
-        return {"Minv": arrow.thin_inverse, "pivot": arrow.pivots, THIN: arrow.thin_factors}
+        factors = arrow.thin_factors(arrow.has_small_core)
+        return {"Minv": arrow.thin_inverse, "pivot": arrow.pivots, THIN: factors}
     return {"Minv": inverse(arrow.factors), "pivot": arrow.pivots}
 
 
