@@ -39,8 +39,9 @@ demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-
 test: $(READY) ## run the tests that every change must pass; JOBS=2 sets the number of workers
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' tests
 
-test-slow: $(READY) ## run the longer cases of the same tests: more robots, builds, tools and seeds
-	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m slow tests
+SLOW ?= tests
+test-slow: $(READY) ## run the longer cases of the same tests: more robots, builds, tools and seeds; SLOW=tests/functions runs a part
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m slow $(SLOW)
 
 COVERED ?= tests
 coverage: $(READY) ## run all tests and show the share of each file that they run; COVERED='tests/program' runs a part

@@ -62,6 +62,8 @@ MENU = {
         "how-to/jax",
         "how-to/pytorch",
         "how-to/adapters",
+        "how-to/matlab",
+        "how-to/ros2",
         "how-to/contacts",
         "how-to/loops",
         "how-to/whole-body",

@@ -71,9 +71,9 @@ def derive(
 ) -> DynamicsModel:
     """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
-    The result is a DynamicsModel. It contains the base parameters theta_b and, unless `expand` leaves them out, the
-    exponents E and the coefficients P of the monomials in the torques. Before `derive` returns the model, it compares the
-    model's torques with those of the Newton-Euler algorithm.
+    The result is a DynamicsModel. It contains the base parameters theta_b, the combinations of masses and inertias that
+    determine all torques. It also contains the torques as sums of monomials: exponents E and coefficients P (see `expand`).
+    Before `derive` returns the model, it compares the model's torques with those of the Newton-Euler algorithm.
 
     robot          path of the robot file
     base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
@@ -84,10 +84,11 @@ def derive(
                    "link5:Ixz@com" (inertia about the centre of mass)
     snap           tolerance for right angles, rad. If an angle of the file, such as 1.5708, differs from a right angle by at
                    most `snap`, psdmc uses the exact right angle; 0: never
-    expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
+    expand         False: leave out E and P, which need much memory for robots with many joints; None: leave them out for
+                   branched robots only
     progress       function, such as print, that psdmc calls with the name of each stage
-    frames         names of links. Their frames become the named frames, for poses, Jacobians, wrenches and loads; if empty:
-                   the tip, or the end of each branch
+    frames         names of the links whose frames you need, for poses, Jacobians, wrenches and loads. These frames become
+                   the named frames. If `frames` is empty, they are the tip, or the end of each branch
     tool           x, y, z (m) and roll, pitch, yaw (rad) of a frame, relative to the tip; psdmc adds this frame as 'tool'
     lock           joints that stay at a fixed position: a dictionary of positions (rad or m) by joint name
     floating       True: the root link moves freely. The first entries of q are the link's position (m) and quaternion
@@ -100,7 +101,8 @@ def derive(
     unknown        links whose masses and inertias are unknown: a list, one name, "all", or "missing", which means all links
                    without an inertia in the file. Without this option, links without an inertia are massless
     contacts       names of links that can touch the world, for functions such as constrained_forward_dynamics. "foot" is a
-                   point, "foot:6" a surface. These links become named frames, too; if empty: each named frame is a point
+                   contact point, "foot:6" a contact surface. These links become named frames, too. If `contacts` is empty,
+                   each named frame is a contact point
     loops          path of a TOML file with closed loops, or its tables [[loop]] as a list of dictionaries
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
@@ -166,8 +168,8 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   form of the generated arithmetic. "expanded": sums of products of sines, cosines and rates; "factored": a
-               recursion from link to link; "auto": the form with fewer operations
+    lowering   how the code computes torques. "expanded": by sums of products of sines, cosines and rates. "factored": by a
+               recursion from link to link. "auto": by the method with fewer operations
     functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
     trig       how the code computes sines. "inline": by its own code, with libm only for angles over 1e5 rad;
@@ -176,11 +178,13 @@ def emit_c(
     force      True: write even if the folder contains other files, or package files that you edited. psdmc overwrites
                edited package files. It keeps other files, and renames one with the name of a package file to NAME.orig
     progress   function, such as print, that psdmc calls with the name of each stage
-    payload    True: add the functions that change theta_b for a load
-    adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python) or "fmu"
+    payload    True: add the functions that change the base parameters theta_b to those of the robot with a load
+    adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python), "fmu", "fmu2" (FMI 2.0), "mex"
+               (MATLAB) or "ros2"
     target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
     friction   for a model that was calibrated from logs. True: add the function that computes friction torques.
-               "in-dynamics": inverse dynamics, forward dynamics and all functions made from them contain friction
+               "in-dynamics": inverse dynamics, forward dynamics, their derivatives and time steps, also with contacts,
+               contain friction
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
     estimator  "mass" or "inertia": add functions that estimate a load at the tip while the robot moves. "mass" finds
                mass and centre of mass, "inertia" also the inertia
@@ -188,8 +192,8 @@ def emit_c(
                of the sign of a joint's speed v. The unit is rad/s, or m/s for sliding joints. None: the value of the
                calibration, usually 0.03
 
-    Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises
-    InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
+    Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises InputError also
+    if the model assumes that parameters are zero (`assume_zero` of `derive`) and `payload` or `bodies` would change them.
 
     Forward dynamics, a default function, and some other functions need the inverse of the mass matrix. If the mass matrix
     is not positive definite at some pose within the joint limits, psdmc raises InputError instead of generating these
@@ -370,12 +374,12 @@ def compile(
     model      a model, or the path of a model file
     functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
                now, and each other function when you first call it
-    friction   True: inverse dynamics, forward dynamics and all functions made from them contain the friction of a model
-               that was calibrated from logs
+    friction   True: inverse dynamics, forward dynamics, their derivatives and time steps, also with contacts, contain the
+               friction that a calibration of the model found
 
-    `emit_c` explains the other options. Raises InputError if the model has no such friction. Raises InputError also if the
-    target is a microcontroller, because its code lacks the batch functions that Python calls. Raises ToolchainError if the
-    compiler or the CPU does not support the target.
+    `emit_c` explains the other options. Raises InputError if `friction` is True and the model has no calibrated friction.
+    Raises InputError also if the target is a microcontroller, because its code lacks the batch functions that Python calls.
+    Raises ToolchainError if the compiler or the CPU does not support the target.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP

@@ -62,8 +62,8 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
 def from_qpos(model: DynamicsModel | str | Path, qpos: ArrayLike, mj_model: Any = None) -> Array:
     """Convert MuJoCo's qpos, (..., nq of MuJoCo), to the joint positions q, (..., nq), of a model, and return q.
 
-    Entries of qpos for mimic joints and for joints that the model lacks have no effect. `to_qpos` explains the other
-    arguments.
+    Entries of qpos for mimic joints and for joints that the model lacks have no effect. `to_qpos` explains the arguments
+    `model` and `mj_model`.
     """
     layout = _Layout.of("from_qpos", model, mj_model)
     return np.asarray(layout.checked("qpos", qpos, len(layout.rest))[..., layout.places[layout.own_places]])
@@ -73,7 +73,8 @@ def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_m
     """Convert joint rates qd, (..., nv), at joint positions q, (..., nq), to MuJoCo's qvel, (..., nv of MuJoCo).
 
     q and qd are in psdmc's convention. A floating base's linear velocity is along the base's axes in qd, and along the
-    world's axes in qvel. Joints that only MuJoCo has get the rate zero. `to_qpos` explains the other arguments.
+    world's axes in qvel. Joints that only MuJoCo has get the rate zero. `to_qpos` explains the arguments `model` and
+    `mj_model`.
     """
     layout = _Layout.of("to_qvel", model, mj_model)
     rates = layout.checked("qd", qd, layout.nv)
@@ -90,7 +91,7 @@ def from_qvel(
     """Convert MuJoCo's qvel, (..., nv of MuJoCo), at joint positions q, (..., nq), to joint rates qd, (..., nv).
 
     q and qd are in psdmc's convention. For a state of MuJoCo, first compute q = from_qpos(model, qpos). `to_qpos`
-    explains the other arguments.
+    explains the arguments `model` and `mj_model`.
     """
     layout = _Layout.of("from_qvel", model, mj_model)
     here, rates = layout.broadcast(
@@ -159,8 +160,8 @@ class _Layout:
         return len(self.own_speeds)
 
     def checked(self, name: str, values: ArrayLike, size: int) -> Array:
-        """Return the values as an array of floats, (..., size). Raises InputError if the last axis is not of length
-        `size`."""
+        """Return an argument of a conversion as an array of floats, (..., size). `name` is the argument's name. Raises
+        InputError if the last axis does not have the length `size`."""
         array = real_array(f"{self.what}: {name}", values)
         if array.shape[-1:] != (size,):
             raise InputError(
@@ -180,8 +181,8 @@ class _Layout:
         return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
-        """Return joint rates with the linear velocity of a floating base rotated from the base's axes to the world's
-        axes. If `back` is true, the velocity is rotated from the world's axes to the base's axes."""
+        """Return joint rates at q. If the robot has a floating base, its linear velocity is rotated from the base's axes
+        to the world's axes; if `back` is true, from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

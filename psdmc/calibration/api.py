@@ -32,12 +32,13 @@ def calibrate(
     model              a model, or the path of a model file
     logs               paths of the logs, of a log description (TOML), or of a campaign folder that `psdmc excite` wrote
     options            filter and friction law of the fit; None: those of the log description, or the defaults
-    torque_constants   N m/A at the joint (after the gear) by joint name, for logs of motor currents. With `loaded`,
-                       psdmc finds the constants of all joints that feel the load; give only those of the other joints
-    validation         logs that psdmc uses only to test the fit. psdmc then fits the model to all of `logs`. Without
-                       validation logs, psdmc tests the fit with the last part of each log
-    loaded             logs of motor currents that were recorded with a known load. From `logs` and `loaded`, psdmc finds
-                       torque constants
+    torque_constants   torque per current of each joint, for logs of motor currents: a dictionary from joint names to
+                       N m/A at the joint (after the gear). With `loaded`, psdmc finds the constants of all joints on which
+                       the load exerts a torque. Then give only those of the other joints
+    validation         logs that psdmc uses only to test the fitted model. Without validation logs, psdmc tests the model
+                       with the last part of each log, and does not use this part for the fit
+    loaded             logs of motor currents that were recorded with a known load at the tip. From `logs`, recorded without
+                       the load, and `loaded`, psdmc finds the torque constants
     load               the known load of the logs `loaded`, as four numbers: mass (kg), and x, y, z of the centre of mass (m,
                        in the tip frame). Instead, you can give the path of a load file that `psdmc payload` wrote
 

@@ -50,8 +50,9 @@ class CalibrateOptions:
     consistency  options of the search for a physically possible result
     verdict      limits from which the verdict (usable or not) follows
     choice       options of the linear fit that the user typed; they replace those of a log description. For plain logs
-    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then act
-                      as a prior; None: no prior. For plain logs
+    prior_confidence  relative standard deviation of the file's masses and inertias about the centres of mass, which
+                      then act as a prior. A centre of mass has this share of its link's radius of gyration. None: no
+                      prior. For plain logs
     essential    how parameters that the data do not need are dropped; None: all are kept. For plain logs
     """
 

@@ -38,11 +38,11 @@ def compare(
     a                 a model, or the path of its file
     b                 another model of the robot, the path of its file, or the path of a robot file (URDF, MJCF, DH table)
     logs              logs on which psdmc tests both models; at least one of the models must then be calibrated
-    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the
-                      models
-    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
-                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
-                      differ
+    torque_constants  torque per current of each joint, for logs of motor currents: a dictionary from joint names to N m/A
+                      at the joint (after the gear); None: those of the models
+    naming            names in the logs that differ from those of the model: psdmc.calibration.sources.LogNaming(topic,
+                      joints). `topic` is the topic of the joint states in ROS bags. `joints` is a dictionary from joint
+                      names in the logs to those of the model. None: no name differs
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if a file is missing, if the parameters of a model have no numerical values, or if the models are of

@@ -66,8 +66,9 @@ def identify_payload(
     logs              paths of logs that were recorded with the load, or the path of a log description (TOML)
     frame             named frame in which psdmc gives the centre of mass and inertia; None: the tip frame
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
-    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the model
-    regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
+    torque_constants  torque per current of each joint, for logs of motor currents: a dictionary from joint names to N m/A
+                      at the joint (after the gear); None: those of the model
+    regressor         result of psdmc.compile(model), which makes the fit faster; None: psdmc computes with NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if psdmc cannot use a log, if no joint moves in the logs, or if the model's theta_b is unknown.

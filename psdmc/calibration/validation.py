@@ -179,20 +179,20 @@ def validate(
     """Test a calibrated model on logs that were not used to calibrate it. Returns an object with the verdict and the
     errors of the torques.
 
-    The attribute `word` of the result is "still valid", "drifted", "changed load" or "log not usable". If the robot has
-    changed, two attributes say what has changed: `load` is the change of the load at the tip (None: unchanged), and
-    `named` lists the changed parameters.
+    The attribute `word` of the result is the verdict: "still valid", "drifted" (the robot has changed), "changed load" or
+    "log not usable". If the robot has changed, the attribute `load` is the change of the load at the tip (None: unchanged),
+    and the attribute `named` lists the other changed parameters.
 
     model             a calibrated model, or the path of its file
     logs              paths of logs, the path of a log description (TOML), or a campaign folder that `psdmc excite` wrote.
-                      Of a campaign, psdmc uses the logs of the validation runs. If there are none, psdmc uses those of
-                      the exciting motions (runs of the step "inertial") without a load. There is one verdict on all logs
-    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the log
-                      description or of the model
-    naming            None, or psdmc.calibration.sources.LogNaming(topic, joints). `topic` is the topic of the joint states
-                      in ROS bags. `joints` is a dictionary from joint names in the logs to those of the model, if they
-                      differ
-    regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
+                      Of a campaign, psdmc uses the logs of the validation runs. If there are none, psdmc uses the logs of
+                      the step "inertial" without a load. psdmc gives one verdict on all logs together
+    torque_constants  torque per current of each joint, for logs of motor currents: a dictionary from joint names to N m/A
+                      at the joint (after the gear); None: those of the log description or of the model
+    naming            names in the logs that differ from those of the model: psdmc.calibration.sources.LogNaming(topic,
+                      joints). `topic` is the topic of the joint states in ROS bags. `joints` is a dictionary from joint
+                      names in the logs to those of the model. None: no name differs
+    regressor         result of psdmc.compile(model), which makes the fit faster; None: psdmc computes with NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
 
     Raises InputError if a file is missing or cannot be read, or if the model is not calibrated.

@@ -24,9 +24,9 @@ def jax(
     trig: Trig | None = None,
     target: str | Target = NATIVE,
 ) -> JaxRobot:
-    """Return the functions of a model as functions of JAX, which run compiled code on the CPU.
+    """Return an object whose methods compute a model's dynamics on arrays of JAX. They run compiled code on the CPU.
 
-    The result has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods work
+    The object has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods work
     inside jax.jit, vmap, grad, jvp, jacfwd, jacrev, lax.scan and lax.map. psdmc compiles a function when JAX
     first traces it.
 
@@ -52,9 +52,9 @@ def torch(
     trig: Trig | None = None,
     target: str | Target = NATIVE,
 ) -> TorchRobot:
-    """Return the functions of a model as functions of PyTorch, which run compiled code on the CPU.
+    """Return an object whose methods compute a model's dynamics on tensors of PyTorch. They run compiled code on the CPU.
 
-    The result has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods have
+    The object has a method for each generated function, such as `robot.forward_dynamics(q, qd, tau)`. The methods have
     gradients. They also work inside torch.compile and torch.func.vmap, grad, jvp, jacrev and jacfwd. psdmc compiles a
     function when you first call it, separately for float32 and float64.
 

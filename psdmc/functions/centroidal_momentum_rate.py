@@ -49,8 +49,8 @@ RECIPE = Recipe(
         INPUTS,
         (RATE,),
         theta=False,
-        summary="Compute the time derivative of the centroidal momentum: of the linear momentum of all links, and "
-        "of their angular momentum about their centre of mass.",
+        summary="Compute the time derivative of the centroidal momentum. The centroidal momentum is the linear "
+        "momentum of all links, then their angular momentum about their centre of mass.",
     ),
     "rate of the centroidal momentum",
     *on_both(values, INPUTS),

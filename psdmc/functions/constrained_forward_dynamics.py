@@ -34,7 +34,7 @@ KP = Quantity(
     "kp",
     largest=100.0,
     least=0.0,
-    means="position gain of Baumgarte's stabilisation, 1/s^2",
+    means="position gain, 1/s^2, with which contacts return to where they should be (Baumgarte's stabilisation)",
     unit="1/s^2",
     default=0.0,
 )
@@ -42,7 +42,7 @@ KD = Quantity(
     "kd",
     largest=20.0,
     least=0.0,
-    means="velocity gain of Baumgarte's stabilisation, 1/s",
+    means="velocity gain, 1/s, which damps the motion of the contacts (Baumgarte's stabilisation)",
     unit="1/s",
     default=0.0,
 )
@@ -50,7 +50,7 @@ ERROR = Quantity(
     "error",
     ("contact_rows",),
     largest=0.01,
-    means="displacement of each contact from where it should be, m and rad along the axes of the base frame",
+    means="displacement of each contact from where it should be, in m and rad along the axes of the base frame",
     unit="1",
     powers=(1,),
     default=0.0,
@@ -58,14 +58,15 @@ ERROR = Quantity(
 FORCES = Quantity(
     "forces",
     ("constraint_rows",),
-    means="what the world exerts on the contacts, along the axes of the base frame; zero for contacts that are not active. "
-    "A point has a force (N); a surface has a force and then a moment (N m) about the contact's origin",
+    means="forces and moments that the world exerts on the contacts, along the axes of the base frame; zero for "
+    "contacts that are not active. A contact point has a force (N). A contact surface has a force, then a moment "
+    "(N m) about the contact's origin",
     unit="J",
     powers=(-1,),
 )
 OF_LOOPS = (
-    "Then come the forces (N) and moments (N m) that keep the closed loops closed: loop_rows entries, along and about the "
-    "axes of each loop's first frame; none without closed loops"
+    "Then follow the forces (N) and moments (N m) that keep closed loops closed, if the robot has any. These are "
+    "loop_rows entries, along and about the axes of each loop's first frame"
 )
 
 
@@ -188,10 +189,11 @@ RECIPE = Recipe(
         "J qdd + dJ/dt qd + kd J qd + kp error + mu forces = 0 for each active contact, and forces = 0 for each other one; "
         "active is 0 or 1 for each contact, mu is not negative",
         (Q, QD, TAU, ACTIVE, MU, KP, KD, ERROR),
-        (QDD, replace(FORCES, means=f"first {FORCES.means}. {OF_LOOPS}")),
+        (QDD, replace(FORCES, means=f"first the {FORCES.means}. {OF_LOOPS}")),
         theta=True,
-        summary="Compute the joint accelerations and the contact forces that torques cause. The active contacts "
-        "accelerate by -kp * error - kd * J qd - mu * forces, with the Jacobian J of the contacts. This is 0 by default.",
+        summary="Compute the joint accelerations and the contact forces that torques cause. By default, active "
+        "contacts do not accelerate. If you give kp, kd or mu, their acceleration is -kp * error - kd * J qd - mu "
+        "* forces, with the Jacobian J of the contacts.",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "constrained forward dynamics",

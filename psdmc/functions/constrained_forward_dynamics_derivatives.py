@@ -226,9 +226,9 @@ RECIPE = Recipe(
         WITHOUT.signature.inputs,
         (QDD, FORCES, *BLOCKS),
         theta=True,
-        summary="Compute the joint accelerations and the contact forces that torques cause. Also compute the "
-        "derivatives of qdd and forces by q, qd, tau and error. The input `error` is the displacement of the "
-        "contacts. The derivatives by q treat `error` as an independent input.",
+        summary="Compute the accelerations qdd and contact forces that torques cause. Also compute derivatives of "
+        "qdd and forces by q, qd, tau and error. The input `error` is the displacement of the contacts. The "
+        "derivatives by q hold `error` constant.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, FREE.name),
         thin=thin_blocks("qdd", "forces", ("q", "qd", "tau", "error")),

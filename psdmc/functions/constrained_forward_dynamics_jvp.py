@@ -5,7 +5,7 @@ from psdmc.functions.constrained_forward_dynamics_vjp import FUNCTION
 RECIPE = FUNCTION.along(
     346,
     "qdd and forces of constrained_forward_dynamics, and their derivatives along (dq, dqd, dtau, derror)",
-    "Compute the joint accelerations and the contact forces that torques cause. Also compute derivatives of qdd "
-    "and forces along the direction (dq, dqd, dtau, derror). The inputs q, qd, tau and `error`, the displacement "
-    "of the contacts, change together along this direction.",
+    "Compute the accelerations qdd and contact forces that torques cause. Also compute derivatives of both along "
+    "a direction (dq, dqd, dtau, derror). If each input changes by e times its part of the direction, with a "
+    "small number e, qdd changes by about e dqdd.",
 )

@@ -37,9 +37,9 @@ RECIPE = with_parameter_gradient(
     345,
     "qdd and forces of constrained_forward_dynamics, and the gradient of cotangent_qdd . qdd + cotangent_forces . forces "
     "by q, qd, tau, error and theta_b",
-    "Compute accelerations qdd and contact forces. Also compute gradients, by q, qd, tau, error and theta_b, of a "
-    "weighted sum of qdd and forces. The weighted sum contains all entries of qdd and forces. The input `error` is "
-    "the displacement of the contacts.",
+    "Compute the accelerations qdd and contact forces that torques cause. Also compute gradients, by q, qd, tau, "
+    "error and theta_b, of their weighted sum. This is the sum of all entries of qdd and forces, multiplied by "
+    "their weights. The input `error` is the displacement of the contacts.",
     trace,
     reference,
     pinocchio,

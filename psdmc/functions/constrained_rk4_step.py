@@ -169,7 +169,7 @@ RECIPE = Recipe(
         (
             Q_NEXT,
             QD_NEXT,
-            replace(FORCES, means=f"mean over the step of {FORCES.means}"),
+            replace(FORCES, means=f"mean over the step of the {FORCES.means}"),
         ),
         theta=True,
         summary="Compute the state of a robot with contacts after one classical fourth-order Runge-Kutta step with "

@@ -116,9 +116,10 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B, B_ERROR, *OF_FORCES),
         theta=True,
-        summary="Compute the next state and contact forces of a semi-implicit Euler step. Also compute derivatives "
-        "of state and forces by q, qd, tau and error. The input `error` is the displacement of the contacts. The "
-        "derivatives by q treat `error` as an independent input.",
+        summary="Compute the state after a semi-implicit Euler step with contacts. Also compute the contact "
+        "forces, and derivatives by q, qd, tau and error. The derivatives are those of the next state and of the "
+        "forces. The input `error` is the displacement of the contacts. The derivatives by q hold `error` "
+        "constant.",
         factorises=STEP.signature.factorises,
         calls=(ACCELERATIONS.name, *ACCELERATIONS.signature.calls),
     ),

@@ -53,14 +53,14 @@ RECIPE = Recipe(
             Quantity(
                 "drift",
                 ("contact_rows",),
-                means=f"accelerations (m/s^2, rad/s^2) in the order of the contacts: {ROW_WORDS}",
+                means=f"accelerations of the contacts (m/s^2, rad/s^2) {ROW_WORDS.format('entries')}",
                 unit="1/s^2",
                 powers=(1,),
             ),
         ),
         theta=False,
         summary="Compute the accelerations that all contacts have if qdd = 0, along the axes of the base frame. "
-        "They are (dJ/dt) qd, with the Jacobian J of the contacts.",
+        "These accelerations are (dJ/dt) qd, with the Jacobian J of the contacts (`contact_jacobian`).",
     ),
     "contact drift",
     *on_both(values, INPUTS),

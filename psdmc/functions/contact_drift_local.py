@@ -38,10 +38,15 @@ RECIPE = Recipe(
         322,
         "accelerations of all contacts at constant qd, along the contacts' own axes",
         INPUTS,
-        (replace(ALIGNED, means=f"accelerations of the contacts (m/s^2, rad/s^2): {LOCAL_ROW_WORDS}"),),
+        (
+            replace(
+                ALIGNED,
+                means=f"accelerations of the contacts (m/s^2, rad/s^2) {LOCAL_ROW_WORDS.format('entries')}",
+            ),
+        ),
         theta=False,
-        summary="Compute the accelerations that all contacts have if qdd = 0, along each contact's own axes. For any qdd, "
-        "the accelerations are J qdd + drift, with J as in `contact_jacobian_local`.",
+        summary="Compute the accelerations that all contacts have if qdd = 0, along each contact's own axes. For "
+        "other qdd, the accelerations are J qdd + drift, with the Jacobian J of `contact_jacobian_local`.",
     ),
     "contact drift along the contacts' axes",
     *on_both(values, INPUTS),

@@ -36,8 +36,8 @@ LINEAR = 3
 
 MU = replace(
     held.MU,
-    means="regularisation (not a friction coefficient), 0 or more: the weight of the squared contact forces (N; N m) in the "
-    "least squares",
+    means="regularisation, 0 or more (not a friction coefficient): the weight of the squared contact forces (N; N "
+    "m) in the minimum",
     unit="1",
 )
 
@@ -125,16 +125,17 @@ RECIPE = Recipe(
         (
             replace(
                 TAU,
-                means=f"{TAU.means}; of a floating base, the first six entries are what the active contacts cannot exert, "
-                "zero within rounding if they can exert all and mu = 0",
+                means=f"{TAU.means}; of a floating base, the first six entries are the part of the base's force and moment "
+                "that the active contacts cannot exert, zero within rounding if they can exert the whole and mu = 0",
             ),
             FORCES,
         ),
         theta=True,
-        summary="Compute the contact forces of a motion, and the joint torques tau = M qdd + h - J^T forces. M is the "
-        "mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, and J the Jacobian of the contacts. "
-        "No motor acts on a floating base, so the forces minimise |tau[:6]|^2 + mu |forces|^2. If several forces do, "
-        "psdmc returns those with the smallest norm. Without a floating base, the forces are zero.",
+        summary="Compute the contact forces of a motion, and the joint torques tau = M qdd + h - J^T forces. M is "
+        "the mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, and J the Jacobian of the "
+        "contacts. Because no motor acts on a floating base, psdmc chooses the forces that minimise |tau[:6]|^2 + "
+        "mu |forces|^2. If this minimum has several solutions, psdmc returns the forces with the smallest norm. "
+        "Without a floating base, the forces are zero.",
         factorises=(MASK,),
     ),
     "inverse dynamics with contacts",

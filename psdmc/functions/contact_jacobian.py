@@ -43,14 +43,14 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("contact_rows", "nv"),
-                means=f"Jacobian. Column j is for qd[j], and the rows are in the order of the contacts: {ROW_WORDS}",
+                means=f"Jacobian, {ROW_WORDS.format('rows')}. Column j is for qd[j]",
                 unit="1",
                 powers=(1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of all contacts: J qd are the velocities of the contacts along the axes of the base "
-        "frame.",
+        summary="Compute the Jacobian J of all contacts (places where the robot can touch the world). J qd are "
+        "the velocities of the contacts along the axes of the base frame.",
     ),
     "contact Jacobian",
     *on_both(values, INPUTS),

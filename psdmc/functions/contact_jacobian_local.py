@@ -40,12 +40,13 @@ RECIPE = Recipe(
         (
             replace(
                 ALIGNED,
-                means=f"Jacobian. Its column j is for qd[j], and its rows are those of the contacts: {LOCAL_ROW_WORDS}",
+                means=f"Jacobian, {LOCAL_ROW_WORDS.format('rows')}. Column j is for qd[j]",
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of all contacts along their own axes: J qd are the velocities of the contacts "
-        "along these axes. If f are contact forces along these axes, J^T f are their joint torques.",
+        summary="Compute the Jacobian J of all contacts (places where the robot can touch the world) along each "
+        "contact's own axes. J qd are the velocities of the contacts. If f are contact forces, J^T f are the "
+        "joint torques that they cause.",
     ),
     "contact Jacobian along the contacts' axes",
     *on_both(values, INPUTS),

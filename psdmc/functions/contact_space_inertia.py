@@ -70,14 +70,15 @@ RECIPE = Recipe(
             Quantity(
                 "Lambda",
                 ("contact_rows", "contact_rows"),
-                means=f"symmetric matrix. Its rows, and likewise its columns, are those of the contacts: {ROW_WORDS}",
+                means=f"symmetric matrix {ROW_WORDS.format('rows and columns')}",
                 unit="J s^2",
                 powers=(-1, -1),
             ),
         ),
         theta=True,
-        summary="Compute the contact-space inertia (J M^-1 J^T + mu I)^-1 of the active contacts. J is their Jacobian as in "
-        "`contact_jacobian`, M the mass matrix, and I the identity matrix. Rows and columns of other contacts are zero.",
+        summary="Compute the contact-space inertia (J M^-1 J^T + mu I)^-1 of the active contacts. J is the "
+        "Jacobian of these contacts (`contact_jacobian`), M the mass matrix, and I the identity matrix. Rows and "
+        "columns of other contacts are zero.",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "contact-space inertia",

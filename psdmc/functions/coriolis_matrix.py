@@ -59,8 +59,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=True,
-        summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques. With the mass "
-        "matrix M, dM/dt - 2 C is skew-symmetric.",
+        summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques. psdmc "
+        "chooses C such that dM/dt - 2 C is skew-symmetric, with the mass matrix M.",
     ),
     "Coriolis matrix",
     trace,

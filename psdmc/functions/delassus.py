@@ -44,14 +44,14 @@ RECIPE = Recipe(
             Quantity(
                 "D",
                 ("contact_rows", "contact_rows"),
-                means=f"symmetric matrix. Its rows, and likewise its columns, are in the order of the contacts: {ROW_WORDS}",
+                means=f"symmetric matrix {ROW_WORDS.format('rows and columns')}",
                 unit="1/(J s^2)",
                 powers=(1, 1),
             ),
         ),
         theta=True,
-        summary="Compute the Delassus matrix J M^-1 J^T of all contacts, with the Jacobian J as in "
-        "`contact_jacobian` and the mass matrix M.",
+        summary="Compute the Delassus matrix J M^-1 J^T of all contacts. J is the Jacobian of the contacts "
+        "(`contact_jacobian`), and M the mass matrix.",
         factorises=(MASS_MATRIX,),
     ),
     "Delassus matrix",

@@ -36,8 +36,9 @@ RECIPE = Recipe(
         (Q, QD, TAU, DQ, DQD, DTAU),
         (QDD, along_direction(QDD)),
         theta=True,
-        summary="Compute the accelerations qdd of forward dynamics. Also compute dqdd, the derivative of qdd along "
-        "the direction (dq, dqd, dtau).",
+        summary="Compute the accelerations qdd of forward dynamics. Also compute dqdd, the derivative of qdd "
+        "along a direction (dq, dqd, dtau). If the inputs change by e dq, e dqd and e dtau, with a small number "
+        "e, qdd changes by about e dqdd.",
         factorises=(MASS_MATRIX,),
     ),
     "forward dynamics along a direction",

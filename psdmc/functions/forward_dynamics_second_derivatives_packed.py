@@ -11,7 +11,8 @@ RECIPE = packed(
     forward_dynamics_second_derivatives.RECIPE,
     216,
     "entries of the lower triangle of cotangent . qdd's second derivatives that can differ from zero, row by row",
-    "Compute the entries that can differ from zero in the lower triangle of the matrix that "
-    "`forward_dynamics_second_derivatives` returns, row by row.",
+    "Compute the nonzero entries of a Hessian's lower triangle as a vector, row by row. The Hessian contains the "
+    "second derivatives of a weighted sum of accelerations. `forward_dynamics_second_derivatives` returns the "
+    "whole Hessian. Entries that are zero at every state are left out.",
     Packing(forward_dynamics_second_derivatives.RECIPE.name, acceleration_hessian_places, is_triangle=True),
 )

@@ -40,9 +40,10 @@ RECIPE = Recipe(
         (Q, QD, TAU, WRENCHES),
         (QDD,),
         theta=True,
-        summary="Compute the joint accelerations that torques and external wrenches cause: qdd = M(q)^-1 (tau + J^T "
-        "wrenches - h(q, qd)). M is the mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, "
-        "and J the Jacobian of the named frames along their own axes.",
+        summary="Compute the joint accelerations that torques and external wrenches (forces and moments) cause: "
+        "qdd = M(q)^-1 (tau + J^T wrenches - h(q, qd)). The wrenches act on the named frames, and J is the "
+        "Jacobian of these frames along their own axes. M is the mass matrix, h the sum of the Coriolis, "
+        "centrifugal and gravity torques.",
         factorises=(MASS_MATRIX,),
         spoilt="accelerations",
     ),

@@ -45,7 +45,8 @@ RECIPE = Recipe(
         (*ACCELERATIONS.signature.outputs, along_direction(QDD)),
         theta=True,
         summary="Compute the accelerations qdd that torques cause under external wrenches. Also compute dqdd, the "
-        "derivative of qdd along the direction (dq, dqd, dtau, dwrenches).",
+        "derivative of qdd along a direction (dq, dqd, dtau, dwrenches). If each input changes by e times its "
+        "part of the direction, with a small number e, qdd changes by about e dqdd.",
         factorises=ACCELERATIONS.signature.factorises,
     ),
     "forward dynamics with wrenches along a direction",

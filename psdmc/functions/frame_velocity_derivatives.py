@@ -8,7 +8,7 @@ import numpy as np
 
 from psdmc.dynamics.named_frames import frame_velocity_slopes
 from psdmc.dynamics.scalar import Scalar
-from psdmc.program.signature import OF_Q, QD, Q, Quantity, Signature
+from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both
 from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
 from psdmc.robot.mechanism import Array
@@ -49,9 +49,10 @@ RECIPE = Recipe(
             Quantity(
                 "dv_dq",
                 ("frames", "6", "nv"),
-                means=f"derivatives of v by q: entry [k, i, j] is the derivative of v[k, i] by {OF_Q}",
+                means="derivatives of v by q: entry [k, i, j] is the derivative of v[k, i] by q[j]",
                 unit="1/s",
                 powers=(0, 1, -1),
+                by_q=True,
             ),
         ),
         theta=False,

@@ -36,16 +36,17 @@ RESTITUTION = Quantity(
     "restitution",
     largest=1.0,
     least=0.0,
-    means="coefficient of restitution e, 0 to 1: after the impact, active contacts have -e times their velocity before it",
+    means="coefficient of restitution, 0 to 1. If it is e, the velocity of active contacts after the impact is -e "
+    "times that before",
     unit="1",
     default=0.0,
 )
 IMPULSES = Quantity(
     "impulses",
     ("contact_rows",),
-    means="what the world exerts on the contacts, along the axes of the base frame; zero for contacts that are not active. "
-    "A point has a linear impulse (N s); a surface has a linear and then an angular impulse (N m s) about the contact's "
-    "origin",
+    means="impulses that the world exerts on the contacts, along the axes of the base frame; zero for contacts "
+    "that are not active. A contact point has a linear impulse (N s). A contact surface has a linear and then an "
+    "angular impulse (N m s) about the contact's origin",
     unit="J s",
     powers=(-1,),
 )
@@ -139,8 +140,8 @@ RECIPE = Recipe(
         (Q, BEFORE, ACTIVE, RESTITUTION, MU),
         (AFTER, IMPULSES),
         theta=True,
-        summary="Compute qd_after, the joint rates after an impact, and the contact impulses. The impulses stop the "
-        "active contacts or reverse their velocity.",
+        summary="Compute qd_after, the joint rates after an impact, and the contact impulses. The impulses stop "
+        "the active contacts or reverse their velocity.",
         factorises=(MASS_MATRIX, TOUCHING),
     ),
     "impulses of an impact",

@@ -213,8 +213,8 @@ RECIPE = Recipe(
         WITHOUT.signature.inputs,
         (*WITHOUT.signature.outputs, *BLOCKS),
         theta=True,
-        summary="Compute qd_after, the rates after an impact, and the impulses. Also compute derivatives of "
-        "qd_after and impulses by q and qd_before.",
+        summary="Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute the "
+        "derivatives of both by q and qd_before.",
         factorises=WITHOUT.signature.factorises,
         calls=(WITHOUT.name, TORQUES.name, GRAVITY.name, INVERSE.name),
         thin=thin_blocks("qd_after", "impulses", ("q", BEFORE.name)),

@@ -5,7 +5,7 @@ from psdmc.functions.impulse_vjp import FUNCTION
 RECIPE = FUNCTION.along(
     356,
     "qd_after and impulses of an impact, and their derivatives along (dq, dqd_before)",
-    "Compute qd_after, the rates after an impact, and the impulses. Also compute derivatives of qd_after and "
-    "impulses along the direction (dq, dqd_before). The inputs q and qd_before change together along this "
-    "direction.",
+    "Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute derivatives of "
+    "both along a direction (dq, dqd_before). If the inputs change by e dq and e dqd_before, with a small number "
+    "e, qd_after changes by about e dqd_after.",
 )

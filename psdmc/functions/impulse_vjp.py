@@ -36,7 +36,7 @@ RECIPE = FUNCTION.gradient(
     354,
     "qd_after and impulses of an impact, and the gradient of cotangent_qd_after . qd_after + cotangent_impulses . impulses "
     "by q and qd_before",
-    "Compute qd_after and impulses of an impact. Also compute gradients, by q and qd_before, of a weighted sum of "
-    "qd_after and impulses. The vector qd_after contains the joint rates after the impact. The weighted sum "
-    "contains all entries of qd_after and impulses.",
+    "Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute gradients, by q "
+    "and qd_before, of their weighted sum. This is the sum of all entries of qd_after and impulses, multiplied by "
+    "their weights.",
 )

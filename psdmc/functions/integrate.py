@@ -11,7 +11,7 @@ WAY = Quantity(
     "v",
     ("nv",),
     3.0,
-    means="displacement, rates times a time: rad or m; for a quaternion, a rotation vector (rad) along the axes of the "
+    means="displacement of the joints, rad or m; for a quaternion, a rotation vector (rad) along the axes of the "
     "body at q",
     unit="1",
     powers=(1,),
@@ -40,7 +40,8 @@ RECIPE = Recipe(
         (Q, WAY),
         (Q_NEXT,),
         theta=False,
-        summary="Compute the joint positions q_next that the robot reaches from q by the displacement v.",
+        summary="Compute the joint positions q_next after a displacement v of the joints from q. For example, v "
+        "is a joint rate times a time.",
         normalizes=True,
     ),
     "position after constant rates",

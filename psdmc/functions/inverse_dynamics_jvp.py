@@ -48,8 +48,9 @@ RECIPE = Recipe(
         (Q, QD, QDD, *DIRECTIONS),
         (TAU, along_direction(TAU)),
         theta=True,
-        summary="Compute the torques tau of inverse dynamics. Also compute dtau, the derivative of tau along the "
-        "direction (dq, dqd, dqdd).",
+        summary="Compute the torques tau of inverse dynamics. Also compute dtau, the derivative of tau along a "
+        "direction (dq, dqd, dqdd). If the inputs change by e dq, e dqd and e dqdd, with a small number e, tau "
+        "changes by about e dtau.",
     ),
     "inverse dynamics along a direction",
     trace,

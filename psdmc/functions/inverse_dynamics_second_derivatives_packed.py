@@ -11,7 +11,8 @@ RECIPE = packed(
     inverse_dynamics_second_derivatives.RECIPE,
     199,
     "entries of the lower triangle of cotangent . tau's second derivatives that can differ from zero, row by row",
-    "Compute the entries that can differ from zero in the lower triangle of the matrix that "
-    "`inverse_dynamics_second_derivatives` returns, row by row.",
+    "Compute the nonzero entries of a Hessian's lower triangle as a vector, row by row. The Hessian contains the "
+    "second derivatives of a weighted sum of torques. `inverse_dynamics_second_derivatives` returns the whole "
+    "Hessian. Entries that are zero at every state are left out.",
     Packing(inverse_dynamics_second_derivatives.RECIPE.name, torque_hessian_places, is_triangle=True),
 )

@@ -37,9 +37,10 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
-        summary="Compute the joint torques of a motion under external wrenches on the named frames: tau = M(q) qdd "
-        "+ h(q, qd) - J^T wrenches. M is the mass matrix, h the sum of the Coriolis, centrifugal and gravity "
-        "torques, and J the Jacobian of the frames along their own axes.",
+        summary="Compute the joint torques of a motion under external wrenches (forces and moments): tau = M(q) "
+        "qdd + h(q, qd) - J^T wrenches. The wrenches act on the named frames, and J is the Jacobian of these "
+        "frames along their own axes. M is the mass matrix, h the sum of the Coriolis, centrifugal and gravity "
+        "torques.",
     ),
     "inverse dynamics with wrenches",
     trace,

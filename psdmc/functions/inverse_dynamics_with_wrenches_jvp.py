@@ -44,8 +44,9 @@ RECIPE = Recipe(
         (*TORQUES.signature.inputs, *DIRECTIONS),
         (*TORQUES.signature.outputs, along_direction(TAU)),
         theta=True,
-        summary="Compute the joint torques tau of a motion under external wrenches. Also compute dtau, the derivative "
-        "of tau along the direction (dq, dqd, dqdd, dwrenches).",
+        summary="Compute the joint torques tau of a motion under external wrenches. Also compute dtau, the "
+        "derivative of tau along a direction (dq, dqd, dqdd, dwrenches). If each input changes by e times its "
+        "part of the direction, with a small number e, tau changes by about e dtau.",
     ),
     "inverse dynamics with wrenches along a direction",
     trace,

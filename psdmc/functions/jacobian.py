@@ -45,7 +45,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of the tip: J qd is the tip's velocity along the axes of the base frame.",
+        summary="Compute the Jacobian J of the tip frame (end effector): J qd is the tip's velocity along the "
+        "axes of the base frame.",
     ),
     "Jacobian",
     trace,

@@ -68,8 +68,9 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the product (dJ/dt) qd with the Jacobian J of the closed loops. A motion that keeps the loops "
-        "closed has J qdd + (dJ/dt) qd = 0.",
+        summary="Compute the product (dJ/dt) qd, with the Jacobian J of the closed loops. A closed loop keeps two "
+        "frames together in the directions that the loop blocks. A motion that keeps the loops closed has J qdd + "
+        "(dJ/dt) qd = 0.",
     ),
     "loop drift",
     trace,

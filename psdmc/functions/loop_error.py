@@ -65,8 +65,9 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute how far the closed loops of a mechanism are from closed. A closed loop keeps two frames together; "
-        "the result is the displacement between the frames in the directions that the loop blocks.",
+        summary="Compute how far the closed loops of a mechanism are from closed. A closed loop keeps two frames "
+        "together in the directions that the loop blocks. The result is the displacement between the two frames "
+        "in these directions.",
     ),
     "loop error",
     trace,

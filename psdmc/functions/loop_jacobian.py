@@ -67,7 +67,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of the closed loops. A motion that keeps the loops closed has J qd = 0.",
+        summary="Compute the Jacobian J of the closed loops. A closed loop keeps two frames together in the "
+        "directions that the loop blocks. A motion that keeps the loops closed has J qd = 0.",
     ),
     "loop Jacobian",
     trace,

@@ -111,14 +111,15 @@ RECIPE = Recipe(
                 "Lambda",
                 ("frames", "6", "6"),
                 means="symmetric matrix of each frame, along the axes of the base frame: three linear rows and "
-                "columns (kg), then three angular ones (kg m^2); kg m if one is linear and one angular",
+                "columns (kg), then three angular ones (kg m^2). An entry with a linear row and an angular column "
+                "is in kg m",
                 unit="kg m^2",
                 powers=(0, -1, -1),
             ),
         ),
         theta=True,
-        summary="Compute the operational-space inertia (J M^-1 J^T + mu I)^-1 of each named frame. J is the frame's "
-        "Jacobian as in `frame_jacobian`, M the mass matrix, and I the identity matrix.",
+        summary="Compute the operational-space inertia (J M^-1 J^T + mu I)^-1 of each named frame. J is the "
+        "Jacobian of the frame (`frame_jacobian`), M the mass matrix, and I the identity matrix.",
         factorises=(MASS_MATRIX, SEEN_BY_FRAMES),
     ),
     "operational-space inertia",

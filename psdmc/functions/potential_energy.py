@@ -43,7 +43,8 @@ RECIPE = Recipe(
         (Q,),
         (Quantity("U", means="potential energy, J; zero at q = neutral()", unit="J"),),
         theta=True,
-        summary="Compute the potential energy U(q) of the links, whose derivative by q is the gravity torques g(q).",
+        summary="Compute the potential energy U(q) of the links in the gravity field. Its derivatives by q are "
+        "the gravity torques g(q).",
     ),
     "potential energy",
     trace,

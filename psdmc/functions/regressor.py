@@ -44,8 +44,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the regressor Y(q, qd, qdd): the torques of inverse dynamics are tau = Y theta_b, with the "
-        "base parameters theta_b.",
+        summary="Compute the regressor Y(q, qd, qdd), with which the torques of inverse dynamics are tau = Y "
+        "theta_b. The base parameters theta_b are combinations of masses and inertias.",
     ),
     "joint-torque regressor",
     trace,

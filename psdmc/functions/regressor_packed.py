@@ -12,7 +12,7 @@ RECIPE = packed(
     regressor.RECIPE,
     71,
     "entries of the regressor Y that can differ from zero, row by row",
-    "Compute the entries of the regressor Y that can differ from zero, row by row. The torques of inverse dynamics are "
-    "tau = Y theta_b, with the base parameters theta_b.",
+    "Compute the nonzero entries of the regressor Y as a vector, row by row. Entries that are zero at every state "
+    "are left out. The torques of inverse dynamics are tau = Y theta_b, with the base parameters theta_b.",
     Packing(regressor.RECIPE.name, regressor_places),
 )

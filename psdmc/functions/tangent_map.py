@@ -41,14 +41,15 @@ RECIPE = Recipe(
             Quantity(
                 "T",
                 ("nv", "nq"),
-                means="entry [i, j] is the derivative of v[i] by q[j]; v = 0 if dq only changes the length of quaternions",
+                means="entry [i, j] is the derivative of v[i] by q[j]. A change dq of only the length of a "
+                "quaternion gives v = 0",
                 unit="1",
                 powers=(1, -1),
             ),
         ),
         theta=False,
-        summary="Compute the matrix T that converts a small change dq of the entries of q into the displacement v = "
-        "T dq of the joints.",
+        summary="Compute the matrix T that converts a small change dq of q into a displacement v = T dq of the "
+        "joints. dq has the nq entries of q, and v has nv entries, like the joint rates.",
         normalizes=True,
     ),
     "map from entries of q to the tangent",

@@ -47,17 +47,17 @@ class DynamicsModel(Answers):
     """A model contains a robot's inverse dynamics as data: the torque of joint i is tau[i] = y(state) @ P[i] @ theta_b.
 
     `psdmc.derive` makes models. The vector y(state) holds the values of p monomials, which are products of powers of q,
-    sin q, cos q, qd and qdd. Each column of the matrix E has the exponents of one monomial. The matrices P[i] and the l
-    base parameters theta_b are constants of the robot. A model derived with `expand=False` has no E and P.
+    sin q, cos q, qd and qdd. The matrices P[i] and the l base parameters theta_b, which are combinations of masses and
+    inertias, are constants of the robot. A model that was derived with `expand=False` has no matrices P[i].
 
     A model has the same methods as a compiled robot (the result of `psdmc.compile`), such as `forward_dynamics`, but it
     computes them in NumPy. In arguments and results, q has the shape (..., nq), and rates, accelerations and torques have
     the shape (..., nv). The dots (...) stand for batch axes, if any. All numbers are in SI units.
 
-    expansion    the matrices E and P; None if the model was derived with `expand=False`
+    expansion    the exponents E of the monomials, and the matrices P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
-    B            (l, 11n) matrix that computes base parameters from the standard parameters x of the n links:
-                 theta_b = B @ x. Each link has 11: mass, first moments (3), inertias (6) and drive inertia
+    B            (l, 11n) matrix that computes the base parameters: theta_b = B @ x. The vector x has 11 standard
+                 parameters for each of the n links: mass, first moments (3), inertias (6) and drive inertia
     mechanism    the robot: joints, link frames, gravity, limits, and standard parameters
     certificate  (nv,) largest difference between the torques of the model and of the Newton-Euler algorithm at random
                  states, divided by the largest torque; one number per entry of tau
@@ -140,8 +140,10 @@ class DynamicsModel(Answers):
     def loops(self) -> dict[str, tuple[str, ...]]:
         """Return a dictionary from each closed loop's name to the directions of relative motion that the loop blocks.
 
-        A direction is 'x', 'y' or 'z' (along an axis of the loop's first frame), or 'rx', 'ry' or 'rz' (about an axis).
-        In arrays of contact forces, the entries of the loops come after those of the contacts, in the order of this
+        A closed loop keeps two frames of the robot together. A direction is 'x', 'y' or 'z' (along an axis of the loop's
+        first frame), or 'rx', 'ry' or 'rz' (about an axis).
+
+        `constrained_forward_dynamics` returns the contact forces first, then the forces of the loops, in the order of this
         dictionary.
         """
         return {
@@ -171,19 +173,20 @@ class DynamicsModel(Answers):
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """Return the matrix E, (5n, p) uint8 for n joints, whose columns are the exponents of the p monomials.
+        """Return the matrix E of exponents: each column describes one of the p monomials in the robot's torques.
 
-        The rows are the exponents of q, sin q, cos q, qd and qdd, in this order, each with one row per joint. E is None if
-        the model was derived with `expand=False`.
+        A monomial is a product of powers of q, sin q, cos q, qd and qdd. E has the shape (5n, p) and the type uint8: n rows
+        of exponents of q (one row per joint), then n rows of sin q, and so on. E is None if the model was derived with
+        `expand=False`.
         """
         return None if self.expansion is None else self.expansion.E
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...] | None:
-        """Return the sparse matrices P[i], (p, l), one per joint torque i: tau[i] = y(state) @ P[i] @ theta_b.
+        """Return one sparse matrix P[i] per joint torque, (p, l): tau[i] = y(state) @ P[i] @ theta_b.
 
-        y(state) holds the values of the model's p monomials, and theta_b the l base parameters. P is None if the model
-        was derived with `expand=False`.
+        The vector y(state) holds the values of p monomials. Monomials are products of powers of q, sin q, cos q, qd and
+        qdd. theta_b are the l base parameters. P is None if the model was derived with `expand=False`.
         """
         return None if self.expansion is None else self.expansion.P
 
@@ -199,21 +202,21 @@ class DynamicsModel(Answers):
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Return, for each of the l base parameters, the index of its pivot in the vector of standard parameters, (11n,).
+        """Return for each base parameter the index of one standard parameter, its pivot.
 
-        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. A base
-        parameter is a linear combination of standard parameters. Its pivot is the first standard parameter that appears
-        in that base parameter only, with the coefficient 1.
+        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. The index
+        is the place in the vector of all 11n standard parameters. A base parameter is a linear combination of standard
+        parameters. Its pivot is the first one that appears in no other base parameter, and that has the coefficient 1.
         """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """Return whether every base parameter has a pivot. In every model that psdmc derives, this is true.
+        """Return whether each base parameter has a pivot, a standard parameter that belongs to it alone.
 
-        A base parameter is a linear combination of standard parameters (masses, first moments and inertias of links).
-        A pivot of a base parameter is a standard parameter that appears in that base parameter only, with the
-        coefficient 1. The attribute `pivots` lists the pivots.
+        This is true for every model that psdmc derives. Standard parameters are the masses, first moments and inertias of
+        the links. A base parameter is a linear combination of standard parameters. Its pivot appears in no other base
+        parameter, and has the coefficient 1.
         """
         return bool(self._leads.any(axis=1).all())
 
@@ -227,12 +230,13 @@ class DynamicsModel(Answers):
     def representative(self) -> Array:
         """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
-        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. Many x
-        have the same theta_b = B @ x, with the matrix B of the model. R gives one of them: l entries of x, the pivots
-        (see `pivots`), have the values of the base parameters, and all other entries are zero.
+        Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. Many
+        vectors x give the same base parameters and therefore the same torques. R computes one of these vectors: one
+        entry of x for each base parameter (its pivot, see `pivots`) has the value of the base parameter. All other entries
+        are zero.
 
-        There is one exception: `assume_zero` can tie an entry to a pivot. For example, if a link is a point mass on its z
-        axis, its inertias Ixx and Iyy about the link frame are equal. If Ixx is a pivot, Iyy then has the same value in x.
+        If the model was derived with `assume_zero`, other entries can also differ from zero. For example, the inertias Ixx
+        and Iyy of a point mass on the z axis of a link are equal. If Ixx is a pivot, Iyy then has the same value in x.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -243,10 +247,10 @@ class DynamicsModel(Answers):
         )
 
     def expanded(self) -> Expansion:
-        """Return an object with the matrices E and P, with which each torque is a sum of monomials.
+        """Return an object with the matrices E and P. They give each joint torque as a sum of monomials.
 
-        Monomials are products of powers of q, sin q, cos q, the rates and the accelerations. E holds the exponents of the
-        monomials. P times the base parameters gives their coefficients in each torque.
+        A monomial is a product of powers of q, sin q, cos q, qd and qdd. E holds the exponents of the monomials. P[i] times
+        the base parameters gives the coefficients of the monomials in the torque of joint i.
 
         Raises InputError if the model was derived with `expand=False`, without E and P.
         """
@@ -265,7 +269,10 @@ class DynamicsModel(Answers):
 
     @property
     def unknown_base_parameters(self) -> tuple[int, ...]:
-        """Return the indices of the base parameters that depend on an unknown mass or inertia; empty if all are known."""
+        """Return the indices in theta_b of the base parameters that depend on an unknown mass or inertia.
+
+        The tuple is empty if all base parameters are known.
+        """
         if self.theta_b is not None:
             return ()
         is_unknown = np.isnan(self.mechanism.parameters.reshape(-1))
@@ -273,9 +280,9 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """Return the base parameters theta_b, (l,), with zero for each mass and inertia that the robot file lacks.
+        """Return the base parameters theta_b, (l,), also if the robot file lacks masses or inertias of some links.
 
-        The result is None if no mass and no inertia is known.
+        Missing masses and inertias count as zero. The result is None if the file has no mass and no inertia at all.
         """
         if self.theta_b is not None:
             return self.theta_b
@@ -285,11 +292,11 @@ class DynamicsModel(Answers):
         return np.asarray(times(self.B, known.reshape(-1)))
 
     def equivalent_parameters(self) -> Array:
-        """Return a vector of standard parameters that gives the same torques as the model.
+        """Return masses and inertias of the links, as one vector, with which the robot has the same torques as the model.
 
-        The vector has 11 numbers for each of the n links: mass, first moments (3), inertias (6) and drive inertia. The
-        matrix `representative`, (11n, l), times theta_b gives this vector. Many other vectors give the same torques. The
-        returned vector does not describe the real links, and can contain negative masses.
+        The vector has 11 numbers for each of the n links: mass, first moments (3), inertias (6) and drive inertia. Many
+        vectors give the same torques. This one is `representative` @ theta_b. It does not describe the real links, and can
+        contain negative masses.
 
         Raises InputError if theta_b is unknown.
         """
@@ -317,9 +324,11 @@ class DynamicsModel(Answers):
 
         Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
 
-        Raises InputError if a mass is negative, or if a number is not finite or exceeds the limits for robot files. Raises
-        InputError also if an inertia is not symmetric, or belongs to a link without mass. If the model was derived with
-        the assumption that a parameter is zero (option `assume_zero`), another value also raises InputError.
+        Raises InputError in each of these cases:
+
+        - a mass is negative, or a number is not finite or exceeds the limits for robot files
+        - an inertia is not symmetric, or belongs to a link without mass
+        - a parameter is not zero, but the model was derived with the assumption that it is (option `assume_zero`)
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -337,12 +346,14 @@ class DynamicsModel(Answers):
 
             q          (..., nq) joint positions, rad or m; ... are batch axes, if any
             qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
-            theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
+            theta_b    (l,) base parameters for all states, or (..., l), one set per state; None: those of the model
             out        array into which psdmc writes the result; optional
 
-        This method uses NumPy; a robot from `psdmc.compile` is hundreds of times faster. The torque of joint i is
-        y @ P[i] @ theta_b, with the attribute `P` and the values y of the model's monomials at q, qd and qdd. A model
-        that was derived with `expand=False` has no monomials, so the method uses the Newton-Euler algorithm.
+        This method computes with NumPy. The method of a compiled robot (`psdmc.compile`) is hundreds of times faster.
+
+        The torque of joint i is y @ P[i] @ theta_b. The vector y holds the values of the model's monomials, products of
+        powers of q, sin q, cos q, qd and qdd. A model that was derived with `expand=False` has no monomials. The method
+        then uses the Newton-Euler algorithm.
         """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
@@ -366,7 +377,9 @@ class DynamicsModel(Answers):
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
-        """Compute the regressor Y, (..., nv, l): with base parameters theta_b, the torques of a motion are tau = Y theta_b.
+        """Compute the regressor Y, (..., nv, l), of a motion: the joint torques are tau = Y theta_b.
+
+        The l base parameters theta_b are combinations of masses and inertias.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
@@ -380,7 +393,7 @@ class DynamicsModel(Answers):
         """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled. Units are kg m^2, kg m or kg.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
-        theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
+        theta_b    (l,) base parameters for all states, or (..., l), one set per state; None: those of the model
         out        array into which psdmc writes the result; optional
         """
         return self._answer("mass_matrix", q, theta_b, out=out)
@@ -388,11 +401,11 @@ class DynamicsModel(Answers):
     def nonlinear_effects(
         self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """Compute h(q, qd), the sum of Coriolis, centrifugal and gravity torques: (..., nv), in N m or N.
+        """Compute h(q, qd), (..., nv), the sum of Coriolis, centrifugal and gravity torques: N m, or N for sliding joints.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd         (..., nv) joint rates, rad/s or m/s
-        theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
+        theta_b    (l,) base parameters for all states, or (..., l), one set per state; None: those of the model
         out        array into which psdmc writes the result; optional
         """
         return self._answer("nonlinear_effects", q, qd, theta_b, out=out)
@@ -401,7 +414,7 @@ class DynamicsModel(Answers):
         """Compute the gravity torques g(q), (..., nv), which keep the robot at rest: N m, or N for sliding joints.
 
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
-        theta_b    (l,) base parameters that replace the model's, or (..., l), one set per state; optional
+        theta_b    (l,) base parameters for all states, or (..., l), one set per state; None: those of the model
         out        array into which psdmc writes the result; optional
         """
         return self._answer("gravity", q, theta_b, out=out)
@@ -430,11 +443,10 @@ class DynamicsModel(Answers):
             joint    name of the joint, or its number: 0 is the first joint
             numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The names of the symbols count joints from 1, so q1, qd1 and qdd1 belong to the first joint.
+        In the sum, the symbols q1, qd1 and qdd1 belong to the first joint.
 
-        Raises InputError if the robot has no such joint, or if the torque has more than 2,000 monomials. Raises InputError
-        also if the model has no monomials, for example because it was derived with `expand=False`. Raises ToolchainError
-        if SymPy is missing.
+        Raises InputError if the robot has no such joint, if the torque has more than 2,000 monomials, or if the model was
+        derived with `expand=False`. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
@@ -466,7 +478,7 @@ class DynamicsModel(Answers):
             frame     the frame: a name from `frame_names`, or a Placement relative to the tip frame; None: the tip frame
 
         Raises InputError if no rigid body has such a mass and inertia, or if a number is too large for a robot file. Raises
-        InputError also if the load contradicts an assumption of the model, such as `assume_zero`.
+        InputError also if the load needs a parameter that the model assumes to be zero (option `assume_zero` of `derive`).
         """
         load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)
         body = payload.carrying_frame(self.mechanism, frame).joint

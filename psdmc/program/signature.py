@@ -121,6 +121,7 @@ class Quantity:
              then 1
     default  the value of all entries if Python's callers leave the input out
     whole    whether tests draw whole numbers only
+    by_q     whether entries are derivatives by q
     """
 
     name: str
@@ -132,6 +133,7 @@ class Quantity:
     least: float | None = None
     default: float | None = None
     whole: bool = False
+    by_q: bool = False
 
     def __post_init__(self) -> None:
         words = [word for axis in self.axes for part in axis.split("+") for word in part.split("*")]
@@ -248,6 +250,11 @@ class Signature:
         return Joined(PIVOTS, (whole,), unit=parts[0].unit, parts=tuple(parts))
 
     @property
+    def note(self) -> str:
+        """Return a paragraph that explains derivatives by q, if an output contains any; else nothing."""
+        return BY_Q if any(quantity.by_q for quantity in self.outputs) else ""
+
+    @property
     def raises(self) -> bool:
         """Return whether a Python call raises an error if a matrix that the function factorises is not positive
         definite."""
@@ -326,17 +333,13 @@ TAU = Quantity(
 )
 """Those of q, qd and qdd if states are drawn."""
 
-SMALL_CHANGE = (
-    "Here x is a small change of q, with nv numbers: x moves a joint with one coordinate by x[j], and a ball joint or "
-    "floating base along and about its own axes"
+BY_Q = (
+    "If the robot has a ball joint or a floating base, q contains a quaternion and has more than nv entries. The "
+    "derivatives by q are then by the nv entries x[j] of a small displacement x, at x = 0. The displaced q is "
+    "integrate(q, x). For a joint with one coordinate, x[j] is the change of its position. For a ball joint or floating "
+    "base, x is along and about its own axes."
 )
-"""What x is in integrate(q, x)."""
-
-OF_Q = (
-    "q[j]. If the robot has a ball joint or a floating base, q is replaced by integrate(q, x), and the derivative is by "
-    f"x[j] at x = 0. {SMALL_CHANGE}"
-)
-"""What an entry of a derivative by q belongs to."""
+"""Explains derivatives by q."""
 
 
 def jacobian_of(output: str, by: str) -> Quantity:
@@ -351,14 +354,14 @@ def derivative_of(above: Quantity, below: Quantity) -> Quantity:
     the second, or nv if the second is q."""
     axes = ("nv",) if below.axes == Q.axes else below.axes
     row, column = "i" if len(above.axes) == 1 else "k, i", "j" if len(axes) == 1 else "k, m"
-    entry = OF_Q if below.name == Q.name else f"{below.name}[{column}]"
     return Quantity(
         f"d{above.name}_d{below.name}",
         (*above.axes, *axes),
         means=f"derivatives of {above.name} by {below.name}: entry [{row}, {column}] is the derivative of "
-        f"{above.name}[{row}] by {entry}",
+        f"{above.name}[{row}] by {below.name}[{column}]",
         unit=str(times(above.dimension, below.dimension, -1)),
         powers=(*_powers(above), *(-power for power in _powers(below))),
+        by_q=below.name == Q.name,
     )
 
 

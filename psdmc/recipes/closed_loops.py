@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 ROW_WORDS = (
-    "along and about the axes of the loop's first frame. There is one {} for each blocked direction, loop by loop: linear "
-    "directions (x, y, z), then angular ones (rx, ry, rz)"
+    "along and about the axes of the loop's first frame. There is one {} for each direction that a loop blocks. "
+    "The order is loop by loop, first linear directions (x, y, z), then angular ones (rx, ry, rz)"
 )
 
 

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from psdmc.recipes.recipe import Ingredients
     from psdmc.robot.reference import Reference
 
-_ROWS = "three linear for each point; three linear, then three angular for each surface; along"
-ROW_WORDS = f"{_ROWS} the base frame's axes"
-LOCAL_ROW_WORDS = f"{_ROWS} the contact's own axes"
+_ROWS = "A contact point has three linear {0}. A contact surface has three linear and then three angular {0}"
+ROW_WORDS = f"along the axes of the base frame. {_ROWS}"
+LOCAL_ROW_WORDS = f"along the axes of each contact. {_ROWS}"
 
 ACTIVE = Quantity(
     "active",
@@ -42,8 +42,9 @@ MU = Quantity(
     "mu",
     largest=1.0,
     least=0.1,
-    means="regularisation (not a friction coefficient), 0 or more: added to the diagonal of J M^-1 J^T, with the Jacobian "
-    "J and the mass matrix M; unit 1/kg in linear rows, 1/(kg m^2) in angular rows",
+    means="regularisation, 0 or more (not a friction coefficient). psdmc adds mu to the diagonal entries of J "
+    "M^-1 J^T, with the Jacobian J and the mass matrix M. The unit is 1/kg in linear rows and 1/(kg m^2) in "
+    "angular rows",
     unit="1/kg",
     default=0.0,
 )

@@ -14,7 +14,7 @@ from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program import dimensions
 from psdmc.program.replay import substituted
-from psdmc.program.signature import OF_Q, QD, QDD, SMALL_CHANGE, TAU, Q, Quantity, Signature
+from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torques
@@ -33,28 +33,30 @@ def direction_of(quantity: Quantity) -> Quantity:
     """A change of this input: a vector that is its direction."""
     name, axes = quantity.name, ("nv",) if quantity is Q else quantity.axes
     which = name if quantity.default is None else f"the input {name} (see below)"
-    means = f"direction of the change of {which}: for a small number e, the new value is {name} + e d{name}"
+    means = f"derivative of {which} by e: for a small number e, the new value is {name} + e d{name}"
     if quantity is Q:
-        means += "; with a ball joint or a floating base, it is integrate(q, e dq)"
+        means += ", or integrate(q, e dq) if the robot has a ball joint or a floating base"
     return replace(quantity, name=f"d{name}", axes=axes, largest=1.0, means=means, default=None)
 
 
 def along_direction(quantity: Quantity) -> Quantity:
     """The derivative of this output along a direction of the inputs."""
     name = quantity.name
-    means = f"derivative of {name} along the direction: for a small number e, the change of {name} is about e d{name}"
+    means = (
+        f"derivative of {name} by e at e = 0: for a small number e, the change of {name} is about e d{name}"
+    )
     return replace(quantity, name=f"d{name}", means=means)
 
 
 def gradient_by(quantity: Quantity) -> Quantity:
     """The gradient of a weighted sum, which has the unit of energy, by this input."""
-    entry = OF_Q if quantity is Q else f"{quantity.name}[j]"
     return Quantity(
         f"grad_{quantity.name}",
         ("nv",) if quantity is Q else quantity.axes,
-        means=f"gradient of the weighted sum by {quantity.name}: entry j is the derivative by {entry}",
+        means=f"gradient of the weighted sum by {quantity.name}: entry j is the derivative by {quantity.name}[j]",
         unit=str(dimensions.times(dimensions.dimension_of("J"), quantity.dimension, -1)),
         powers=(-quantity.powers[0],),
+        by_q=quantity is Q,
     )
 
 
@@ -72,10 +74,9 @@ def hessian_of(last: Quantity, axis: str) -> Quantity:
     """The symmetric matrix of second derivatives of a weighted sum by q, qd and a third quantity."""
     means = (
         "symmetric matrix of the second derivatives of the weighted sum. The first nv rows and columns are for q, the next "
-        f"nv for qd, the last nv for {last.name}. If the robot has a ball joint or a floating base, q is replaced by "
-        f"integrate(q, x), and the first nv are for x at x = 0. {SMALL_CHANGE}"
+        f"nv for qd, the last nv for {last.name}"
     )
-    return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1))
+    return Quantity("hessian", (axis, axis), means=means, unit="J", powers=(-1, -1), by_q=True)
 
 
 _FREE = "free_qdd"

@@ -14,7 +14,7 @@ from psdmc.robot.mechanism import Array
 VALUES = Quantity(
     "values",
     ("nonzeros",),
-    means="matrix entries that can differ from zero; `CompiledRobot.pattern` returns their rows and columns",
+    means="entries of the matrix; `CompiledRobot.pattern` returns their rows and columns",
 )
 
 

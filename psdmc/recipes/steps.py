@@ -35,6 +35,7 @@ A = Quantity(
     means="derivatives of the new state (q_next, qd_next) by the old state (q, qd)",
     unit="1",
     powers=(1, -1),
+    by_q=True,
 )
 B = Quantity(
     "B",

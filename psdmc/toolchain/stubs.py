@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from psdmc.functions import SIGNATURES, recipe_of
-from psdmc.program.signature import SMALL_CHANGE, Quantity, Signature
+from psdmc.program.signature import Quantity, Signature
 
 STUB = Path(__file__).with_name("call.pyi")
 MODEL = Path(__file__).parents[1] / "model"
@@ -64,8 +64,8 @@ def documentation(function: Signature) -> str:
         for q in function.inputs
     ]
     theta = (
-        "(l,) base parameters (combinations of masses and inertias) that replace the model's, or (..., l), one set per "
-        "state. SI units; optional if the model's are known"
+        "(l,) base parameters for all states, or (..., l) for one set per state. Base parameters are combinations of masses "
+        "and inertias, in SI units. Without theta_b, the function uses those of the model, if they are known"
     )
     given += [("theta_b", theta)] if function.theta else []
     written = (
@@ -82,7 +82,15 @@ def documentation(function: Signature) -> str:
     sizes = _SIZES if closes else {**_SIZES, "constraint_rows": _WITHOUT_LOOPS}
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
     lengths = [(size, meaning) for size, meaning in sizes.items() if size in {*axes, *lead}]
-    parts = [_rows(given), returned, _rows(made), *_failures(function), "In these shapes:", _rows(lengths)]
+    parts = [
+        _rows(given),
+        returned,
+        _rows(made),
+        *_note(function),
+        *_failures(function),
+        "In these shapes:",
+        _rows(lengths),
+    ]
     return "\n\n".join([function.summary, *parts])
 
 
@@ -90,24 +98,26 @@ _SIZES = {
     "...": "batch axes, if the call computes many states; none for one state",
     "nq": "length of q, which is the number of joints if every joint has one coordinate",
     "nv": "number of joint rates",
-    "nx": "2 nv, the length of a small change of the state: the first nv for q, the last nv for qd. If the robot has a "
-    "ball joint or a floating base, q is replaced by integrate(q, x), and the first nv are for x at x = 0. "
-    f"{SMALL_CHANGE}",
+    "nx": "2 nv: nv for the displacement of the joints, then nv for the change of qd",
     "nxa": "3 nv: nv for q, nv for qd and nv for qdd",
     "nxu": "3 nv: nv for q, nv for qd and nv for tau",
     "l": "number of base parameters, the entries of theta_b",
-    "frames": "number of named frames; `frame_names` lists them",
+    "frames": "number of named frames, which are links or tools chosen when the model was derived; `frame_names` lists them",
     "contacts": "number of contacts: links or frames that can touch the world; `contacts` lists them",
-    "contact_rows": "number of rows of all contacts: 3 for each point, 6 for each surface, in the order of `contacts`",
+    "contact_rows": "number of rows of all contacts (links or frames that can touch the world): 3 for each contact point, "
+    "6 for each contact surface, in the order of `contacts`",
     "loop_rows": "number of directions that all closed loops block, in the order of `loops`; 0 without closed loops",
     "constraint_rows": "contact_rows + loop_rows: first the rows of all contacts, then those of all closed loops",
-    "nonzeros": "number of matrix entries that can differ from zero",
+    "nonzeros": "number of matrix entries that can differ from zero at some state",
 }
 
 _WITHOUT_LOOPS = (
-    "here equal to contact_rows, because psdmc does not generate this function for robots with "
-    "closed loops yet"
+    "equal to contact_rows, because psdmc cannot yet generate this function for robots with closed loops"
 )
+
+
+def _note(function: Signature) -> list[str]:
+    return [_filled(function.note)] if function.note else []
 
 
 def _failures(function: Signature) -> list[str]:

@@ -14,6 +14,7 @@ import mpmath
 import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
+from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 import psdmc
@@ -253,8 +254,12 @@ WITHOUT_STEPS = tuple(
 
 @pytest.mark.parametrize(
     ("robot", "name"),
-    [(robot, name) for robot in ("arm", "floating") for name in MOTORS]
-    + [("walker", name) for name in WITHOUT_STEPS],
+    slow_but_for(
+        [("arm" if name in WITHOUT_STEPS else "floating", name) for name in MOTORS],
+        [(robot, name) for robot in ("arm", "floating") for name in MOTORS]
+        + [("walker", name) for name in WITHOUT_STEPS],
+        spread=True,
+    ),
 )
 def test_every_function_is_pinocchios_with_the_law(name: str, robot: str) -> None:
     """PROGRAMs without and with theta_b, and the NumPy reference of the self-test."""
@@ -282,7 +287,12 @@ REGIONS = tuple(
 """Functions whose C for many rates is loops and calls of others, and those with which they can be compared."""
 
 
-@pytest.mark.parametrize(("robot", "names"), [("arm", MOTORS), ("floating", REGIONS), ("walker", DEFAULT)])
+@pytest.mark.parametrize(
+    ("robot", "names"),
+    slow_but_for(
+        [("walker", DEFAULT)], [("arm", MOTORS), ("floating", REGIONS), ("walker", DEFAULT)], spread=True
+    ),
+)
 def test_c_is_pinocchios_with_the_law(robot: str, names: tuple[str, ...]) -> None:
     """One state, and many states in lanes."""
     own = case(robot, 0.05 if robot == "arm" else None)

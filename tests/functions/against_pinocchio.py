@@ -260,7 +260,9 @@ SEVERAL = [pytest.param(*pair, id="-".join(pair)) for pair in sorted(COMPILED)]
 """(robot, real) of a long function's test in C."""
 
 EVERY = [
-    pytest.param(*pair, id="-".join(pair))
+    pytest.param(
+        *pair, id="-".join(pair), marks=[pytest.mark.slow] if pair == ("first slides", "float64") else []
+    )
     for pair in [(name, "float64") for name in ROBOTS] + [(name, "float32") for name in SINGLE]
 ]
-"""(robot, real) of a function's test."""
+"""(robot, real) of a function's test. `make test` leaves the C of the longest chain to `make test-slow`."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 from mimic_trees import as_urdf
@@ -64,6 +66,22 @@ FOOT = (
 
 
 @dataclass(frozen=True, eq=False)
+class OneByOne:
+    """A model's compiled functions as methods, each in a library of its own, made by its first call."""
+
+    model: DynamicsModel
+    real: str = "float64"
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        return getattr(self._with(name), name)
+
+    @cache  # noqa: B019 - a test's robot lives as long as the tests
+    def _with(self, function: str) -> CompiledRobot:
+        with without_optimisation():
+            return psdmc.compile(self.model, functions=[function], real=self.real)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
 class ContactTree:
     """A robot with three contacts or two, one of which is a surface where its base floats."""
 
@@ -75,9 +93,8 @@ class ContactTree:
         return derive_model(self.loaded.mechanism, expand=False)
 
     @cached_property
-    def robot(self) -> CompiledRobot:
-        with without_optimisation():
-            return psdmc.compile(self.model, functions=FUNCTIONS, real=self.real)  # type: ignore[arg-type]
+    def robot(self) -> OneByOne:
+        return OneByOne(self.model, self.real)
 
     @cached_property
     def given(self) -> dict[str, Array]:
@@ -134,17 +151,12 @@ def given_to(robot: Mechanism) -> dict[str, Array]:
 
 
 @cache
-def floating_gripper() -> tuple[DynamicsModel, CompiledRobot, dict[str, Array]]:
+def floating_gripper() -> tuple[DynamicsModel, OneByOne, dict[str, Array]]:
     """The Panda, whose fingers are coupled, on a floating base: its model, its C, and what the functions read."""
     path, contacts = path_of("panda"), ["panda_link5", "panda_leftfinger:6"]
     robot = load_robot(path, floating=True, frames=["panda_link3"], contacts=contacts).mechanism
     model = derive_model(robot, expand=False)
-    with without_optimisation():
-        return (
-            model,
-            psdmc.compile(model, functions=FUNCTIONS),
-            given_to(robot) | {"mu": np.linspace(0.1, 1.0, COUNT)},
-        )
+    return model, OneByOne(model), given_to(robot) | {"mu": np.linspace(0.1, 1.0, COUNT)}
 
 
 @cache
