@@ -157,12 +157,11 @@ class Arrow:
                     rows[k][column] = rows[k][column] - product
         return rows
 
-    @property
-    def thin_inverse(self) -> list[list[Scalar]]:
+    def thin_inverse(self, is_solved: bool = False) -> list[list[Scalar]]:
         """The factors of M^-1 itself."""
         n = len(self.pivots)
         unit = [[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
-        return self.thin(unit, is_solved=self.has_small_core)
+        return self.thin(unit, is_solved=is_solved)
 
     @property
     def has_small_core(self) -> bool:

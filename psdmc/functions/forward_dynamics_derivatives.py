@@ -63,24 +63,21 @@ def _in_limbs(g: Ingredients) -> Outputs:
     accelerations = arrow.solved(load, at_rest.by_qd, [0.5 * rate for rate in g.inputs["qd"]])
     moving = _torque_derivatives(g, accelerations)
     blocks: list[Matrix] = [moving.by_q, at_rest.by_qd]
-    is_solved = arrow.has_small_core
     if has_free_root(g.frames):
         known = known_derivatives(g.frames, g.inputs["q"], g.inputs["qd"], g.base_acceleration)
         thin = [
-            _with_block(
-                arrow.thin(_without_columns(matrix, count), is_solved=is_solved), block, count - 3
-            )
+            _with_block(arrow.thin(_without_columns(matrix, count)), block, count - 3)
             for matrix, block, count in zip(blocks, known, (KNOWN_BY_Q, KNOWN_BY_QD), strict=True)
         ]
     else:
-        thin = [arrow.thin(matrix, is_solved=is_solved) for matrix in blocks]
+        thin = [arrow.thin(matrix) for matrix in blocks]
     return {
         "qdd": accelerations,
         "dqdd_dq": thin[0],
         "dqdd_dqd": thin[1],
-        "dqdd_dtau": arrow.thin_inverse,
+        "dqdd_dtau": arrow.thin_inverse(),
         "pivot": arrow.pivots,
-        THIN: arrow.thin_factors(is_solved),
+        THIN: arrow.thin_factors(),
     }
 
 
