@@ -170,7 +170,7 @@ def thin_outputs(
     changes  for each quantity, the result of `Arrow.thin` for its derivatives of minus the residuals, whose last rows
              belong to minus the contact forces
     """
-    thin = [row[:nv] for row in arrow.thin_factors]
+    thin = [row[:nv] for row in arrow.thin_factors()]
     return {
         **{f"d{motion}_d{by}": [list(row) for row in rows[:nv]] for by, rows in changes.items()},
         **{f"d{forces}_d{by}": minus(rows[nv:]) for by, rows in changes.items()},
