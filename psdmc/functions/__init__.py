@@ -27,7 +27,7 @@ SIGNATURES = {signature.name: signature for signature in in_order([r.signature f
 
 RECIPES = {name: _FOUND[name] for name in SIGNATURES}
 
-OF_TREES = tuple(name for name, recipe in RECIPES.items() if recipe.needs is not Needs.LOOPS)
+OF_TREES = tuple(name for name, recipe in RECIPES.items() if recipe.needs not in (Needs.LOOPS, Needs.PASSIVE))
 """Names of the functions of robots without closed loops."""
 
 OF_FILE_MASSES = frozenset(name for name, recipe in RECIPES.items() if recipe.needs is Needs.STANDARD)
