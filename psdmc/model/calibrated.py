@@ -28,6 +28,8 @@ Word = Literal["usable", "usable, with doubts", "not usable"]
 
 NOT_USABLE_STATUS = 6
 """Exit status of `psdmc calibrate` where the verdict is `not usable`."""
+LOG_INFORMATION = "log_information"
+"""Name of the fact that holds the share of each log in the information of each parameter."""
 WHOLE = "All"
 """The step whose quality is that of the whole torque."""
 

@@ -200,6 +200,22 @@ def _lacking(values: Values) -> str:
     )
 
 
+def _odd_log(values: Values) -> str:
+    return (
+        "{log} contradicts the other logs: they predict its torque at joint {joint} with RMSE {rmse:.3g} {unit}, its own "
+        "fit with {own:.3g} {unit} (chi-square {statistic:.4g} per degree of freedom): look for another load, friction or "
+        "robot; leave it out of the fit".format(**values)
+    )
+
+
+def _logs_disagree(values: Values) -> str:
+    return (
+        "the {logs} logs contradict each other: the others predict the torque of {log} at joint {joint} with RMSE "
+        "{rmse:.3g} {unit}, its own fit with {own:.3g} {unit} (chi-square {statistic:.4g} per degree of freedom): look for "
+        "another load, friction or robot; calibrate each log alone and compare".format(**values)
+    )
+
+
 def _by_step(values: Values) -> str:
     return "{samples} independent samples for {unknowns} unknowns ({step})".format(**values)
 
@@ -220,6 +236,8 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
         f"the effort may be cut off at a limit, or this may be friction alone: joint {_at_levels(v)} of its moving rows: "
         "if the drive or sensor has that limit, record again with slower motions"
     ),
+    "odd_log": _odd_log,
+    "logs_disagree": _logs_disagree,
     "late": _late,
     "not_physical": lambda v: f"no mass distribution of a real robot is near the fit ({v['why']})",
     "starved": lambda v: (

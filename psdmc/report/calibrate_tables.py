@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from psdmc.model.calibrated import Calibrated, NumberRow, Quality, Verdict
+from psdmc.model.calibrated import LOG_INFORMATION, Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.joined_units import joined_units
 
 NOTHING = "–"
@@ -128,6 +128,24 @@ def log_table(record: Calibrated) -> str:
     return table(["Log", "Rows", "Duration [s]", "Date", "Used"], rows) if rows else ""
 
 
+def information_table(record: Calibrated) -> str:
+    """Return the table of each log's share in the information of each parameter; empty text for a single log. For each
+    parameter, the log without which its standard deviation would grow most comes first."""
+    found = record.facts.get(LOG_INFORMATION)
+    if found is None:
+        return ""
+    rows = []
+    for row in found["parameters"]:
+        grown = [math.inf if value is None else value for value in row["std_without"]]
+        most = max(range(len(grown)), key=grown.__getitem__)
+        shares = sorted(zip(found["logs"], row["shares"], strict=True), key=lambda each: -each[1])
+        words = ", ".join(f"{log} {share:.0%}" for log, share in shares)
+        growth = f"{grown[most]:.3g} times" if math.isfinite(grown[most]) else "not determined"
+        rows.append([row["name"], found["logs"][most], growth, words])
+    head = ["Parameter", "Most important log", "Standard deviation without it", "Shares of all logs"]
+    return table(head, rows, text_columns=(0, 3))
+
+
 def step_table(record: Calibrated) -> str:
     """Return the table of calibration steps: the cut-off frequency of the filter, and how the data were split. The text
     is empty if they are unknown."""
@@ -145,7 +163,8 @@ def step_table(record: Calibrated) -> str:
 
 def fact_table(record: Calibrated) -> str:
     """Ranks, condition numbers and the like."""
-    rows = [[name.replace("_", " "), _plain(value)] for name, value in record.facts.items()]
+    own = {name: value for name, value in record.facts.items() if name not in (LOG_INFORMATION, "odd_logs")}
+    rows = [[name.replace("_", " "), _plain(value)] for name, value in own.items()]
     return table(["Quantity", "Value"], rows, text_columns=(1,))
 
 

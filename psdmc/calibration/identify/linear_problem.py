@@ -36,6 +36,7 @@ class LinearProblem:
     held_out  (N,) whether a sample is held out for validation
     terms     plain friction terms of every joint, which have f values together
     columns   springs and further friction
+    counts    number of samples of each log, in their order
     """
 
     chain: Mechanism
@@ -45,6 +46,7 @@ class LinearProblem:
     l: int
     terms: tuple[Term, ...]
     columns: Columns = field(default_factory=Columns)
+    counts: tuple[int, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -128,8 +130,9 @@ def linear_problem(
             share = (states.first + at[-1]) / len(log)
             progress(Step(f"linear fit: {log.name}: {share:.0%}", share))
         outs.append(held_out_of(log, count, options.split))
+    counts = tuple(len(out) for out in outs)
     problem = LinearProblem(
-        chain, rows, np.concatenate(torques), np.concatenate(outs), l, terms, options.columns
+        chain, rows, np.concatenate(torques), np.concatenate(outs), l, terms, options.columns, counts
     )
     return problem, tuple(remarks)
 

@@ -158,9 +158,29 @@ class KeptRows:
             store.append(np.ascontiguousarray(values.reshape(len(values), -1)))
 
     def __iter__(self) -> Iterator[Block]:
-        for start in range(0, len(self), BLOCK_SAMPLES):
-            stop = min(start + BLOCK_SAMPLES, len(self))
+        return self.blocks(0, len(self))
+
+    def between(self, first: int, end: int) -> Rows:
+        """Return the rows of the samples from `first` to before `end`, which are read when they are needed."""
+        return _Between(self, first, end)
+
+    def blocks(self, first: int, end: int) -> Iterator[Block]:
+        """Yield the blocks of the samples from `first` to before `end`."""
+        for start in range(first, end, BLOCK_SAMPLES):
+            stop = min(start + BLOCK_SAMPLES, end)
             shape = (stop - start, *self.shape)
             yield Block(
                 self._columns.rows(start, stop).reshape(shape), self._noise.rows(start, stop).reshape(shape)
             )
+
+
+@dataclass(frozen=True, slots=True)
+class _Between:
+    """Some consecutive samples of kept rows."""
+
+    rows: KeptRows
+    first: int
+    end: int
+
+    def __iter__(self) -> Iterator[Block]:
+        return self.rows.blocks(self.first, self.end)
