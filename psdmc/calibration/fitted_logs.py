@@ -4,9 +4,10 @@ parameters or only those that the data need."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from psdmc.calibration.identify.essential import Essential, EssentialOptions, essential
+from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.knowledge import Knowledge
 from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.identify.linear_options import LinearOptions
@@ -19,7 +20,7 @@ from psdmc.calibration.verdict.judge import NOT_PHYSICAL, ODD_LOGS
 from psdmc.calibration.verdict.record import Calibration, judged_record, linear_record, with_data, with_model
 from psdmc.errors import InputError, InternalError
 from psdmc.links.link_terms import PhysicalOptions
-from psdmc.model.calibrated import LOG_INFORMATION
+from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 
@@ -57,12 +58,14 @@ class LogFit:
             )
         self.progress("comparing logs")
         logs = log_information(found.problem, found.estimate, [log.name for log in self.logs])
-        found = self._with_prior(found)
+        drifts = friction_drift(found.problem, found.estimate, [log.name for log in self.logs])
+        unstated, found = found, self._with_prior(found)
         self.progress("reading the result back")
         result = self._consistent(found)
         if self.known.essential is not None:
             result = self._essential(found, result, self.known.essential)
-        return result if logs is None else with_log_information(result, logs, found)
+        result = result if logs is None else with_log_information(result, logs, unstated)
+        return with_drift(result, drifts)
 
     def _with_prior(self, found: LinearResult) -> LinearResult:
         if not self.known.confidence:
@@ -190,3 +193,12 @@ def with_log_information(record: Calibration, logs: LogInformation, found: Linea
         ODD_LOGS: {"disagree": logs.disagree, "items": [dict(each) for each in logs.odd]},
     }
     return with_model(replace(record, facts=facts, notes=(*record.notes, *notes)))
+
+
+def with_drift(record: Calibration, drifts: Sequence[FrictionDrift]) -> Calibration:
+    """Return the result with the change of each joint's friction over each log, from which a doubt may follow."""
+    if not drifts:
+        return record
+    return with_model(
+        replace(record, facts={**record.facts, FRICTION_DRIFT: [asdict(each) for each in drifts]})
+    )

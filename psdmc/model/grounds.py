@@ -238,6 +238,11 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
     ),
     "odd_log": _odd_log,
     "logs_disagree": _logs_disagree,
+    "friction_drifts": lambda v: (
+        f"friction changes over the {v['seconds']:.3g} s that are fitted of {v['log']}: "
+        f"{_each(v, 'joint {joint} by {change:+.3g} +- {std:.1g} {unit} ({share:+.0%})', MOST_LISTED)}: move the robot "
+        "until it is warm before you record, or leave out the first part by --warm SECONDS"
+    ),
     "late": _late,
     "not_physical": lambda v: f"no mass distribution of a real robot is near the fit ({v['why']})",
     "starved": lambda v: (

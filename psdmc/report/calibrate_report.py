@@ -14,6 +14,7 @@ from psdmc.model.calibrated_json import document
 from psdmc.report.calibrate_plots import excitation_panels, step_panels
 from psdmc.report.calibrate_tables import (
     accuracy_table,
+    drift_table,
     fact_table,
     information_table,
     joint_table,
@@ -77,6 +78,7 @@ class ReportView:
     spring_table: str
     log_table: str
     information_table: str
+    drift_table: str
     step_table: str
     versions: tuple[str, ...]
     fact_table: str
@@ -116,6 +118,7 @@ def report_html(record: Calibrated, found: Excitation | None = None, truth: Trut
         spring_table=spring_table(record),
         log_table=log_table(record),
         information_table=information_table(record),
+        drift_table=drift_table(record),
         step_table=step_table(record),
         versions=tuple(f"{name} {value}" for name, value in record.versions.items()),
         fact_table=fact_table(record),

@@ -61,7 +61,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
     start    (l,) values of the unknowns, whose torques are subtracted from `target` first; None: zero
     """
     triangle, noise, l = np.zeros((0, 0)), None, 0
-    for block, own in _with_rows(rows):
+    for block, own in with_rows(rows):
         l = block.columns.shape[2]
         weight = weights[own]
         ahead = target[own] if start is None else target[own] - block.columns @ start
@@ -79,7 +79,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
 def residual_of(rows: Rows, target: Array, values: Array) -> Array:
     """Return the residual at all samples, an array (N samples, n joints): target minus columns @ values."""
     residual = np.empty_like(target)
-    for block, own in _with_rows(rows):
+    for block, own in with_rows(rows):
         residual[own] = target[own] - block.columns @ values
     return residual
 
@@ -108,7 +108,7 @@ def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Col
     """
     count, n = weighted.shape
     squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
-    for block, own in _with_rows(rows):
+    for block, own in with_rows(rows):
         flat = block.columns * weights[own][:, :, None]
         if not squares.shape[1]:
             l, k = flat.shape[2], 0 if block.consider is None else block.consider.shape[2]
@@ -122,7 +122,7 @@ def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Col
     return Collected(squares, scores, consider)
 
 
-def _with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:
+def with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:
     """Each block with its place among all samples."""
     start = 0
     for block in rows:

@@ -46,8 +46,10 @@ FEWEST_LOGS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """One log in r white coordinates: M_i and the covariance of its score (r, r), the score (r,), the RMSE by its own
-    fit (n,), the RMS of its weighted own residual, and its rows with their residual and used entries."""
+    """One log in r white coordinates.
+
+    M_i and the covariance of its score (r, r), the score (r,), the RMSE by its own fit (n,), the RMS of its weighted own
+    residual, and its rows with their residual and used entries."""
 
     name: str
     information: Array
@@ -90,11 +92,9 @@ def log_information(problem: LinearProblem, solved: Estimate, names: Sequence[st
 
     names  of the logs, in the order of their rows
     """
-    white = solved.scale[:, None] * np.linalg.pinv(solved.whitening[: solved.rank] * solved.scale)
+    white = white_coordinates(solved)
     residual = residual_of(problem.rows, problem.torque, solved.values)
-    stops = np.cumsum(problem.counts)
-    places = [slice(int(stop - count), int(stop)) for stop, count in zip(stops, problem.counts, strict=True)]
-    fitted = [(name, own) for name, own in zip(names, places, strict=True) if solved.weights[own].any()]
+    fitted = fitted_logs(problem, solved, names)
     if len(fitted) < 2 or not solved.rank:
         return None
     parts = []
@@ -118,6 +118,23 @@ def log_information(problem: LinearProblem, solved: Estimate, names: Sequence[st
         disagree,
         _noisier(parts),
     )
+
+
+def white_coordinates(solved: Estimate) -> Array:
+    """Return a matrix (l, r) whose columns span the r seen directions of a fit, in which the fit's information is a
+    multiple of the identity."""
+    return solved.scale[:, None] * np.linalg.pinv(solved.whitening[: solved.rank] * solved.scale)
+
+
+def fitted_logs(problem: LinearProblem, solved: Estimate, names: Sequence[str]) -> list[tuple[str, slice]]:
+    """Return name and samples of each log that the fit uses; logs for validation are left out."""
+    found, start = [], 0
+    for name, count in zip(names, problem.counts, strict=True):
+        own = slice(start, start + count)
+        start += count
+        if solved.weights[own].any():
+            found.append((name, own))
+    return found
 
 
 def _part(name: str, rows: Rows, residual: Array, weights: Array, white: Array) -> _Part:

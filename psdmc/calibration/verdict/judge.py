@@ -27,7 +27,7 @@ from psdmc.calibration.verdict.findings import Demand, Findings
 from psdmc.calibration.verdict.record import Calibration, with_verdict
 from psdmc.calibration.verdict.suspects import suspect, unit_suspect
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
-from psdmc.model.calibrated import LOG_INFORMATION, Verdict
+from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION, Verdict
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Delay, Ground
 
@@ -200,6 +200,7 @@ def _poor(found: Findings) -> Iterator[Ground]:
 def doubts(found: Findings) -> Iterator[Ground]:
     """Yield all doubts about a calibration."""
     yield from _odd_logs(found)
+    yield from _drifting(found)
     yield from _perhaps_saturated(found)
     yield from _a_little_late(found)
     yield from _sampled_slowly(found)
@@ -222,6 +223,14 @@ def _odd_logs(found: Findings) -> Iterator[Ground]:
     for item in odd["items"]:
         fitted = len(found.record.facts[LOG_INFORMATION]["logs"])
         yield Ground("logs_disagree" if odd["disagree"] else "odd_log", {**item, "logs": fitted})
+
+
+def _drifting(found: Findings) -> Iterator[Ground]:
+    """A doubt about each log over which friction changes."""
+    drifts = [each for each in found.record.facts.get(FRICTION_DRIFT, ()) if each["shown"]]
+    for log in dict.fromkeys(each["log"] for each in drifts):
+        items = [each for each in drifts if each["log"] == log]
+        yield Ground("friction_drifts", {"log": log, "seconds": items[0]["seconds"], "items": items})
 
 
 def _perhaps_saturated(found: Findings) -> Iterator[Ground]:
