@@ -11,7 +11,7 @@ from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_dr
 from psdmc.calibration.identify.knowledge import Knowledge
 from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.log_information import ALONE, LogInformation, log_information
+from psdmc.calibration.identify.log_information import ALONE, MAIN_SHARE, LogInformation, log_information
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.stated_prior import theta_covariance, with_prior
 from psdmc.calibration.logs.log import Array
@@ -169,12 +169,13 @@ def with_log_information(record: Calibration, logs: LogInformation, found: Linea
     ]
     notes = []
     grown, share = logs.std_without.max(axis=0), logs.shares.max(axis=0)
-    alone = sorted((k for k in seen if grown[k] > ALONE), key=lambda k: (-grown[k], -share[k]))
+    alone = [k for k in seen if grown[k] > ALONE and share[k] > MAIN_SHARE]
+    alone.sort(key=lambda k: (-grown[k], -share[k]))
     if alone:
         named = [
             f"{names[k]} ({logs.logs[i]}: {logs.shares[i, k]:.0%} of its information)"
             for k in alone[:MOST_ALONE]
-            for i in [int(logs.std_without[:, k].argmax())]
+            for i in [int(logs.shares[:, k].argmax())]
         ]
         more = f" and {len(alone) - MOST_ALONE} more" if len(alone) > MOST_ALONE else ""
         notes.append(f"parameters that depend on one log alone: {', '.join(named)}{more}")

@@ -38,8 +38,9 @@ MATERIAL = 1.2
 NOISIER, SPREADS = 2.0, 5.0
 """Ratio of a log's own residual to the others' median, and number of their robust standard deviations (of the
 logarithm), from which a log is noisier than the others."""
-ALONE = 10.0
-"""Growth of a standard deviation without a log from which the parameter depends on this log alone."""
+ALONE, MAIN_SHARE = 10.0, 0.8
+"""Growth of a standard deviation without a log, and the log's share in the information, from which the parameter depends
+on this log alone."""
 FEWEST_LOGS = 3
 """Logs of which one can be told from the others."""
 

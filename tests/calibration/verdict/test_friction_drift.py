@@ -15,8 +15,8 @@ from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_dr
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import read_log, write_log
-from psdmc.calibration.logs.stored_log import without_start
+from psdmc.calibration.logs.log_files import open_log, read_log, write_log
+from psdmc.calibration.logs.stored_log import StoredLog, without_start
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.store import save
@@ -138,3 +138,16 @@ def test_leaving_out_all_is_refused(folder: Path):
     log = read_log(folder / "good0.csv")
     with pytest.raises(InputError, match=r"no rows after the first 60 s: it lasts 39\.99 s"):
         without_start(log, 60.0)
+
+
+def test_a_log_on_disk_loses_the_same_rows(folder: Path):
+    held = read_log(folder / "good0.csv")
+    on_disk = open_log(folder / "good0.csv", held=1000)
+    assert isinstance(on_disk, StoredLog)
+
+    left, read = without_start(held, 7.0), without_start(without_start(on_disk, 3.0), 4.0)
+
+    assert np.array_equal(left.time, read.time)
+    assert len(left) == 3300
+    assert np.array_equal(left.rows(5, 900).position, read.rows(5, 900).position)
+    assert np.array_equal(left.rows(5, 900).effort, read.rows(5, 900).effort)

@@ -210,3 +210,24 @@ def test_what_one_log_alone_shows_is_said(arm, folder: Path):
     (note,) = [note for note in record.notes if note.startswith("parameters that depend on one log alone")]
     assert "viscous of shoulder (good1.csv: 100% of its information)" in note
     assert "elbow_only" not in note
+
+
+def test_what_needs_two_logs_together_depends_on_none_alone(arm, folder: Path):
+    """Coulomb and viscous friction at one speed each: either log shows a sum of both, and only both logs show each."""
+    log, names = read_log(folder / "good0.csv"), []
+    for k, speed in enumerate((0.45, 0.55)):
+        turn = speed * (2.0 * np.abs((log.time / 2.0) % 2.0 - 1.0) - 1.0)
+        position = np.column_stack([turn, log.position[:, 1]])
+        qd, qdd = _rates(position, log.time)
+        effort = arm.regressor.regressor(position, qd, qdd) @ arm.model.theta_b
+        effort += np.array(COULOMB) * np.tanh(qd / 0.03) + np.array(VISCOUS) * qd
+        effort += 0.05 * np.random.default_rng(k).standard_normal(effort.shape)
+        names.append(folder / f"even{k}.csv")
+        write_log(replace(log, name=f"even{k}", position=position, velocity=None, effort=effort), names[-1])
+
+    record = calibrate(arm.model, names, CalibrateOptions(physical=False))
+
+    rows = {row["name"]: row for row in record.facts["log_information"]["parameters"]}
+    assert max(rows["coulomb of shoulder"]["shares"]) < 0.8
+    assert max(rows["coulomb of shoulder"]["std_without"]) > 10.0
+    assert not any("coulomb of shoulder" in note for note in record.notes if "one log alone" in note)
