@@ -3,8 +3,8 @@
 `make bench-contacts` runs this on an idle machine. Pinocchio's functions `constraintDynamics` and
 `computeConstraintDynamicsDerivatives` are compiled from headers, with the flags of psdmc's C. Their proximal method makes
 one step without regularisation, which is exact. Results are compared first. Robots with surfaces are compared at rest,
-where the spatial acceleration that Pinocchio prescribes is the classical one. A figure is the median time of a call with one state, over blocks of 512
-random states, on one thread.
+where the spatial acceleration that Pinocchio prescribes is the classical one. A figure is the median time of a call with
+one state, over blocks of 512 random states, on one thread.
 """
 
 from __future__ import annotations

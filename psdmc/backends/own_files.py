@@ -27,13 +27,15 @@ LARGEST_LIST = 16 << 20
 """Bytes of a manifest or journal that are read; a nine-joint arm's manifest has 0.1 MB."""
 
 OWN_NAME = re.compile(
-    r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi(?:_(?:theta|hessian))? | wheel | fmu )
-              / [A-Za-z_]\w* \. (?: c | h | hpp | inc )
+    r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi(?:_(?:theta|hessian))? | wheel | fmu2? | mex | ros2 )
+              / [A-Za-z_]\w* \. (?: c | cpp | h | hpp | inc )
           | cmake / [A-Za-z_]\w* \.cmake\.in
           | [A-Za-z_]\w* \.pc\.in
           | (?: src | tests ) / [a-z_]\w* \.rs
           | wheel / (?: __init__\.py | py\.typed )
-          | fmu / (?: modelDescription\.xml | buildDescription\.xml | pack\.py )
+          | ros2 / (?: plugins\.xml | package\.xml | CMakeLists\.txt )
+          | mex / [A-Za-z_]\w* \. m
+          | fmu2? / (?: modelDescription\.xml | buildDescription\.xml | pack\.py )
           | pyproject\.toml | setup\.py
           | Cargo\.toml | CMakeLists\.txt | Makefile | README\.md | LICENSE | package\.xml )""",
     re.VERBOSE | re.ASCII,

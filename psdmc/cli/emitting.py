@@ -124,7 +124,7 @@ def emit(
         typer.Option(
             "--with",
             metavar="NAME,...",
-            help="also write files for another program: casadi, casadi_theta, casadi_hessian, wheel, fmu",
+            help="also write files for another program: casadi, casadi_theta, casadi_hessian, wheel, fmu, fmu2, mex, ros2",
         ),
     ] = None,
     target: Annotated[

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from psdmc.derivation.certify import judged, measured
-from psdmc.derivation.closed_loops import require_closable
+from psdmc.derivation.closed_loops import require_closable, with_passive_joints
 from psdmc.derivation.expand import (
     EXTENDED,
     FINEST,
@@ -25,7 +25,7 @@ from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, ty
 from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derivation.rounding import merged
 from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
-from psdmc.errors import DerivationError, InputError
+from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.reproducible import times
@@ -74,11 +74,9 @@ def derive_model(
     tell = progress or silent
     require_derivable(chain)
     _refuse_absurd(chain)
-    require_closable(chain)
+    chain = with_passive_joints(chain, require_closable(chain))
     if expand is None:
         expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)
-    if expand and chain.has_followers:
-        raise InputError(f"'{chain.name}': E and P are of joints that follow no other", "leave --expand out")
     if expand:
         _refuse_wide(chain)
         refuse_long(0, types_along_ways(chain.types, chain.parents), len(chain))

@@ -24,6 +24,7 @@ from psdmc.recipes.contacts import (
     Solved,
     dense_solution,
     held_on_arrays,
+    joined,
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
@@ -65,8 +66,9 @@ FORCES = Quantity(
     powers=(-1,),
 )
 OF_LOOPS = (
-    "Then follow the forces (N) and moments (N m) that keep closed loops closed, if the robot has any. These are "
-    "loop_rows entries, along and about the axes of each loop's first frame"
+    "Then follow the forces (N) and moments (N m) that keep closed loops closed, if the robot has any. A closed loop "
+    "keeps two frames together, and has one entry for each direction of relative motion that it blocks. The entries are "
+    "along and about the axes of the loop's first frame"
 )
 
 
@@ -133,7 +135,7 @@ def solved(g: Ingredients) -> Solved:
         for own, row, error in zip(drifts, rows, errors, strict=True)
     ]
     load = [given - h for given, h in zip(tau, bias, strict=True)]
-    mask = Held.of(g, g.loops)
+    mask = Held.of(g)
     return *mask.solved(factors, rows, load, wanted), factors, rows
 
 
@@ -149,8 +151,8 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     def wanted(jacobian: Array) -> Array:
         own, errors = contact_drift.RECIPE.reference(robot, given)["drift"], given[ERROR.name]
         if loops:
-            own = _joined(own, loop_drift.RECIPE.reference(robot, given)["drift"])
-            errors = _joined(errors, loop_error.RECIPE.reference(robot, given)["error"])
+            own = joined(own, loop_drift.RECIPE.reference(robot, given)["drift"])
+            errors = joined(errors, loop_error.RECIPE.reference(robot, given)["error"])
         return -_stabilised(given, errors, own, along(jacobian, given["qd"])) - along(jacobian, free)
 
     change, forces, pivots = held_on_arrays(robot, given, wanted, loops)
@@ -162,19 +164,15 @@ def _stabilised(given: Given, errors: Array, own: Array, velocity: Array) -> Arr
     return np.asarray(own + kd * velocity + kp * errors)
 
 
-def _joined(of_contacts: Array, of_loops: Array) -> Array:
-    return np.concatenate([of_contacts, of_loops], axis=1)
-
-
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]
     errors = given[ERROR.name]
     if robot.loops:
-        jacobian = _joined(jacobian, loop_jacobian.RECIPE.pinocchio(robot, given)["J"])
-        own = _joined(own, loop_drift.RECIPE.pinocchio(robot, given)["drift"])
-        errors = _joined(errors, loop_error.RECIPE.pinocchio(robot, given)["error"])
+        jacobian = joined(jacobian, loop_jacobian.RECIPE.pinocchio(robot, given)["J"])
+        own = joined(own, loop_drift.RECIPE.pinocchio(robot, given)["drift"])
+        errors = joined(errors, loop_error.RECIPE.pinocchio(robot, given)["error"])
     wanted = -_stabilised(given, errors, own, along(jacobian, qd))
     load = given["tau"] - robot.nonlinear_effects(q, qd)
     qdd, forces = dense_solution(robot, given, jacobian, load, wanted)
@@ -192,8 +190,8 @@ RECIPE = Recipe(
         (QDD, replace(FORCES, means=f"first the {FORCES.means}. {OF_LOOPS}")),
         theta=True,
         summary="Compute the joint accelerations and the contact forces that torques cause. By default, active "
-        "contacts do not accelerate. If you give kp, kd or mu, their acceleration is -kp * error - kd * J qd - mu "
-        "* forces, with the Jacobian J of the contacts.",
+        "contacts do not accelerate. If you give kp, kd or mu, active contacts have the acceleration -kp * error - "
+        "kd * J qd - mu * forces. J is the Jacobian of the contacts (`contact_jacobian`).",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "constrained forward dynamics",

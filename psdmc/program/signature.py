@@ -266,7 +266,7 @@ class Signature:
         positive. Pivots are numbered from 0 over all matrices."""
         lengths = [" ".join(matrix.axes) for matrix in self.factorises]
         later = f", + ({' + '.join(lengths)}) times the stage of the step" if self.stages > 1 else ""
-        later = later.replace("constraints", "contacts")  # no such function has closed loops
+        later = later.replace("constraints", "contacts")  # closed loops count as contacts there
         return tuple(
             "".join(f"{length} + " for length in lengths[:k]) + matrix.number + later
             for k, matrix in enumerate(self.factorises)
@@ -335,9 +335,10 @@ TAU = Quantity(
 
 BY_Q = (
     "If the robot has a ball joint or a floating base, q contains a quaternion and has more than nv entries. The "
-    "derivatives by q are then by the nv entries x[j] of a small displacement x, at x = 0. The displaced q is "
-    "integrate(q, x). For a joint with one coordinate, x[j] is the change of its position. For a ball joint or floating "
-    "base, x is along and about its own axes."
+    "derivatives by q are then derivatives by the nv entries x[j] of a small displacement x, at x = 0. The displaced q "
+    "is integrate(q, x). For a joint with one coordinate, x[j] is the change of its position. For a ball joint, x has "
+    "three rotations about the axes of the moving body. For a floating base, x has three linear displacements along the "
+    "base's axes, then three rotations about these axes."
 )
 """Explains derivatives by q."""
 

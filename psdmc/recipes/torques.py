@@ -96,8 +96,8 @@ def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
     frames, owners = g.frames, joints_of_rates(g.frames)
     moved: set[int] = set()
     for i, frame in enumerate(frames):
-        leader = i if frame.follows is None else frame.follows[0]
-        if leader == owners[rate] or frame.parent in moved:
+        led_by = (i,) if frame.follows is None else frame.follows.leaders
+        if owners[rate] in led_by or frame.parent in moved:
             moved.add(i)
     kept = with_carriers(frames, moved)
     rates = tuple(k for k, joint in enumerate(owners) if joint in kept)

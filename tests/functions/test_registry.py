@@ -34,6 +34,7 @@ NAMES_SEVERAL = {
     "calibration/verdict/record.py": "steps of a calibration, and what the verdict compares",
     "model/dynamics_model.py": "methods with documentation of their own: what E and P are defined by",
     "model_functions.py": "what is computed from E and P where a model has them",
+    "backends/c/adapters/ros2.py": "what the two controllers call",
     "backends/c/adapters/fmu.py": "what an FMU simulates, and its optional outputs",
     "frameworks/differentiation.py": "which function gives the derivatives of which",
     "frameworks/jax_robot.py": "what JAX reads of functions that need help",

@@ -70,8 +70,18 @@ class PackageView:
         """Return the adapters (files for other programs) whose C file becomes a separate shared library,
         lib<robot>_<name>. Each adapter has the C files that its library needs in addition. The files for CasADi already
         include the code of the package, and need none."""
-        sources = {"casadi": (), "casadi_theta": (), "casadi_hessian": (), "fmu": self.sources}
+        sources: dict[str, tuple[str, ...]] = dict.fromkeys(("casadi", "casadi_theta", "casadi_hessian"), ())
+        sources |= dict.fromkeys(("fmu", "fmu2"), self.sources)
         return {name: sources[name] for name in self.adapters if name in sources}
+
+    @property
+    def fmus(self) -> dict[str, str]:
+        """Return the adapters that make FMUs, each with the files that the build packs with the library."""
+        named = {
+            "fmu": "fmu/modelDescription.xml fmu/buildDescription.xml fmu/pack.py",
+            "fmu2": "fmu2/modelDescription.xml fmu2/pack.py",
+        }
+        return {fmu: named[fmu] for fmu in self.adapters if fmu in named}
 
     @property
     def n(self) -> int:

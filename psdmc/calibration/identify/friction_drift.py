@@ -65,7 +65,7 @@ def friction_drift(
     rubbing = [k for k, name in enumerate(problem.friction) if name not in constant]
     if not rubbing or not solved.rank:
         return ()
-    places = np.array([[l + j * f + k for k in rubbing] for j in range(len(problem.chain))])
+    places = np.array([[l + j * f + k for k in rubbing] for j in range(problem.chain.nv)])
     residual = residual_of(problem.rows, problem.torque, solved.values)
     whole = collected(problem.rows, solved.weights, residual * solved.weights, 0).squares.sum(axis=0)
     white = white_coordinates(solved)
@@ -83,7 +83,7 @@ def friction_drift(
             of_all = np.array([solved.values[own_places] for own_places in places])
             level = np.sum(np.abs(of_all) * sizes, axis=1)
             sure = float(stats.t.isf(0.5 * CHANCE / change.size / len(fitted), STRETCHES - 1))
-            for k, joint in enumerate(problem.chain.joints):
+            for k, joint in enumerate(problem.chain.leading_joints):
                 if not level[k] > 0 or not variance[k] > 0:
                     continue
                 std, share = float(np.sqrt(variance[k])), float(change[k] / level[k])

@@ -57,8 +57,8 @@ def knowledge_of(
     robot file does not give.
 
     where  name of the log description, for messages
-    share  relative standard deviation of every link's mass, radius of gyration and inertia; None: the value in the
-           table `prior`
+    share  relative standard deviation of every link's mass and inertia, and standard deviation of its centre of mass
+           divided by its radius of gyration; None: the value in the table `prior`
     """
     faults: list[str] = []
     if share is not None and not SHARES[0] <= share <= SHARES[1]:

@@ -232,7 +232,7 @@ def _figures(
     rmse = _rmse(residual_of(part.rows, part.residual, moved), part.used)
     ratio = rmse / np.maximum(part.rmse, 1e-12 + 1e-9 * part.rmse.max())
     k = int(np.argmax(ratio))
-    joint = problem.chain.joints[k]
+    joint = problem.chain.leading_joints[k]
     return {
         "log": part.name,
         "joint": joint.name,

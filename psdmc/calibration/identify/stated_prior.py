@@ -38,7 +38,8 @@ class Confidence:
 def body_confidence(link: Array, share: float) -> Confidence:
     """Return the confidence in a link's standard parameters (11,) from one relative standard deviation, `share`.
 
-    The mass, the radius of gyration and the moments of inertia each have this relative standard deviation.
+    The mass and the inertia about the centre of mass each have this relative standard deviation. The centre of mass has
+    this share of the radius of gyration.
     """
     mass, inertia = max(float(link[0]), np.finfo(float).tiny), _about_centre(link)
     return Confidence(share, share * float(np.sqrt(max(np.trace(inertia), 0.0) / (2.0 * mass))), share)

@@ -25,6 +25,7 @@ pytest.importorskip("fmpy")
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 from fmpy.validation import validate_fmu
 
@@ -32,19 +33,42 @@ TIGHT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
 FORWARD, ALL = ["forward_dynamics_jvp"], ["kinetic_energy", "potential_energy", "forward_kinematics"]
 
 
-def packed(robot: str, folder: Path, functions: list[str]) -> Path:
-    """The FMU of a bundled robot, as `make fmu` packs it."""
-    emit_c(bundled_model(robot), folder / "arm", functions=functions, adapters="fmu", name="arm")
+def packed(robot: str, folder: Path, functions: list[str], adapter: str = "fmu") -> Path:
+    """The FMU of a bundled robot, as `make fmu` or `make fmu2` packs it."""
+    emit_c(bundled_model(robot), folder / "arm", functions=functions, adapters=adapter, name="arm")
     flags = "CFLAGS=-O0 -Wall -Wextra -Wpedantic -Wconversion -Wno-sign-conversion -Werror"
-    make = ["make", "-s", "-C", folder / "arm", "fmu", flags, f"CC={' '.join(find_compiler().command)}"]
+    make = ["make", "-s", "-C", folder / "arm", adapter, flags, f"CC={' '.join(find_compiler().command)}"]
     done = subprocess.run(make, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return folder / "arm" / "build" / "arm.fmu"
+    return folder / "arm" / "build" / f"arm{adapter[3:]}.fmu"
 
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return packed("two_link", tmp_path_factory.mktemp("fmu"), FORWARD)
+
+
+@pytest.fixture(scope="module")
+def fmu2(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return packed("two_link", tmp_path_factory.mktemp("fmu2"), FORWARD, "fmu2")
+
+
+@pytest.fixture
+def model2(fmu2: Path, tmp_path: Path) -> Iterator[FMU2Model]:
+    """The FMU of FMI 2.0, ready for model exchange."""
+    made = FMU2Model(
+        guid=read_model_description(str(fmu2)).guid,
+        unzipDirectory=extract(str(fmu2), str(tmp_path)),
+        modelIdentifier="arm",
+        instanceName="arm",
+    )
+    made.instantiate()
+    made.setupExperiment()
+    made.enterInitializationMode()
+    made.exitInitializationMode()
+    yield made
+    made.terminate()
+    made.freeInstance()
 
 
 @pytest.fixture
@@ -105,9 +129,51 @@ def test_fmpy_finds_no_fault_in_it(fmu: Path) -> None:
     assert [one.description for one in known.modelVariables if one.name == "tau[1]"] == ["joint elbow"]
 
 
+def test_fmpy_finds_no_fault_in_fmi_2(fmu2: Path) -> None:
+    assert validate_fmu(str(fmu2)) == []
+    known = read_model_description(str(fmu2), validate=True)
+    assert (known.fmiVersion, known.numberOfContinuousStates) == ("2.0", 4)
+    states = [one.derivative.name for one in known.modelVariables if one.derivative is not None]
+    assert states == ["q[0]", "q[1]", "qd[0]", "qd[1]"]
+
+
 @pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
-def test_it_moves_as_pinocchio_s_robot_does(fmu: Path, kind: str) -> None:
-    moves_as_pinocchio_s(fmu, kind, "two_link")
+@pytest.mark.parametrize("version", ["fmu", "fmu2"])
+def test_it_moves_as_pinocchio_s_robot_does(version: str, kind: str, request: pytest.FixtureRequest) -> None:
+    moves_as_pinocchio_s(request.getfixturevalue(version), kind, "two_link")
+
+
+def test_fmi_2_has_derivatives_states_and_errors(fmu2: Path, model2: FMU2Model) -> None:
+    rng, known = np.random.default_rng(8), places(fmu2, "q", "qd", "tau")
+    state, seed = rng.uniform(-1.0, 1.0, (2, 6))
+    model2.setReal(known, list(state))
+    q, qd, tau = (part[None] for part in state.reshape(3, 2))
+    oracle = reference(bundled_robot("two_link"))
+    _, by_q, by_qd, by_tau = oracle.forward_dynamics_derivatives(q, qd, tau)
+    expected = np.hstack([by_q[0], by_qd[0], by_tau[0]]) @ seed
+    found = model2.getDirectionalDerivative(places(fmu2, "qdd"), known, list(seed))
+    assert np.abs(np.array(found) - expected).max() < 1e-12 * np.abs(expected).max()
+    qdd, kept = model2.getReal(places(fmu2, "qdd")), model2.getFMUstate()
+    assert np.abs(qdd - oracle.forward_dynamics(q, qd, tau)[0]).max() < 1e-12 * np.abs(qdd).max()
+
+    for wrong in ([float("nan")], [float("inf")]):
+        with pytest.raises(FMICallException, match="status 3"):
+            model2.setReal(places(fmu2, "theta_b")[:1], wrong)
+    model2.setReal(places(fmu2, "q"), [0.0, 1.0])
+    assert model2.getReal(places(fmu2, "qdd")) != qdd
+    model2.setFMUstate(kept)
+    assert model2.getReal(places(fmu2, "qdd")) == qdd
+    model2.freeFMUstate(kept)
+    with pytest.raises(FMICallException, match="status 3"):
+        model2.getInteger([1])
+
+
+@pytest.mark.slow
+def test_fmpy_compiles_the_sources_of_fmi_2(tmp_path: Path) -> None:
+    unzipped = Path(extract(str(packed("two_link", tmp_path, FORWARD, "fmu2")), str(tmp_path / "unzipped")))
+    shutil.rmtree(unzipped / "binaries")
+    build_platform_binary(unzipped)
+    moves_as_pinocchio_s(unzipped, "CoSimulation", "two_link")
 
 
 def moves_as_pinocchio_s(fmu: Path, kind: str, robot: str) -> None:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
-from psdmc.backends.c.adapters import casadi, fmu, wheel
+from psdmc.backends.c.adapters import casadi, fmu, mex, ros2, wheel
 from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
@@ -22,6 +23,9 @@ ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
     casadi.HESSIANS: casadi.files_of(casadi.HESSIANS),
     "wheel": wheel.files,
     "fmu": fmu.files,
+    "fmu2": partial(fmu.files, version=2),
+    "mex": mex.files,
+    "ros2": ros2.files,
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
@@ -30,6 +34,8 @@ NEEDS = {
     casadi.BY_THETA: casadi.needed_by_theta,
     casadi.HESSIANS: casadi.needed,
     "fmu": fmu.needed,
+    "fmu2": fmu.needed,
+    "ros2": ros2.needed,
 }
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 

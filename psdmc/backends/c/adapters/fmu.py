@@ -1,5 +1,5 @@
-"""The adapter that writes an FMU, a model for simulation tools (FMI 3.0, model exchange and co-simulation). The states
-are q and qd, the inputs are torques, and the outputs are accelerations.
+"""The adapter that writes an FMU, a model for simulation tools (FMI 3.0 or 2.0, model exchange and co-simulation). The
+states are q and qd, the inputs are torques, and the outputs are accelerations.
 
 The template declares the data types of the FMI standard itself. So the package contains no file of the standard and
 keeps its licence. All values are in one array of doubles, and the value reference of a variable is an index into this
@@ -9,6 +9,7 @@ array.
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -37,11 +38,22 @@ BASE_UNITS = {
 }
 
 FILES = {
-    "fmu/{}_fmu.c": "fmu.c",
-    "fmu/modelDescription.xml": "modelDescription.xml",
-    "fmu/buildDescription.xml": "buildDescription.xml",
-    "fmu/pack.py": "fmu_pack.py",
+    3: {
+        "fmu/{}_fmu.c": "fmu.c",
+        "fmu/modelDescription.xml": "modelDescription.xml",
+        "fmu/buildDescription.xml": "buildDescription.xml",
+        "fmu/pack.py": "fmu_pack.py",
+    },
+    2: {
+        "fmu2/{}_fmu2.c": "fmu.c",
+        "fmu2/modelDescription.xml": "modelDescription2.xml",
+        "fmu2/pack.py": "fmu_pack.py",
+    },
 }
+"""By version of FMI, the files of an FMU and their templates. FMI 2.0's functions call those of FMI 3.0."""
+
+OF_THE_VARIABLE = ("name", "description", "causality", "variability", "initial")
+"""Attributes that FMI 2.0 has in another element than unit and start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +78,27 @@ class Variable:
     reference: int
     attributes: str
 
+    @property
+    def of_fmi2(self) -> tuple[str, str]:
+        """Return the attributes of FMI 2.0's elements ScalarVariable and Real. A derivative names its state by the place
+        in the list of variables, counted from 1."""
+        pairs = re.findall(r'(\w+)="([^"]*)"', self.attributes)
+        pairs = [(key, str(int(value) + 1) if key == "derivative" else value) for key, value in pairs]
+        scalar, real = (
+            " ".join(f'{key}="{value}"' for key, value in pairs if (key in OF_THE_VARIABLE) is of_it)
+            for of_it in (True, False)
+        )
+        return scalar, real
+
 
 def needed(functions: Sequence[str], wide: bool) -> list[str]:
     """An FMU integrates forward dynamics."""
     return ["forward_dynamics"]
 
 
-def files(package: PackageView) -> dict[str, str]:
-    """Return the text of each file of the FMU's sources, by path. Raises InputError if the package cannot become an
-    FMU."""
+def files(package: PackageView, version: int = 3) -> dict[str, str]:
+    """Return the text of each file of the FMU's sources, by path, for FMI 3.0 or 2.0. Raises InputError if the package
+    cannot become an FMU."""
     info, robot = package.info, package.robot
     kernels = {kernel.name: kernel for kernel in package.kernels}
     values = [parameter.value for parameter in info.parameters]
@@ -85,18 +109,20 @@ def files(package: PackageView) -> dict[str, str]:
     if info.is_wide:
         raise InputError(
             f"{info.name}: an FMU's states are q and qd, and q of this robot has joints with several coordinates",
-            "leave out --with fmu; FMUs of floating bases and ball joints are not supported",
+            "leave out the FMU; FMUs of floating bases and ball joints are not supported",
         )
     if None in values:
         raise InputError(
             f"{info.name}: an FMU needs values of the base parameters, and this model's are unknown",
-            "calibrate the model first, or leave out --with fmu",
+            "calibrate the model first, or leave out the FMU",
         )
     more = [kernels[name] for name in MORE_OUTPUTS if name in kernels]
     blocks = {block.name: block for block in _blocks(package, more)}
     variables = [one for block in blocks.values() for one in _variables(block, package)]
     view = {
         "package": package,
+        "version": version,
+        "folder": "fmu" if version == 3 else "fmu2",
         "blocks": blocks.values(),
         "outputs": [block for block in blocks.values() if 'causality="output"' in block.attributes],
         "derivatives": [blocks["der_q"], blocks["qdd"]],
@@ -107,7 +133,9 @@ def files(package: PackageView) -> dict[str, str]:
         "more": [(kernel.prototypes["single"].symbol, _arguments(kernel)) for kernel in more],
         "direction": DIRECTION in kernels and not more,
     }
-    return {path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES.items()}
+    return {
+        path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES[version].items()
+    }
 
 
 def _blocks(package: PackageView, more: Sequence[KernelView]) -> Iterator[Block]:

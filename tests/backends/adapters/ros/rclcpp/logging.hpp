@@ -1,0 +1,3 @@
+#pragma once
+#include <cstdio>
+#define RCLCPP_ERROR(logger, ...) ((void)(logger), std::printf(__VA_ARGS__), std::printf("\n"))
