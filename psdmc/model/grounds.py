@@ -210,7 +210,7 @@ def _odd_log(values: Values) -> str:
 
 def _logs_disagree(values: Values) -> str:
     return (
-        "the {logs} logs contradict each other: the others predict the torque of {log} at joint {joint} with RMSE "
+        "the {logs} logs contradict each other: the fit of the others predicts {log} at joint {joint} with RMSE "
         "{rmse:.3g} {unit}, its own fit with {own:.3g} {unit} (chi-square {statistic:.4g} per degree of freedom): look for "
         "another load, friction or robot; calibrate each log alone and compare".format(**values)
     )

@@ -65,7 +65,7 @@ class _Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogInformation:
-    """What the logs of one fit say of its l parameters, and how they agree.
+    """Shares of the logs of one fit in the information of its l parameters, and how the logs agree.
 
     logs         names of the I fitted logs
     shares       (I, l) share of each log in the information of each parameter; they add up to one
@@ -122,8 +122,9 @@ def log_information(problem: LinearProblem, solved: Estimate, names: Sequence[st
 
 
 def white_coordinates(solved: Estimate) -> Array:
-    """Return a matrix (l, r) whose columns span the r seen directions of a fit, in which the fit's information is a
-    multiple of the identity."""
+    """Return a matrix (l, r) whose columns span the r seen directions of a fit.
+
+    In these coordinates, the fit's information matrix is a multiple of the identity."""
     return solved.scale[:, None] * np.linalg.pinv(solved.whitening[: solved.rank] * solved.scale)
 
 
