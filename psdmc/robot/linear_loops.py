@@ -65,6 +65,8 @@ def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None],
     Raises InputError if a joint cannot follow.
     """
     columns = tuple(i for i in robot.own_joints if robot.joints[i].type.about_z)
+    if len(robot.loops) > len(columns):
+        return robot  # an error for whoever closes them
     named = {name for names in follows for name in names or ()} | _passive(robot, robot.loops)
     depths = [len(robot.path_to(i)) for i in range(len(robot))]
     order = sorted(
@@ -182,12 +184,12 @@ def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequenc
     count, rng = len(loop.rows), np.random.default_rng(SEED)
     near = np.zeros((1 + STARTS, len(columns)))
     near[1:, mine] = rng.uniform(-NEAR, NEAR, (STARTS, len(mine)))
-    rank = max(len(_eliminated(_slopes(gap, start, count), mine).pivots) for start in near)
+    rank = max(len(_eliminated(_slopes(gap, start, count, mine), mine).pivots) for start in near)
     for k, start in enumerate(near):
         q = _assembled(gap, start, count, mine)
         if q is None:
             continue
-        found = _eliminated(_slopes(gap, q, count), mine)
+        found = _eliminated(_slopes(gap, q, count, mine), mine)
         if len(found.pivots) < rank:
             continue  # a singular position: several ways lead from it
         whole = np.round(found.rows)
@@ -229,10 +231,13 @@ def _gap(apart: Placement, rows: Sequence[int]) -> Array:
     return np.array([*closed, turned])
 
 
-def _slopes(gap: Gap, q: Array, count: int) -> Array:
-    """(count, columns) derivatives of the loop's rows."""
-    steps = STEP * np.eye(len(q))
-    return np.column_stack([(gap(q + step) - gap(q - step))[:count] / (2.0 * STEP) for step in steps])
+def _slopes(gap: Gap, q: Array, count: int, moving: Sequence[int]) -> Array:
+    """(count, columns) derivatives of the loop's rows, which depend on the columns `moving` only."""
+    found = np.zeros((count, len(q)))
+    for k in moving:
+        step = STEP * np.eye(len(q))[k]
+        found[:, k] = (gap(q + step) - gap(q - step))[:count] / (2.0 * STEP)
+    return found
 
 
 def _eliminated(rows: Array, order: Sequence[int], right: Array | None = None) -> Relations:
@@ -263,7 +268,7 @@ def _assembled(gap: Gap, start: Array, count: int, order: Sequence[int]) -> Arra
     for _ in range(STEPS):
         error = gap(q)
         is_closed = np.abs(error).max() < CLOSED
-        found = _eliminated(_slopes(gap, q, count), order, error[:count])
+        found = _eliminated(_slopes(gap, q, count, order), order, error[:count])
         step = found.offsets[: len(found.pivots)]
         q[list(found.pivots)] -= step * min(1.0, 0.5 / max(np.abs(step).max(initial=0.0), 1e-300))
         if is_closed:  # and with this step to the last digits
