@@ -46,6 +46,8 @@ class CompiledRobot(CompiledFunctions):
         """Put a direct call in the place of each method whose kernel this library has."""
         make = direct_calls().make
         for name in compiled.functions if make is not None else ():
+            if name in SIGNATURES and self._interface.gravity_input and SIGNATURES[name].depends_on_gravity:
+                continue
             if name not in SIGNATURES or not is_direct(SIGNATURES[name], self._units):
                 continue
             self.__dict__[name] = make(*self._bound(SIGNATURES[name], compiled))
@@ -90,8 +92,9 @@ def _method(function: Signature) -> Callable[..., Any]:
     def method(self: CompiledRobot, *given: Any, **named: Any) -> Any:
         if not named and len(given) == count:
             return self.call(function, given)
+        gravity = named.pop("gravity", None) if function.depends_on_gravity else None
         inputs, theta_b, out = bound_arguments(function, given, named)
-        return self.call(function, inputs, theta_b, out)
+        return self.call(function, inputs, theta_b, out, gravity)
 
     method.__name__, method.__doc__ = function.name, documentation(function)
     method.__qualname__ = f"{CompiledRobot.__name__}.{function.name}"
