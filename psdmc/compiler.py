@@ -439,7 +439,15 @@ class _Request:
 
     def __reduce__(self) -> tuple[Any, ...]:
         filed = self.model if isinstance(self.model, bytes) else zlib.compress(file_bytes(self.model))
-        others = (self.lowering, self.functions, self.real, self.trig, self.target, *self._law, self.gravity_input)
+        others = (
+            self.lowering,
+            self.functions,
+            self.real,
+            self.trig,
+            self.target,
+            *self._law,
+            self.gravity_input,
+        )
         return _Request, (filed, self.model_hash, self.names, *others)
 
     @property

@@ -89,7 +89,9 @@ def emission(
 def _check_gravity_input(gravity_input: object, estimator: str | None, adapters: Sequence[str]) -> None:
     """InputError where gravity cannot be an input."""
     if not isinstance(gravity_input, bool):
-        raise InputError(f"gravity_input is {gravity_input!r}, expected True or False", "the default is False")
+        raise InputError(
+            f"gravity_input is {gravity_input!r}, expected True or False", "the default is False"
+        )
     wanting = "an estimator" if estimator else f"--with {adapters[0]}" if adapters else None
     if gravity_input and wanting:
         raise InputError(

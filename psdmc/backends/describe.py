@@ -37,7 +37,9 @@ def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
     )
 
 
-_GRAVITY_INPUT = "Functions that depend on gravity read it from the input gravity[3], m/s^2 in this frame, one per state."
+_GRAVITY_INPUT = (
+    "Functions that depend on gravity read it from the input gravity[3], m/s^2 in this frame, one per state."
+)
 
 
 def frame_lines(info: PackageInfo) -> tuple[str, ...]:

@@ -118,11 +118,7 @@ def reference_states(
     expected |= _values(free, robots.get("", robots["_theta"]), given, "", solvable)
     if any(name in BY_ROWS for name in functions):
         thetas = theta_b * (1.0 + np.arange(len(given["q"])) / STEPS)[:, None]
-        own = [
-            made(recipe)
-            for recipe in RECIPES.values()
-            if f"{recipe.name}{THETA_ROWS}" in functions
-        ]
+        own = [made(recipe) for recipe in RECIPES.values() if f"{recipe.name}{THETA_ROWS}" in functions]
         robots_by_rows = [RobotOnArrays.of(model, theta) for theta in thetas]
         added, values = _by_rows(own, robots_by_rows, given, solvable, friction)
         given |= {THETAS.name: thetas, **added}

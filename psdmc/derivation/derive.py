@@ -86,8 +86,8 @@ def derive_model(
             )
         general = under_general_gravity(chain)
         origin = {**(provenance or {}), "gravity_input": True}
-        found = derive_model(general, expand=False, progress=tell, provenance=origin)
-        return replace(found, mechanism=chain)
+        own = derive_model(general, expand=False, progress=tell, provenance=origin)
+        return replace(own, mechanism=chain)
     if expand is None:
         expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)
     if expand and chain.has_followers:

@@ -195,7 +195,12 @@ class _Lowered:
         gravity_input: bool = False,
     ) -> None:
         self.model = for_every_gravity(model) if gravity_input else model
-        self.lowering, self.costs, self.friction, self.gravity_input = lowering, costs, friction, gravity_input
+        self.lowering, self.costs, self.friction, self.gravity_input = (
+            lowering,
+            costs,
+            friction,
+            gravity_input,
+        )
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         self.geometry = Geometry(self.model.mechanism, model.representative, not gravity_input)
         self._searches: dict[bool, Search] = {}

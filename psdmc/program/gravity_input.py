@@ -10,7 +10,11 @@ from psdmc.program.regions import Call, For, Region, Regions
 from psdmc.program.signature import Quantity, Signature
 
 GRAVITY = Quantity(
-    "gravity", ("3",), 9.81, "acceleration of gravity, m/s^2, along the axes of the robot's base frame", "m/s^2"
+    "gravity",
+    ("3",),
+    9.81,
+    "acceleration of gravity, m/s^2, along the axes of the robot's base frame",
+    "m/s^2",
 )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
-from psdmc.program.gravity_input import takes_gravity
+from psdmc.program.gravity_input import GRAVITY, takes_gravity
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.robot.mechanism import ROW_NAMES
@@ -365,7 +365,8 @@ class CompiledFunctions(RobotFacts):
     ) -> Any:
         """The outputs as Dask's or xarray's arrays, as the inputs are."""
         refuse_out(function, out)
-        call = OnArrays(self, function.name, theta_b)
+        gravity = function.inputs.index(GRAVITY) if GRAVITY in function.inputs else None
+        call = OnArrays(self, function.name, theta_b, gravity)
         found = foreign(call, self._axes, function, inputs, kernel.tails, self._dtype)
         return found[0] if len(found) == 1 else results(function)(*found)
 
@@ -433,15 +434,22 @@ class CompiledFunctions(RobotFacts):
 @dataclass(frozen=True, slots=True)
 class OnArrays:
     """A function of a robot, with optional base parameters theta_b, that can be called with arrays. The object can be
-    pickled and sent to other processes."""
+    pickled and sent to other processes.
+
+    gravity  number of the array that is gravity; None: none is
+    """
 
     robot: CompiledFunctions
     function: str
     theta_b: ArrayLike | None
+    gravity: int | None
 
     def __call__(self, *arrays: Any) -> Any:
-        parameters = {} if self.theta_b is None else {"theta_b": self.theta_b}
-        return getattr(self.robot, self.function)(*arrays, **parameters)
+        named = {} if self.theta_b is None else {"theta_b": self.theta_b}
+        if self.gravity is not None:
+            named["gravity"] = arrays[self.gravity]
+            arrays = (*arrays[: self.gravity], *arrays[self.gravity + 1 :])
+        return getattr(self.robot, self.function)(*arrays, **named)
 
 
 def _opened(ffi: cffi.FFI, library: Path, robot: str) -> Any:
