@@ -66,6 +66,7 @@ MENU = {
         "how-to/ros2",
         "how-to/contacts",
         "how-to/loops",
+        "how-to/friction-cones",
         "how-to/whole-body",
         "how-to/reproducible-builds",
     ),

@@ -71,8 +71,8 @@ def loop_lines(info: PackageInfo) -> tuple[str, ...]:
         "",
         f"Closed loops, with their rows along the axes of the first frame. In forces, they begin at entry {first}. They are",
         "always active: active has no entry for them, and error none, as it is computed. Returned numbers of contacts",
-        f"from {info.sizes.contacts} on are theirs. kp and kd apply to them, and so does mu. All functions without contacts",
-        "compute the spanning tree, in which the loops are open.",
+        f"from {info.sizes.contacts} on are theirs, and loops count as contacts there. kp and kd apply to them, and so does",
+        "mu. All functions without contacts or loops compute the spanning tree, in which the loops are open.",
         *numbered,
     )
 

@@ -211,8 +211,9 @@ def package_info(
 def _followers(chain: Mechanism) -> Iterator[str]:
     for joint, coordinate in zip(chain.joints, chain.coordinates, strict=True):
         if coordinate.leader is not None and chain.joints[coordinate.leader] is not joint:
-            leader = chain.joints[coordinate.leader].name
-            yield f"{joint.name} follows {leader}: q = {coordinate.ratio:g} q_{leader} + {coordinate.offset:g}"
+            names = [chain.joints[leader].name for leader, _ in coordinate.shares]
+            terms = (f"{ratio:g} q_{chain.joints[leader].name} + " for leader, ratio in coordinate.shares)
+            yield f"{joint.name} follows {' and '.join(names)}: q = {''.join(terms)}{coordinate.offset:g}"
 
 
 def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:

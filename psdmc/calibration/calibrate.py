@@ -103,20 +103,20 @@ def calibrate(
             "give --loaded LOG and --load MASS,X,Y,Z",
         )
     campaign = campaign_of(paths)
-    plain = None if campaign is None else _exciting_logs(campaign, model.joint_names)
+    plain = None if campaign is None else _exciting_logs(campaign, model.v_names)
     if plain is not None:
         held += validation_logs(paths[0])
         paths, campaign = list(plain), None
     if campaign is not None:
         _require_plain(campaign, options, held, naming, with_load)
-        runs = read_campaign(campaign, model.joint_names)
+        runs = read_campaign(campaign, model.v_names)
         return calibrate_campaign(model, runs, options, regressor, torque_constants, progress)
     naming.require_bag([*paths, *held, *with_load])
     progress("reading logs")
-    found = log_sources(paths, held, model.joint_names, options.linear, options.choice, naming, progress)
+    found = log_sources(paths, held, model.v_names, options.linear, options.choice, naming, progress)
     full = None
     if load is not None:
-        own = log_sources(with_load, [], model.joint_names, options.linear, options.choice, naming, progress)
+        own = log_sources(with_load, [], model.v_names, options.linear, options.choice, naming, progress)
         full = LoadedLogs(own.logs, load)
     options = replace(options, linear=found.linear)
     constants = {**found.constants, **(torque_constants or {})}
@@ -228,7 +228,7 @@ def calibrate_logs(
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
     if loaded is None:
-        motors = motors_of_logs(model.joint_names, logs, torque_constants)
+        motors = motors_of_logs(model.v_names, logs, torque_constants)
     else:
         progress("torque constants")
         motors, by_load = motors_with_load(model, regressor, logs, loaded, linear, torque_constants, progress)

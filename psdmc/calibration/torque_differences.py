@@ -55,11 +55,12 @@ def _range(limits: Limits, turns: bool) -> tuple[float, float]:
 
 def _states(chain: Mechanism) -> tuple[Array, Array, Array]:
     """q, qd, qdd (STATES, n) within the joints' limits: the same for the same robot."""
-    draw = np.random.default_rng(SEED).uniform(-1.0, 1.0, (3, STATES, len(chain)))
-    low, high = np.array([_range(j.limits, j.type.effort_unit == "N m") for j in chain.joints]).T
-    speed = np.array([j.limits.speed if np.isfinite(j.limits.speed) else SPEED for j in chain.joints])
+    draw = np.random.default_rng(SEED).uniform(-1.0, 1.0, (3, STATES, chain.nv))
+    low, high = np.array([_range(j.limits, j.type.effort_unit == "N m") for j in chain.leading_joints]).T
+    speed = np.array([j.limits.speed if np.isfinite(j.limits.speed) else SPEED for j in chain.leading_joints])
     hard = [
-        j.limits.acceleration if np.isfinite(j.limits.acceleration) else ACCELERATION for j in chain.joints
+        j.limits.acceleration if np.isfinite(j.limits.acceleration) else ACCELERATION
+        for j in chain.leading_joints
     ]
     return low + (high - low) * 0.5 * (draw[0] + 1.0), speed * draw[1], np.array(hard) * draw[2]
 
@@ -67,7 +68,7 @@ def _states(chain: Mechanism) -> tuple[Array, Array, Array]:
 def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
     """Return the friction torque (N samples, n joints) without springs. For LuGre friction, whose state is the
     deflection of bristles, return the torque in steady sliding."""
-    names = found.model.joint_names
+    names = found.model.v_names
     if found.prediction.is_linear:
         still = np.zeros_like(q)
         plain_ones = replace(found, extra=np.where(found.columns.of_springs, 0.0, found.extra))
@@ -115,7 +116,7 @@ def joint_differences(a: Side, b: Side, both: bool) -> tuple[JointDifference, ..
             joint.type.effort_unit,
             *(float(x[k]) for x in (rms, largest, typical, gravity, friction, heavier)),
         )
-        for k, joint in enumerate(chain.joints)
+        for k, joint in enumerate(chain.leading_joints)
     )
 
 
@@ -124,10 +125,12 @@ def friction_curves(a: Side, b: Side) -> tuple[Curve, ...]:
     assert a.found is not None
     assert b.found is not None
     chain = a.model.mechanism
-    middle = np.array([0.5 * sum(_range(j.limits, j.type.effort_unit == "N m")) for j in chain.joints])
+    middle = np.array(
+        [0.5 * sum(_range(j.limits, j.type.effort_unit == "N m")) for j in chain.leading_joints]
+    )
     q = np.tile(middle, (CURVE, 1))
     found = []
-    for k, joint in enumerate(chain.joints):
+    for k, joint in enumerate(chain.leading_joints):
         top = joint.limits.speed if np.isfinite(joint.limits.speed) else SPEED
         qd = np.zeros_like(q)
         qd[:, k] = np.linspace(-top, top, CURVE)
@@ -155,7 +158,7 @@ def errors_on_logs(
         )
     logs, constants = opened_logs(known, paths, naming, progress)
     given = torque_constants or constants or known.constants or None
-    names = a.model.joint_names
+    names = a.model.v_names
     motors = motors_of_logs(names, logs, given if one_quantity(logs) == "current" else None)
     measured, errors = [], []
     for side in (a, b):
@@ -172,12 +175,12 @@ def errors_on_logs(
             joint.type.effort_unit,
             *((float(x[0][k]), float(x[1][k])) for x in (r2, rms, largest)),
         )
-        for k, joint in enumerate(a.model.mechanism.joints)
+        for k, joint in enumerate(a.model.mechanism.leading_joints)
     )
 
 
 def _without_friction(known: Delivered, model: DynamicsModel) -> Delivered:
     """A model that was not calibrated, with the filter of one that was."""
     law = Prediction(LINEAR, {"all": known.step.used}, sign_speed=1.0)
-    none = {(joint, name): 0.0 for joint in model.joint_names for term in law.terms for name in term.names}
+    none = {(joint, name): 0.0 for joint in model.v_names for term in law.terms for name in term.names}
     return Delivered(model, law, none, {}, {}, Columns())

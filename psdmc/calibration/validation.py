@@ -221,7 +221,7 @@ def opened_logs(
     A path is a log, a log description, or a campaign folder. Of a campaign, the logs of the validation runs are used, or
     if there are none, those of the exciting motions without a load.
     """
-    names = found.model.joint_names
+    names = found.model.v_names
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]
     campaign = campaign_of(paths)
     if campaign is not None:
@@ -275,13 +275,13 @@ def _validated(
             for log, p in zip(logs, parts, strict=True)
         },
         quality=judged(
-            "All", chain.joint_names, rows.time, rows.measured, rows.predicted, np.zeros(len(rows.time), bool)
+            "All", chain.v_names, rows.time, rows.measured, rows.predicted, np.zeros(len(rows.time), bool)
         ),
     )
     has_changed = test.chance < CHANCE and test.noticed
     why = test.explanation() if has_changed else Explanation(np.zeros(test.size), left=test.chi2)
     explained = qualities(rows.measured, rows.predicted + test.torque(why.values))
-    r2 = dict(zip(chain.joint_names, (q.r2 for q in explained), strict=True))
+    r2 = dict(zip(chain.v_names, (q.r2 for q in explained), strict=True))
     against = [ground for ground in own.against if not _is_harmless(ground, own, r2, why)]
     harmless = [ground for ground in own.against if ground not in against]
     reasons = [
@@ -355,10 +355,10 @@ def _joint_errors(
     found: Delivered, motors: Motors, rows: PredictedRows, refitted: Sequence[float]
 ) -> tuple[JointError, ...]:
     error = rows.measured - rows.predicted
-    given = dict(zip(found.model.joint_names, motors.torque_constant.tolist(), strict=True))
+    given = dict(zip(found.model.v_names, motors.torque_constant.tolist(), strict=True))
     constants = found.constants or (given if np.any(motors.torque_constant != 1.0) else {})
     errors = []
-    for k, joint in enumerate(found.model.mechanism.joints):
+    for k, joint in enumerate(found.model.mechanism.leading_joints):
         own, speed = error[:, k], rows.qd[:, k]
         rms, largest = float(np.sqrt(np.mean(own**2))), float(np.abs(own).max())
         per_ampere = abs(constants.get(joint.name, float("nan")))

@@ -155,10 +155,7 @@ def followed(found: Mechanism, i: int) -> str:
         return f"{coordinate.offset:g}"
     if coordinate.leader == i:
         return "its own"
-    offset = (
-        f" {'-' if coordinate.offset < 0 else '+'} {abs(coordinate.offset):g}" if coordinate.offset else ""
-    )
-    return f"{coordinate.ratio:g} q of {found.joints[coordinate.leader].name}{offset}"
+    return coordinate.in_words(found.joint_names, "q of ")
 
 
 def _numbers(values: Iterable[float]) -> str:

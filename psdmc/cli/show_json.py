@@ -102,6 +102,11 @@ def _joint(robot: Mechanism, i: int, joint: Joint) -> dict[str, Any]:
         None
         if coordinate.leader == i
         else {"joint": leader, "ratio": coordinate.ratio, "offset": coordinate.offset}
+        | (
+            {"others": [{"joint": robot.joints[k].name, "ratio": ratio} for k, ratio in coordinate.others]}
+            if coordinate.others
+            else {}
+        )
     )
     return {
         "name": joint.name,

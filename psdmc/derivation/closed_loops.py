@@ -19,6 +19,7 @@ from psdmc.dynamics.manifold import integrated, restored
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InputError
 from psdmc.model.random_states import states_of
+from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import ROW_NAMES, Loop, Mechanism
 
 Array = NDArray[np.float64]
@@ -39,13 +40,14 @@ DEPENDENT = 1e-7
 """Share of the largest row below which the part of a row that other rows do not explain is nothing."""
 
 
-def require_closable(robot: Mechanism) -> None:
-    """Raise InputError if loops of the robot cannot be assembled, or if rows of them are redundant.
+def require_closable(robot: Mechanism) -> Array:
+    """Return configurations (states, nq) in which all loops are closed.
 
-    Raises InputError also if a loop closes one rotation of several: this holds a rate to zero, but no angle.
+    Raises InputError if loops of the robot cannot be assembled, or if rows of them are redundant. Raises InputError also
+    if a loop closes one rotation of several: this holds a rate to zero, but no angle.
     """
     if not robot.loops:
-        return
+        return np.zeros((0, robot.nq))
     if len(robot.loops) > robot.nv:
         raise InputError(
             f"'{robot.name}': {len(robot.loops)} loops close a robot with {robot.nv} joint rates: some are redundant",
@@ -70,6 +72,84 @@ def require_closable(robot: Mechanism) -> None:
     _refuse_redundant(robot, q, scales)
     for loop in robot.loops:
         _refuse_one_rotation(robot, loop, q)
+    return np.asarray(q)
+
+
+def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
+    """Return the robot with passive joints, whose motion follows from that of the others.
+
+    They have one rate for each row of the loops. If no table [[loop]] names passive joints, psdmc chooses joints of one
+    coordinate. Their columns of the loops' Jacobian are as independent as possible in one of the closed configurations q
+    (states, nq). If there are too few such joints, no joint is passive. Raises InputError if the motion of declared
+    passive joints does not follow from that of the others.
+    """
+    if not robot.loops:
+        return robot
+    unit = length_unit(robot)
+    scales = np.array([1.0 / unit if row < 3 else 1.0 for loop in robot.loops for row in loop.rows])
+    units = [unit if order else 1.0 for kind in _types(robot) for order in kind.v_orders]
+    rows = _jacobian(robot, q) * scales[:, None] * np.array(units)
+    single = [robot.joints[joint].type.nv == 1 for joint in robot.rate_joints]
+    chosen, share = _independent(rows, np.flatnonzero(single))
+    declared = robot.passive_rates
+    if not declared:
+        if share < DEPENDENT:
+            return robot
+        joints = tuple(robot.rate_joints[k] for k in chosen)
+        first, *others = robot.loops
+        names = ", ".join(robot.joints[j].name for j in joints)
+        note = (
+            f"passive joints, chosen: {names}; to choose others, write passive = [...] into a table [[loop]]"
+        )
+        loops = (replace(first, passive=joints), *others)
+        return replace(robot, loops=loops, notes=(*robot.notes, note))
+    names = ", ".join(
+        robot.joints[joint].name for joint in dict.fromkeys(robot.rate_joints[k] for k in declared)
+    )
+    hint = "name others in [[loop]]"
+    if share >= DEPENDENT:
+        listed = ", ".join(f'"{robot.joints[robot.rate_joints[k]].name}"' for k in chosen)
+        hint = f"for example passive = [{listed}]"
+    if len(declared) != len(scales):
+        raise InputError(
+            f"'{robot.name}': passive joints {names} have {len(declared)} rates, expected {len(scales)}: one for each row "
+            "of the loops",
+            hint,
+        )
+    if _independent(rows, np.array(declared))[1] < DEPENDENT:
+        raise InputError(
+            f"'{robot.name}': the motion of passive joints {names} does not follow from that of the other joints",
+            hint,
+        )
+    return robot
+
+
+def _types(robot: Mechanism) -> list[JointType]:
+    return [robot.joints[joint].type for joint in robot.own_joints]
+
+
+def _independent(rows: Array, candidates: NDArray[np.intp]) -> tuple[list[int], float]:
+    """Return as many independent columns of matrices (states, rows, nv) as they have rows, and a measure of independence.
+
+    The measure is the smallest share of a column that those before it do not explain. The columns are those of the state
+    where it is largest. In each state, the column with the largest unexplained rest is next.
+    """
+    best: tuple[list[int], float] = ([], 0.0)
+    if len(candidates) < rows.shape[1]:
+        return best
+    for matrix in rows:
+        rest, chosen, least = matrix[:, candidates].copy(), [], np.inf
+        largest = float(np.sqrt(np.sum(rest * rest, axis=0)).max())
+        for _ in range(len(matrix)):
+            sizes = np.sqrt(np.sum(rest * rest, axis=0))
+            next_one = int(np.argmax(np.round(sizes / largest, 9)))
+            least = min(least, float(sizes[next_one]) / largest)
+            chosen.append(int(candidates[next_one]))
+            basis = rest[:, next_one] / max(float(sizes[next_one]), 1e-300)
+            rest -= basis[:, None] * np.sum(basis[:, None] * rest, axis=0)
+        if least > best[1] * (1.0 + 1e-6):
+            best = sorted(chosen), least
+    return best
 
 
 def _assembled(robot: Mechanism, scales: Array) -> tuple[Array, Array]:

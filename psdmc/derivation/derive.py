@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from psdmc.derivation.certify import judged, measured
-from psdmc.derivation.closed_loops import require_closable
+from psdmc.derivation.closed_loops import require_closable, with_passive_joints
 from psdmc.derivation.expand import (
     EXTENDED,
     FINEST,
@@ -77,21 +77,18 @@ def derive_model(
     tell = progress or silent
     require_derivable(chain)
     _refuse_absurd(chain)
-    require_closable(chain)
     if gravity_input:
         if expand:
             raise InputError(
                 f"'{chain.name}': E and P contain one direction of gravity, and gravity is an input",
                 "leave --expand out",
             )
-        general = under_general_gravity(chain)
         origin = {**(provenance or {}), "gravity_input": True}
-        own = derive_model(general, expand=False, progress=tell, provenance=origin)
-        return replace(own, mechanism=chain)
+        own = derive_model(under_general_gravity(chain), expand=False, progress=tell, provenance=origin)
+        return replace(own, mechanism=replace(own.mechanism, gravity=chain.gravity))
+    chain = with_passive_joints(chain, require_closable(chain))
     if expand is None:
         expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)
-    if expand and chain.has_followers:
-        raise InputError(f"'{chain.name}': E and P are of joints that follow no other", "leave --expand out")
     if expand:
         _refuse_wide(chain)
         refuse_long(0, types_along_ways(chain.types, chain.parents), len(chain))

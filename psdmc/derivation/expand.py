@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.derivation.coupled import coupled
 from psdmc.derivation.extended import extended, has_small_entries, is_of_many_scales
 from psdmc.derivation.inertia import Moving, coefficients, column, expanded, mass_matrix_terms, moving
 from psdmc.derivation.interpolate import linear_sizes
@@ -27,6 +28,7 @@ from psdmc.derivation.rounding import merged
 from psdmc.derivation.terms import Array, Terms, joined, summed, times_matrix
 from psdmc.derivation.units import Scaled, monomial_units, parameter_units, torque_units
 from psdmc.derivation.velocity import acceleration_terms, derivative, velocity_terms
+from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import carried_by, path_to
 from psdmc.dynamics.regressor import Placed, carried, twist_in
@@ -95,6 +97,8 @@ def expand(
     velocity = velocity_terms(mass, monomials, carried, precision.zero)
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, monomials), velocity])
+    if any_follows(scaled.frames):
+        terms, monomials = coupled(terms, scaled.frames, monomials, precision.zero)
     units = parameter_units(types, scaled.unit)[scaled.leads[reduction.pivots]]
     return Expansion.of(*assembled(terms, monomials, units, scaled.unit, precision.noise))
 

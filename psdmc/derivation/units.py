@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import BASE, Frame, frames_of
+from psdmc.dynamics.frames import BASE, Follows, Frame, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
 from psdmc.reproducible import length
@@ -43,7 +43,7 @@ def in_unit(placement: Placement, unit: float) -> Placement:
 def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
     """Return the joint frames with lengths in another unit: translations, and the data of mimic joints.
 
-    These data are the ratio and offset to the leader's position, if either joint slides.
+    These data are ratios and offsets to the leaders' positions, if a joint slides.
 
     unit  m
     """
@@ -52,9 +52,12 @@ def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
         x, y, z = frame.translation
         scaled = replace(frame, translation=(x / unit, y / unit, z / unit))
         if frame.follows is not None:
-            leader, ratio, offset = frame.follows
-            own, others = frame.joint.length_order, frames[leader].joint.length_order
-            scaled = replace(scaled, follows=(leader, ratio * unit ** (others - own), offset / unit**own))
+            own, (shares, offset) = frame.joint.length_order, frame.follows
+            shares = tuple(
+                (leader, ratio * unit ** (frames[leader].joint.length_order - own))
+                for leader, ratio in shares
+            )
+            scaled = replace(scaled, follows=Follows(shares, offset / unit**own))
         found.append(scaled)
     return tuple(found)
 

@@ -22,6 +22,9 @@ from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_produ
 
 Matrix = Sequence[Sequence[Scalar]]
 
+SMALL = 6
+"""Rates of a floating base."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limb:
@@ -119,13 +122,15 @@ class Arrow:
                 found[k] = own[k]
         return found
 
-    def thin(self, matrix: Matrix, owners: Sequence[int] | None = None) -> list[list[Scalar]]:
+    def thin(
+        self, matrix: Matrix, owners: Sequence[int] | None = None, is_solved: bool = False
+    ) -> list[list[Scalar]]:
         """Return two factors of -M^-1 D in one matrix: E in the rows of the core, and Y in those of limbs (such as
         legs).
 
         For a column of E and Y, -M^-1 D is x = -V E in rows of the core, and Y - T x in rows of a limb. The module
         defines V and T. Y is zero in columns of other limbs. Entries of D that belong to two different limbs must be
-        zero.
+        zero. With `is_solved`, the rows of the core are x instead of E, and columns of the core are those of -M^-1 D.
 
         owners  for each column of D, the row of M that belongs to the same joint or contact; None: the row of its number
         """
@@ -136,23 +141,42 @@ class Arrow:
             for k, column in zip(owners or range(len(columns)), columns, strict=True)
         ]
         rows = [list(row) for row in zip(*found, strict=True)]
-        return [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
+        rows = [row if k in self.core else [-value for value in row] for k, row in enumerate(rows)]
+        return self._solved(rows, owners or range(len(columns))) if is_solved else rows
 
-    @property
-    def thin_inverse(self) -> list[list[Scalar]]:
+    def _solved(self, rows: list[list[Scalar]], owners: Sequence[int]) -> list[list[Scalar]]:
+        """Replace E by x = -V E and, in columns of the core, Y by Y - T x."""
+        right = list(zip(*(rows[k] for k in self.core), strict=True))
+        for k, weights in zip(self.core, inverse(self.factors), strict=True):
+            rows[k] = [-inner_product(weights, column) for column in right]
+        own = [column for column, owner in enumerate(owners) if owner in self.core]
+        for limb in self.limbs:
+            for k, shares in zip(limb.rates, limb.shares, strict=True):
+                for column in own:
+                    product = inner_product(shares, [rows[c][column] for c in limb.carriers])
+                    rows[k][column] = rows[k][column] - product
+        return rows
+
+    def thin_inverse(self, is_solved: bool = False) -> list[list[Scalar]]:
         """The factors of M^-1 itself."""
         n = len(self.pivots)
-        return self.thin([[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)])
+        unit = [[-1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
+        return self.thin(unit, is_solved=is_solved)
 
     @property
-    def thin_factors(self) -> list[list[Scalar]]:
+    def has_small_core(self) -> bool:
+        """Whether the core is a floating base alone. Its rows of -M^-1 D are then written out in straight lines (`thin`
+        with `is_solved`). For larger cores, these lines would be longer than the code of limbs."""
+        return self.core == tuple(range(SMALL))
+
+    def thin_factors(self, is_solved: bool = False) -> list[list[Scalar]]:
         """Return two factors of M^-1 in one matrix: V in the rows of the core, and T in those of limbs such as legs.
 
-        Both have the columns of the core, and are defined in the module.
+        Both have the columns of the core, and are defined in the module. With `is_solved`, V is left out.
         """
         n = len(self.pivots)
         found: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
-        for k, row in zip(self.core, inverse(self.factors), strict=True):
+        for k, row in zip(self.core, () if is_solved else inverse(self.factors), strict=not is_solved):
             for j, value in zip(self.core, row, strict=True):
                 found[k][j] = value
         for limb in self.limbs:

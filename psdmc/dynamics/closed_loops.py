@@ -25,6 +25,7 @@ from psdmc.dynamics.scalar import (
     Vector,
     add,
     cross,
+    dot,
     multiply,
     scale,
     transform,
@@ -49,27 +50,50 @@ def loop_error(
     """
     found: list[Scalar] = []
     for loop in loops:
-        part = _part(frames, loop, q, (), root)
-        apart, turn = transform(transpose(part.axes), part.apart), part.turn
-        found += [
-            apart[row] if row < ANGULAR else angle
-            for row, angle in zip(loop.rows, _angles(loop.rows, turn), strict=True)
-        ]
+        part = part_of(frames, loop, q, (), root)
+        values = (*transform(transpose(part.axes), part.apart), *_rotation(loop.rows, part))
+        found += [values[row] for row in loop.rows]
     return found
 
 
-def _angles(rows: Sequence[int], turn: Matrix) -> list[Scalar]:
-    """For each row from 3 on its part of the rotation; zeros for the others."""
-    angular = [row - ANGULAR for row in rows if row >= ANGULAR]
-    if len(angular) == 2:
-        (free,) = {0, 1, 2} - {*angular}
-        axis = tuple(turn[row][free] for row in range(3))
-        unit = tuple(1.0 if row == free else 0.0 for row in range(3))
-        about, share = cross(unit, axis), 2.0 / (1.0 + axis[free])  # type: ignore[arg-type]
-    else:
-        about = tuple(turn[i][j] - turn[j][i] for i, j in ((2, 1), (0, 2), (1, 0)))
-        share = 2.0 / (1.0 + turn[0][0] + turn[1][1] + turn[2][2]) if angular else 0.0
-    return [about[row - ANGULAR] * share if row >= ANGULAR else 0.0 for row in rows]
+def _rotation(rows: Sequence[int], part: Part) -> Vector:
+    """The angular entries of an error; zeros if the loop blocks no rotation."""
+    if rows[-1] < ANGULAR:
+        return ZERO
+    turn, free = part.turn, free_axis(rows)
+    if free is not None:
+        unit, axis = unit_and_axis(turn, free)
+        return scale(cross(unit, axis), 2.0 / (1.0 + axis[free]))
+    about = (turn[2][1] - turn[1][2], turn[0][2] - turn[2][0], turn[1][0] - turn[0][1])
+    return scale(about, 2.0 / (1.0 + turn[0][0] + turn[1][1] + turn[2][2]))
+
+
+def free_axis(rows: Sequence[int]) -> int | None:
+    """Return the axis of the only rotation that a loop leaves free while it blocks two; None for other loops."""
+    free = {0, 1, 2} - {row - ANGULAR for row in rows}
+    return free.pop() if len(free) == 1 else None
+
+
+def unit_and_axis(turn: Matrix, free: int) -> tuple[Vector, Vector]:
+    """Return the axis number `free` of the first frame and of the second frame, along the first one's axes."""
+    unit = [1.0 if row == free else 0.0 for row in range(3)]
+    return (unit[0], unit[1], unit[2]), (turn[0][free], turn[1][free], turn[2][free])
+
+
+def rotation_slope(rows: Sequence[int], part: Part, z: Vector) -> Vector:
+    """Return the derivative of the angular entries of a loop's error as the second frame turns about z.
+
+    With g, half of the error, it is z + z x g + (z . g) g; with two blocked rotations, it follows from the free axis.
+    """
+    if rows[-1] < ANGULAR:
+        return ZERO
+    free, error = free_axis(rows), _rotation(rows, part)
+    half = scale(error, 0.5)
+    if free is None:
+        return add(add(z, cross(z, half)), scale(half, dot(z, half)))
+    unit, axis = unit_and_axis(part.turn, free)
+    moved, share = cross(z, axis), 1.0 / (1.0 + axis[free])
+    return add(scale(cross(unit, moved), 2.0 * share), scale(error, -moved[free] * share))
 
 
 @on_coordinates(columns_summed)
@@ -80,7 +104,7 @@ def loop_jacobian(
     found: list[list[Scalar]] = []
     nv = sum(frame.joint.nv for frame in frames)
     for loop in loops:
-        part = _part(frames, loop, q, (), root)
+        part = part_of(frames, loop, q, (), root)
         rows: list[list[Scalar]] = [[0.0] * nv for _ in range(6)]
         turned = transpose(part.axes)
         for k, (along, about) in part.columns.items():
@@ -105,7 +129,7 @@ def loop_drift(
     """
     found: list[Scalar] = []
     for loop in loops:
-        part = _part(frames, loop, q, qd, root)
+        part = part_of(frames, loop, q, qd, root)
         (linear, angular), (own, turning) = part.accelerations
         w, (u, spin) = part.first_rate, part.velocity
         linear = _less(
@@ -125,7 +149,7 @@ def _less(value: Vector, *others: Vector) -> Vector:
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """The joints of one loop, seen from the last body that carries both frames, as if it did not move.
 
     frames         the joints, whose parents are numbers in this list
@@ -226,9 +250,9 @@ class _Part:
         return found[0], found[1]
 
 
-def _part(
+def part_of(
     frames: Sequence[Frame], loop: Loop, q: Sequence[Scalar], qd: Sequence[Scalar], root: Root
-) -> _Part:
+) -> Part:
     """The joints of a loop alone. `q` and `qd` have the values of all joints."""
     first, second = (path_to(frames, end.joint) for end in (loop.first, loop.second))
     shared = len([1 for a, b in zip(first, second, strict=False) if a == b])
@@ -243,7 +267,7 @@ def _part(
     def flat(values: Sequence[Scalar]) -> list[Scalar]:
         return [x for j in kept for x in (values[j] if isinstance(values[j], tuple) else (values[j],))]
 
-    return _Part(
+    return Part(
         tuple(replace(frames[j], parent=number.get(frames[j].parent, BASE)) for j in kept),
         (
             replace(loop.first, joint=number.get(loop.first.joint, BASE)),

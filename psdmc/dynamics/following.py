@@ -3,7 +3,8 @@
 Algorithms compute with one value per joint. Callers give and get values of the robot's coordinates, without mimic
 joints. A mimic joint's q is ratio q_leader + offset. The power of all joint torques equals the power of the
 coordinates' torques. A mimic joint's torque is therefore multiplied by its ratio and added to its leader's. The same
-holds for columns of Jacobians, for derivatives by q, and for any other quantity with one entry per torque.
+holds for columns of Jacobians, for derivatives by q, and for any other quantity with one entry per torque. A joint of a
+parallelogram can have several leaders, each with its ratio.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ParamSpec, TypeVar
 
-from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.frames import Follows, Frame
 from psdmc.dynamics.scalar import Scalar
 
 P = ParamSpec("P")
@@ -79,8 +80,10 @@ def _on_joints(frames: Sequence[Frame], values: Sequence[Scalar], are_positions:
         if frame.follows is None:
             found += own[i]
             continue
-        leader, ratio, offset = frame.follows
-        value = _times(ratio, own[leader][0])
+        value: Scalar = 0.0
+        for leader, ratio in frame.follows.shares:
+            value = _plus(value, _times(ratio, own[leader][0]))
+        offset = frame.follows.offset
         found.append(value + offset if are_positions and offset else value)
     return found
 
@@ -90,15 +93,16 @@ def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, .
     leader's."""
     found: dict[int, list[Scalar]] = {}
     rest = list(values)
-    followers: list[tuple[tuple[int, Scalar, Scalar], Scalar]] = []
+    followers: list[tuple[Follows, Scalar]] = []
     for i, frame in enumerate(frames):
         own, rest = rest[: frame.joint.nv], rest[frame.joint.nv :]
         if frame.follows is None:
             found[i] = own
         else:
             followers.append((frame.follows, own[0]))
-    for (leader, ratio, _), value in followers:
-        found[leader] = [_plus(found[leader][0], _times(ratio, value))]
+    for follows, value in followers:
+        for leader, ratio in follows.shares:
+            found[leader] = [_plus(found[leader][0], _times(ratio, value))]
     return tuple(x for own in found.values() for x in own)
 
 

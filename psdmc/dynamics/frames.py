@@ -10,7 +10,7 @@ cosine exactly and need no operations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -33,6 +33,21 @@ from psdmc.robot.mechanism import Mechanism, Placement
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+class Follows(NamedTuple):
+    """Position of a joint without its own coordinate: the sum of ratio * q_leader over `shares`, plus the offset.
+
+    shares  leaders, each with its ratio; a mimic joint has one
+    offset  rad or m
+    """
+
+    shares: tuple[tuple[int, Scalar], ...]
+    offset: Scalar
+
+    @property
+    def leaders(self) -> tuple[int, ...]:
+        return tuple(leader for leader, _ in self.shares)
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
@@ -42,8 +57,7 @@ class Frame:
     translation  m, origin of this frame at q = 0 in the parent's frame
     offset       rad, rotation about z at q = 0, without multiples of 90 degrees
     quarters     number of 90-degree rotations in addition to the offset, 0 to 3
-    follows      for a mimic joint: its leader, ratio and offset, with q = ratio q_leader + offset; None: not a mimic
-                 joint
+    follows      for a mimic joint, and for others without their own coordinate: their leaders; None: other joints
     limbs        function that returns the sum of a scalar over equal limbs, such as legs. Only the first frame of a
                  limb that stands for several has it; None for other frames
 
@@ -57,7 +71,7 @@ class Frame:
     translation: Vector
     offset: Scalar = 0.0
     quarters: int = 0
-    follows: tuple[int, Scalar, Scalar] | None = None
+    follows: Follows | None = None
     limbs: Callable[[Scalar], Scalar] | None = None
     is_parallel: bool = field(init=False, compare=False)
     inward_rows: Fixed = field(init=False, compare=False)
@@ -158,7 +172,7 @@ def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, 
         if joint != BASE and joint not in kept:
             kept.add(joint)
             follows = frames[joint].follows
-            left += [frames[joint].parent] if follows is None else [frames[joint].parent, follows[0]]
+            left += [frames[joint].parent, *(() if follows is None else follows.leaders)]
     return tuple(sorted(kept))
 
 
@@ -170,20 +184,21 @@ def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
     number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
     own = (frames[joint] for joint in kept)
     return tuple(
-        replace(f, parent=number[f.parent], follows=f.follows and (number[f.follows[0]], *f.follows[1:]))
-        for f in own
+        replace(f, parent=number[f.parent], follows=f.follows and _renumbered(f.follows, number)) for f in own
     )
 
 
-def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
-    """Return leader, ratio and offset of joint i if it is a mimic joint, whose position follows that of its leader.
+def _renumbered(follows: Follows, number: Mapping[int, int]) -> Follows:
+    return follows._replace(shares=tuple((number[leader], ratio) for leader, ratio in follows.shares))
 
-    The result is None if the joint has its own coordinate.
-    """
+
+def what_follows(chain: Mechanism, i: int) -> Follows | None:
+    """Return the leaders of joint i if it follows other joints, as a mimic joint does. The result is None if the joint
+    has its own coordinate."""
     coordinate = chain.coordinates[i]
     if coordinate.leader is None or coordinate.leader == i:
         return None
-    return coordinate.leader, coordinate.ratio, coordinate.offset
+    return Follows(coordinate.shares, coordinate.offset)
 
 
 def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:

@@ -117,6 +117,12 @@ def _require_exportable(model: DynamicsModel) -> None:
         chain.has_free_root or chain.types[0].about_z
     ):
         require_axes(chain, "a written URDF")
+    if chain.has_sums:
+        sums = [name for name, own in zip(chain.joint_names, chain.coordinates, strict=True) if own.others]
+        raise InputError(
+            f"{shown(chain.name)}: joint {shown(sums[0])} follows several joints, which a URDF cannot contain",
+            "use the robot's own file with its loops",
+        )
     model.known_theta_b()
 
 

@@ -27,7 +27,7 @@ SIGNATURES = {signature.name: signature for signature in in_order([r.signature f
 
 RECIPES = {name: _FOUND[name] for name in SIGNATURES}
 
-OF_TREES = tuple(name for name, recipe in RECIPES.items() if recipe.needs is not Needs.LOOPS)
+OF_TREES = tuple(name for name, recipe in RECIPES.items() if recipe.needs not in (Needs.LOOPS, Needs.PASSIVE))
 """Names of the functions of robots without closed loops."""
 
 BY_ROWS = {f"{each.name}{THETA_ROWS}": by_rows(each) for each in SIGNATURES.values() if each.theta}

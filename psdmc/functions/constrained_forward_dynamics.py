@@ -24,6 +24,7 @@ from psdmc.recipes.contacts import (
     Solved,
     dense_solution,
     held_on_arrays,
+    joined,
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
@@ -133,7 +134,7 @@ def solved(g: Ingredients) -> Solved:
         for own, row, error in zip(drifts, rows, errors, strict=True)
     ]
     load = [given - h for given, h in zip(tau, bias, strict=True)]
-    mask = Held.of(g, g.loops)
+    mask = Held.of(g)
     return *mask.solved(factors, rows, load, wanted), factors, rows
 
 
@@ -149,8 +150,8 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     def wanted(jacobian: Array) -> Array:
         own, errors = contact_drift.RECIPE.reference(robot, given)["drift"], given[ERROR.name]
         if loops:
-            own = _joined(own, loop_drift.RECIPE.reference(robot, given)["drift"])
-            errors = _joined(errors, loop_error.RECIPE.reference(robot, given)["error"])
+            own = joined(own, loop_drift.RECIPE.reference(robot, given)["drift"])
+            errors = joined(errors, loop_error.RECIPE.reference(robot, given)["error"])
         return -_stabilised(given, errors, own, along(jacobian, given["qd"])) - along(jacobian, free)
 
     change, forces, pivots = held_on_arrays(robot, given, wanted, loops)
@@ -162,19 +163,15 @@ def _stabilised(given: Given, errors: Array, own: Array, velocity: Array) -> Arr
     return np.asarray(own + kd * velocity + kp * errors)
 
 
-def _joined(of_contacts: Array, of_loops: Array) -> Array:
-    return np.concatenate([of_contacts, of_loops], axis=1)
-
-
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     q, qd = given["q"], given["qd"]
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     own = contact_drift.RECIPE.pinocchio(robot, given)["drift"]
     errors = given[ERROR.name]
     if robot.loops:
-        jacobian = _joined(jacobian, loop_jacobian.RECIPE.pinocchio(robot, given)["J"])
-        own = _joined(own, loop_drift.RECIPE.pinocchio(robot, given)["drift"])
-        errors = _joined(errors, loop_error.RECIPE.pinocchio(robot, given)["error"])
+        jacobian = joined(jacobian, loop_jacobian.RECIPE.pinocchio(robot, given)["J"])
+        own = joined(own, loop_drift.RECIPE.pinocchio(robot, given)["drift"])
+        errors = joined(errors, loop_error.RECIPE.pinocchio(robot, given)["error"])
     wanted = -_stabilised(given, errors, own, along(jacobian, qd))
     load = given["tau"] - robot.nonlinear_effects(q, qd)
     qdd, forces = dense_solution(robot, given, jacobian, load, wanted)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from psdmc.dynamics.arrow import any_limbs
-from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
+from psdmc.dynamics.constraints import Constraints
+from psdmc.dynamics.contacts import changed, contact_slopes, response
 from psdmc.dynamics.contacts import contact_jacobian as contact_jacobian_of
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
@@ -17,8 +19,11 @@ from psdmc.functions import (
     contact_jacobian,
     forward_dynamics_derivatives,
     frame_acceleration_derivatives,
+    loop_drift,
+    loop_error,
+    loop_jacobian,
 )
-from psdmc.functions.constrained_forward_dynamics import ERROR, FORCES, KD, KP
+from psdmc.functions.constrained_forward_dynamics import ERROR, KD, KP
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, derivative_of
 from psdmc.recipes.contact_derivatives import (
@@ -27,6 +32,7 @@ from psdmc.recipes.contact_derivatives import (
     Counts,
     changed_by_pinocchio,
     changed_on_arrays,
+    constraints_of,
     flat,
     geometry,
     held_inverse,
@@ -37,14 +43,17 @@ from psdmc.recipes.contact_derivatives import (
     thin_blocks,
     thin_outputs,
 )
-from psdmc.recipes.contacts import Held
+from psdmc.recipes.contacts import Held, joined
+from psdmc.recipes.directions import along
 from psdmc.recipes.loops import Block, copied
+from psdmc.recipes.on_arrays import matrix
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques import torque_derivatives
-from psdmc.robot.mechanism import NamedFrame
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 WITHOUT = constrained_forward_dynamics.RECIPE
 FREE = forward_dynamics_derivatives.RECIPE.signature
+FORCES = WITHOUT.signature.outputs[1]
 BLOCKS = tuple(derivative_of(output, by) for output in (QDD, FORCES) for by in (Q, QD, TAU, ERROR))
 NAMES = tuple(block.name for block in BLOCKS)
 
@@ -58,9 +67,11 @@ def trace(g: Ingredients) -> Outputs:
     q, qd = g.inputs["q"], g.inputs["qd"]
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
     slopes = torque_derivatives(g, found.motion)
-    turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
+    of = Constraints(g.frames, g.named, g.loops, g.root)
+    turn = of.pushes(q, found.forces)
     damped = [x + kd * rate for x, rate in zip(found.motion, qd, strict=True)]
-    by_q, by_qd = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
+    by_q, by_qd = of.slopes(q, qd, damped)
+    by_q = of.drawn_closed(by_q, q, kp)
     own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
     loads = (
         [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)],
@@ -71,12 +82,13 @@ def trace(g: Ingredients) -> Outputs:
         [[-(x + kd * y) for x, y in zip(*rows, strict=True)] for rows in zip(by_qd, jacobian, strict=True)],
     )
     motions, forces = zip(*(changed(own, *each) for each in zip(loads, wanted, strict=True)), strict=True)
-    by_error = [[-kp * row[i] for row in own.push] for i in range(len(g.still))]
+    first = of.contact_rows
+    by_error = [[-kp * row[i] for row in own.push[:first]] for i in range(len(g.still))]
     motions = (*motions, own.inverse, by_error)
     forces = (
         *forces,
         [[-x for x in row] for row in own.push],
-        [[-kp * x for x in row] for row in own.compliance],
+        [[-kp * x for x in row[:first]] for row in own.compliance],
     )
     blocks = dict(zip(NAMES, (*motions, *forces), strict=True))
     return {"qdd": found.motion, "forces": found.forces, **blocks, PIVOTS: [*factors.pivots, *signs]}
@@ -119,7 +131,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     }
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
     """Return the function's body as loops and two calls: of forward dynamics with contacts, then of the derivatives of
     forward dynamics, at torques that contain the contact forces. Besides those of `Counts.arrays`, the arrays are:
 
@@ -128,16 +140,18 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     wanted_B    derivatives by B of the prescribed accelerations
     minus_kp    minus kp
     """
-    counts = Counts.of(frames, named)
-    nv, rows = counts.nv, counts.rows
+    of = Constraints(frames, named, loops)
+    counts = Counts.of(of)
+    nv, rows, first_rows = counts.nv, counts.rows, counts.contact_rows
     kept: dict[str, list[tuple[int, ...]]] = {}
 
     def placed(read: Reader) -> dict[str, Column]:
-        jacobian, stored = geometry(frames, named, read, "forces", kept)
+        jacobian, stored = geometry(of, read, "forces", kept)
         q, qd, qdd = read("q", counts.nq), read("qd", nv), read("qdd", nv)
         (kp,), (kd,) = read(KP.name, 1), read(KD.name, 1)
         damped = [x + kd * rate for x, rate in zip(qdd, qd, strict=True)]
-        by_q, by_qd = contact_slopes(frames, named, q, qd, damped)
+        by_q, by_qd = of.slopes(q, qd, damped)
+        by_q = of.drawn_closed(by_q, q, kp)
         held = [
             [-(x + kd * y) for x, y in zip(*pair, strict=True)] for pair in zip(by_qd, jacobian, strict=True)
         ]
@@ -158,7 +172,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     given, found = (tuple((each.name, 0) for each in part) for part in (signature.inputs, signature.outputs))
     push, compliance = Block("push", nv), Block("compliance", rows)
     body = (
-        Call(signature.name, given, found, nv + counts.contacts),
+        Call(signature.name, given, found, nv + counts.constraints),
         first,
         Call(
             FREE.name,
@@ -169,15 +183,14 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         ),
         *pushed_motion(nv, by_tau, by_q, kept["turn"]),
         *responses(
-            frames,
-            named,
+            of,
             by_tau,
             kept,
             (Changes("wanted_q", by_q, forces_q), Changes("wanted_qd", by_qd, forces_qd)),
         ),
-        *held_inverse(frames, named, by_tau, forces_tau),
-        copied(nv, rows, push.turned(), Block(by_error, rows), "minus_kp"),
-        copied(rows, rows, compliance, Block(forces_error, rows), "minus_kp"),
+        *held_inverse(of, by_tau, forces_tau),
+        copied(nv, first_rows, push.turned(), Block(by_error, first_rows), "minus_kp"),
+        copied(rows, first_rows, compliance, Block(forces_error, first_rows), "minus_kp"),
     )
     arrays = {"load": nv, "same": nv, "wanted_q": rows * nv, "wanted_qd": rows * nv, "minus_kp": 1}
     return Regions(counts.arrays | arrays, body, MINUS)
@@ -188,13 +201,62 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     kp, kd = (np.reshape(given[each.name], (-1, 1, 1)) for each in (KP, KD))
     q, qd = given["q"], given["qd"]
     slopes = robot.torque_derivatives(q, qd, found["qdd"])
-    turn, by_q, by_qd = slopes_on_arrays(robot, q, qd, found["qdd"] + kd[..., 0] * qd, found["forces"])
-    jacobian = contact_jacobian.RECIPE.reference(robot, given)["J"]
+    turn, by_q, by_qd = slopes_on_arrays(
+        robot, q, qd, found["qdd"] + kd[..., 0] * qd, found["forces"], kp=kp[:, 0, 0]
+    )
+    jacobian = matrix(constraints_of(robot).jacobian(list(q.T)), len(q))
+    first = sum(robot.chain.rows_of_contacts)
     loads, wanted = (turn - slopes[0], -slopes[1]), (-by_q, -(by_qd + kd * jacobian))
     motions, forces, (fixed, push, compliance) = changed_on_arrays(robot, given, loads, wanted)
-    motions += [fixed, kp * np.swapaxes(push, -1, -2)]
-    forces += [push, -kp * compliance]
+    motions += [fixed, kp * np.swapaxes(push, -1, -2)[..., :first]]
+    forces += [push, -kp * compliance[..., :first]]
     return found | dict(zip(NAMES, (*motions, *forces), strict=True))
+
+
+class LoopSlopes(NamedTuple):
+    """The Jacobian J of loops, the derivatives of J^T f by q, and those of J qdd + dJ/dt qd + kp error."""
+
+    jacobian: Array
+    pushes: Array
+    by_q: Array
+    by_qd: Array
+
+
+def loop_slopes_by_pinocchio(robot: Reference, given: Given, forces: Array, kp: Array | float) -> LoopSlopes:
+    """Return the derivatives for k states from differences of Pinocchio's placements and accelerations.
+
+    Those by q are central differences of sixth order. Drifts are quadratic in qd, so a step of one is exact.
+    """
+
+    def all_at(q: Array) -> Array:
+        there = {**given, "q": q}
+        jacobian = loop_jacobian.RECIPE.pinocchio(robot, there)["J"]
+        pushed = np.einsum("krj,kr->kj", jacobian, forces)
+        moved = along(jacobian, given["qdd"]) + loop_drift.RECIPE.pinocchio(robot, there)["drift"]
+        error = loop_error.RECIPE.pinocchio(robot, there)["error"]
+        return np.concatenate([pushed, moved + kp * error], axis=1)
+
+    q, qd = given["q"], given["qd"]
+    ways = np.eye(qd.shape[1])
+    by_q, by_qd = [], []
+    for way in ways:
+        near = [
+            weight
+            * (all_at(robot.integrated(q, k * STEP * way)) - all_at(robot.integrated(q, -k * STEP * way)))
+            for k, weight in enumerate(WEIGHTS, start=1)
+        ]
+        by_q.append(np.sum(near, axis=0) / STEP)
+        ahead, behind = (
+            loop_drift.RECIPE.pinocchio(robot, {**given, "qd": qd + sign * way})["drift"] for sign in (1, -1)
+        )
+        by_qd.append(0.5 * (ahead - behind))
+    pushes, moved = np.split(np.stack(by_q, axis=-1), [len(ways)], axis=1)
+    jacobian = loop_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    return LoopSlopes(jacobian, pushes, moved, np.stack(by_qd, axis=-1))
+
+
+STEP, WEIGHTS = 3e-3, (3 / 4, -3 / 20, 1 / 60)
+"""Step in rad or m of central differences of sixth order, and the weights of one, two and three steps."""
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
@@ -209,9 +271,16 @@ def pinocchio(robot: Reference, given: Given) -> Arrays:
         for block in frame_acceleration_derivatives.RECIPE.pinocchio(robot, moved).values()
     )
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
+    rows = jacobian.shape[1]
+    if robot.loops:
+        loops = loop_slopes_by_pinocchio(robot, moved, found["forces"][:, rows:], kp[..., 0])
+        turn = turn + loops.pushes
+        jacobian, by_q, by_qd = (
+            joined(*pair) for pair in ((jacobian, loops.jacobian), (by_q, loops.by_q), (by_qd, loops.by_qd))
+        )
     unit = np.broadcast_to(np.eye(qd.shape[1]), slopes[0].shape)
-    one = np.broadcast_to(np.eye(jacobian.shape[1]), (len(q), jacobian.shape[1], jacobian.shape[1]))
-    loads = (turn - slopes[0], -slopes[1], unit, np.zeros_like(np.swapaxes(jacobian, -1, -2)))
+    one = np.broadcast_to(np.eye(jacobian.shape[1], rows), (len(q), jacobian.shape[1], rows))
+    loads = (turn - slopes[0], -slopes[1], unit, np.zeros((len(q), qd.shape[1], rows)))
     wanted = (-by_q, -(by_qd + kd * jacobian), np.zeros_like(jacobian), -kp * one)
     motions, forces = changed_by_pinocchio(robot, given, loads, wanted, jacobian)
     return found | dict(zip(NAMES, (*motions, *forces), strict=True))
@@ -241,4 +310,5 @@ RECIPE = Recipe(
     shares="inverse_dynamics",
     regions=regions,
     in_limbs=True,
+    closes=True,
 )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.contacts import contact_accelerations, contact_jacobian
+from psdmc.dynamics.closed_loops import loop_drift, loop_error
+from psdmc.dynamics.constraints import Constraints
+from psdmc.dynamics.contacts import contact_accelerations
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.functions import constrained_forward_dynamics, constrained_forward_dynamics_derivatives
@@ -16,17 +18,25 @@ from psdmc.recipes.torques import torques
 
 
 def residuals(g: Ingredients, qdd: Sequence[Scalar], forces: Sequence[Scalar]) -> list[Scalar]:
-    """Return the torques of inverse dynamics less tau and J^T forces, and what the contacts' accelerations are too large
-    by, without the part of the forces."""
+    """Return the torques of inverse dynamics less tau and J^T forces, and by how much accelerations are too large.
+
+    The accelerations are those of contacts and loops, without the part of the forces."""
     q, qd, tau = (g.inputs[name] for name in ("q", "qd", "tau"))
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
-    pushed = zip(*contact_jacobian(g.frames, g.named, q, g.root), strict=True)
+    of = Constraints(g.frames, g.named, g.loops, g.root)
+    rows, errors = of.jacobian(q), list(g.inputs[ERROR.name])
+    pushed = zip(*rows, strict=True)
     own = torques(g, qd, qdd, g.base_acceleration)
     damped = [x + kd * rate for x, rate in zip(qdd, qd, strict=True)]
     moved = contact_accelerations(g.frames, g.named, q, qd, damped, g.root)
+    if g.loops:
+        drifts = loop_drift(g.frames, g.loops, q, qd, g.root)
+        held = rows[of.contact_rows :]
+        moved += [own + inner_product(row, damped) for own, row in zip(drifts, held, strict=True)]
+        errors += loop_error(g.frames, g.loops, q, g.root)
     return [
         *(x - given - inner_product(row, forces) for x, given, row in zip(own, tau, pushed, strict=True)),
-        *(x + kp * error for x, error in zip(moved, g.inputs[ERROR.name], strict=True)),
+        *(x + kp * error for x, error in zip(moved, errors, strict=True)),
     ]
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.contacts import contact_jacobian
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import coordinate_rates, restored
@@ -27,7 +28,7 @@ from psdmc.recipes.loops import added, filled
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, stepped
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -57,7 +58,7 @@ def trace(g: Ingredients) -> Outputs:
     return {"q_next": q_next, "qd_next": v_next[:nv], "forces": mean, PIVOTS: pivots}
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
     """Return the function's body: a loop over four stages, each with a call of forward dynamics with contacts. The arrays
     are:
 
@@ -65,12 +66,12 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     rate         their slopes (those of q, qd and the displacements), then the contact forces
     total        weighted sum of the stages' rates
     """
-    counts = Counts.of(frames, named)
-    nq, nv, rows = counts.nq, counts.nv, counts.rows
-    size = nq + nv + 2 * rows
+    counts = Counts.of(Constraints(frames, named, loops))
+    nq, nv, rows, errors = counts.nq, counts.nv, counts.rows, counts.contact_rows
+    size = nq + nv + errors + rows
 
     def begun(read: Reader) -> dict[str, Column]:
-        there = [*read("qd", nv), *read(ERROR.name, rows)]
+        there = [*read("qd", nv), *read(ERROR.name, errors)]
         return {"here": Column(read("q", nq)), "there": Column(there)}
 
     def rated(read: Reader) -> dict[str, Column]:
@@ -81,8 +82,8 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     def reached(rate: str, reach: str | None, read: Reader) -> dict[str, Column]:
         (step,) = read(DT.name, 1)
         share = step * read(reach, 1)[0] if reach else step
-        own = read(rate, nq + nv + rows)
-        there = stepped([*read("qd", nv), *read(ERROR.name, rows)], own[nq:], share)
+        own = read(rate, nq + nv + errors)
+        there = stepped([*read("qd", nv), *read(ERROR.name, errors)], own[nq:], share)
         here = restored(frames, stepped(read("q", nq), own[:nq], share))
         return {"here": Column(here), "there": Column(there)}
 
@@ -94,7 +95,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     places = {"q": ("here", 0), "qd": ("there", 0), ERROR.name: ("there", nv)}
     given = tuple(places.get(each.name, (each.name, 0)) for each in ACCELERATIONS.signature.inputs)
     stage = (
-        Call(ACCELERATIONS.name, given, (("rate", nq), ("rate", size - rows)), nv + counts.contacts),
+        Call(ACCELERATIONS.name, given, (("rate", nq), ("rate", size - rows)), nv + counts.constraints),
         straight(rated),
         added(size, Slice("entry", "total"), Slice("other", "rate"), "weight_k"),
         straight(lambda read: reached("rate", "reach_k", read)),
@@ -111,7 +112,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         straight(lambda read: reached("total", None, read)),
         straight(ended),
     )
-    arrays = {"here": nq, "there": nv + rows, "rate": size, "total": size}
+    arrays = {"here": nq, "there": nv + errors, "rate": size, "total": size}
     return Regions(arrays, body, {"reach": REACH, "weight": WEIGHT})
 
 
@@ -185,4 +186,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    closes=True,
 )

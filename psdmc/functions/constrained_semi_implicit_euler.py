@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
 from psdmc.functions import constrained_forward_dynamics
-from psdmc.functions.constrained_forward_dynamics import FORCES
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, Signature
 from psdmc.recipes.contact_derivatives import Counts
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped, turned
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 ACCELERATIONS = constrained_forward_dynamics.RECIPE
 Q, QD, TAU, *HELD = ACCELERATIONS.signature.inputs
+_, FORCES = ACCELERATIONS.signature.outputs
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -32,10 +33,10 @@ def trace(g: Ingredients) -> Outputs:
     return {"q_next": q_next, "qd_next": rates, "forces": found["forces"], PIVOTS: found[PIVOTS]}
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
     """Return the function's body: a call of forward dynamics with contacts, and the step. The internal arrays have the
     results of the call."""
-    counts = Counts.of(frames, named)
+    counts = Counts.of(Constraints(frames, named, loops))
 
     def moved(read: Reader) -> dict[str, Column]:
         (dt,) = read(DT.name, 1)
@@ -45,7 +46,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         return {name: Column(values) for name, values in found.items()}
 
     given = tuple((each.name, 0) for each in ACCELERATIONS.signature.inputs)
-    call = Call(ACCELERATIONS.name, given, (("qdd", 0), ("pushed", 0)), counts.nv + counts.contacts)
+    call = Call(ACCELERATIONS.name, given, (("qdd", 0), ("pushed", 0)), counts.nv + counts.constraints)
     return Regions({"qdd": counts.nv, "pushed": counts.rows}, (call, straight(moved)))
 
 
@@ -86,4 +87,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    closes=True,
 )

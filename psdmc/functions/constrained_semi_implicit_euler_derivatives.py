@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
 from psdmc.dynamics.tangent_steps import step_slopes
@@ -29,7 +30,7 @@ from psdmc.recipes.steps import (
     step_on_arrays,
     stepped,
 )
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -68,19 +69,19 @@ def trace(g: Ingredients) -> Outputs:
     }
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
     """Return the function's body: a call of the derivatives of forward dynamics with contacts, whose results are internal
     arrays (`of_` and the name of those that are copied to outputs), and loops."""
-    counts = Counts.of(frames, named)
-    nv, rows = counts.nv, counts.rows
-    widths = dict(zip((block.name for block in BLOCKS), 2 * (nv, nv, nv, rows), strict=True))
+    counts = Counts.of(Constraints(frames, named, loops))
+    nv, rows, errors = counts.nv, counts.rows, counts.contact_rows
+    widths = dict(zip((block.name for block in BLOCKS), 2 * (nv, nv, nv, errors), strict=True))
     by = [block.name for block in OF_RATES]
     kept = {FORCES.name: 1} | {block.name: widths[block.name] for block in OF_FORCES}
     results = {"qdd": nv, f"of_{FORCES.name}": rows} | {name: nv * widths[name] for name in by}
     results |= {f"of_{block.name}": rows * widths[block.name] for block in OF_FORCES}
     given = tuple((each.name, 0) for each in ACCELERATIONS.signature.inputs)
-    call = Call(ACCELERATIONS.name, given, tuple((name, 0) for name in results), nv + counts.contacts)
-    arrays, body = state_and_jacobians(frames, by, ((B.name, nv), (B_ERROR.name, rows)))
+    call = Call(ACCELERATIONS.name, given, tuple((name, 0) for name in results), nv + counts.constraints)
+    arrays, body = state_and_jacobians(frames, by, ((B.name, nv), (B_ERROR.name, errors)))
     copies = (
         copied(rows, width, Block(f"of_{name}", width), Block(name, width)) for name, width in kept.items()
     )
@@ -130,4 +131,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    closes=True,
 )

@@ -75,9 +75,9 @@ def _in_limbs(g: Ingredients) -> Outputs:
         "qdd": accelerations,
         "dqdd_dq": thin[0],
         "dqdd_dqd": thin[1],
-        "dqdd_dtau": arrow.thin_inverse,
+        "dqdd_dtau": arrow.thin_inverse(),
         "pivot": arrow.pivots,
-        THIN: arrow.thin_factors,
+        THIN: arrow.thin_factors(),
     }
 
 

@@ -76,7 +76,8 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
     """
     nv = _rates(frames)
     width, size = 3 * nv, nv * nv
-    still = 0 if any(frame.follows and frame.follows[0] == 0 for frame in frames) else frames[0].joint.nv
+    is_followed = any(frame.follows and 0 in frame.follows.leaders for frame in frames)
+    still = 0 if is_followed else frames[0].joint.nv
 
     def weighted_row(read: Reader) -> dict[str, Column]:
         return {"weight": Column([_product(read("row", nv), read("cotangent", nv))])}

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics import contacts
+from psdmc.dynamics import closed_loops, contacts
 from psdmc.dynamics.arrow import Arrow, any_limbs
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
-from psdmc.functions import contact_jacobian
+from psdmc.functions import contact_jacobian, loop_jacobian
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
@@ -26,9 +26,11 @@ from psdmc.recipes.contacts import (
     Solved,
     dense_solution,
     held_on_arrays,
+    joined,
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.robot.mechanism import Array
 
 BEFORE = replace(QD, name="qd_before", means="joint rates before the impact, rad/s or m/s")
 AFTER = replace(QD, name="qd_after", means="joint rates after the impact, rad/s or m/s")
@@ -43,12 +45,17 @@ RESTITUTION = Quantity(
 )
 IMPULSES = Quantity(
     "impulses",
-    ("contact_rows",),
+    ("constraint_rows",),
     means="impulses that the world exerts on the contacts, along the axes of the base frame; zero for contacts "
     "that are not active. A contact point has a linear impulse (N s). A contact surface has a linear and then an "
     "angular impulse (N m s) about the contact's origin",
     unit="J s",
     powers=(-1,),
+)
+
+OF_LOOPS = (
+    "Then come the impulses that keep the closed loops closed: loop_rows entries, along and about the axes of each loop's "
+    "first frame; none without closed loops"
 )
 
 TOUCHING = replace(
@@ -105,6 +112,10 @@ def solved(g: Ingredients) -> Solved:
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
     wanted = [-(1.0 + restitution) * inner_product(row, before) for row in rows]
+    if g.loops:
+        own = closed_loops.loop_jacobian(g.frames, g.loops, q, g.root)
+        wanted += [-inner_product(row, before) for row in own]
+        rows += own
     return *Held.of(g).solved(factors, rows, g.still, wanted), factors, rows
 
 
@@ -114,10 +125,15 @@ def _within(restitution: Any, sign: Any) -> Any:
 
 
 def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
-    change, impulses, pivots = held_on_arrays(
-        robot, given, lambda jacobian: -(1.0 + restitution) * along(jacobian, before)
-    )
+    before, loops = given[BEFORE.name], robot.chain.loops
+    restitution = np.reshape(given[RESTITUTION.name], (-1, 1))
+    rows = sum(robot.chain.rows_of_contacts)
+
+    def wanted(jacobian: Array) -> Array:
+        rebound = 1.0 + restitution * (np.arange(jacobian.shape[1]) < rows)  # loops do not rebound
+        return np.asarray(-rebound * along(jacobian, before))
+
+    change, impulses, pivots = held_on_arrays(robot, given, wanted, loops)
     pivots[:, robot.nv :] = _within(restitution, pivots[:, robot.nv :])
     return {"qd_after": before + change, "impulses": impulses, PIVOTS: pivots}
 
@@ -126,6 +142,9 @@ def pinocchio(robot: Reference, given: Given) -> Arrays:
     before, restitution = given[BEFORE.name], np.reshape(given[RESTITUTION.name], (-1, 1))
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
     wanted = -(1.0 + restitution) * along(jacobian, before)
+    if robot.loops:
+        own = loop_jacobian.RECIPE.pinocchio(robot, given)["J"]
+        jacobian, wanted = joined(jacobian, own), joined(wanted, -along(own, before))
     change, impulses = dense_solution(robot, given, jacobian, np.zeros_like(before), wanted)
     return {"qd_after": before + change, "impulses": impulses}
 
@@ -138,7 +157,7 @@ RECIPE = Recipe(
         "J qd_after + restitution J qd_before + mu impulses = 0 for each active contact, and impulses = 0 for each other "
         "one; active is 0 or 1 for each contact, mu is not negative",
         (Q, BEFORE, ACTIVE, RESTITUTION, MU),
-        (AFTER, IMPULSES),
+        (AFTER, replace(IMPULSES, means=f"first {IMPULSES.means}. {OF_LOOPS}")),
         theta=True,
         summary="Compute qd_after, the joint rates after an impact, and the contact impulses. The impulses stop "
         "the active contacts or reverse their velocity.",
@@ -152,4 +171,5 @@ RECIPE = Recipe(
     shares="inverse_dynamics",
     matters=("fold_double_angle",),
     in_limbs=True,
+    closes=True,
 )

@@ -8,7 +8,8 @@ import numpy as np
 
 from psdmc.dynamics import contacts
 from psdmc.dynamics.arrow import any_limbs
-from psdmc.dynamics.contacts import changed, contact_slopes, pushed_slopes, response
+from psdmc.dynamics.constraints import Constraints
+from psdmc.dynamics.contacts import changed, contact_slopes, response
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
@@ -22,7 +23,8 @@ from psdmc.functions import (
     mass_matrix_inverse,
 )
 from psdmc.functions import inverse_dynamics_derivatives as torque_derivatives
-from psdmc.functions.impulse import AFTER, BEFORE, IMPULSES, RESTITUTION
+from psdmc.functions.constrained_forward_dynamics_derivatives import loop_slopes_by_pinocchio
+from psdmc.functions.impulse import AFTER, BEFORE, RESTITUTION
 from psdmc.program.regions import Call, Column, Reader, Regions, Slice, straight
 from psdmc.program.signature import PIVOTS, Q, Signature, derivative_of
 from psdmc.recipes.contact_derivatives import (
@@ -31,6 +33,7 @@ from psdmc.recipes.contact_derivatives import (
     Counts,
     changed_by_pinocchio,
     changed_on_arrays,
+    constraints_of,
     flat,
     geometry,
     minus,
@@ -40,12 +43,14 @@ from psdmc.recipes.contact_derivatives import (
     thin_blocks,
     thin_outputs,
 )
-from psdmc.recipes.contacts import Held
+from psdmc.recipes.contacts import Held, joined
 from psdmc.recipes.loops import Block, Product, added, filled, one_more
+from psdmc.recipes.on_arrays import matrix
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 WITHOUT = impulse.RECIPE
+IMPULSES = WITHOUT.signature.outputs[1]
 TORQUES, GRAVITY, INVERSE = (
     each.RECIPE.signature for each in (torque_derivatives, gravity_derivatives, mass_matrix_inverse)
 )
@@ -62,18 +67,31 @@ def trace(g: Ingredients) -> Outputs:
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
     (restitution,) = g.inputs[RESTITUTION.name]
     slopes = _torque_derivatives(g, found.motion)
-    turn = pushed_slopes(g.frames, g.named, q, found.forces, g.root)
+    of = Constraints(g.frames, g.named, g.loops, g.root)
+    turn = of.pushes(q, found.forces)
     seen = [x + (1.0 + restitution) * rate for x, rate in zip(found.motion, before, strict=True)]
-    by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
+    closed = [x + rate for x, rate in zip(found.motion, before, strict=True)] if g.loops else None
+    by_q, _ = of.slopes(q, g.still, seen, closed)
     own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
     load = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)]
     rates_q, impulses_q = changed(own, load, [[-x for x in row] for row in by_q])
     nothing = [[0.0] * len(before) for _ in before]
-    rates_v, impulses_v = changed(own, nothing, [[-(1.0 + restitution) * x for x in row] for row in jacobian])
+    rates_v, impulses_v = changed(own, nothing, _reversed(of, jacobian, restitution))
     for i, row in enumerate(rates_v):
         row[i] = row[i] + 1.0
     blocks = dict(zip(NAMES, (rates_q, rates_v, impulses_q, impulses_v), strict=True))
     return {**impulse.trace(g), **blocks}
+
+
+def _reversed(
+    of: Constraints, jacobian: Sequence[Sequence[Scalar]], restitution: Scalar
+) -> list[list[Scalar]]:
+    """Derivatives of the prescribed change of the contacts' velocities by the rates before; loops do not rebound."""
+    first = of.contact_rows
+    return [
+        *([-(1.0 + restitution) * x for x in row] for row in jacobian[:first]),
+        *([-x for x in row] for row in jacobian[first:]),
+    ]
 
 
 def _in_limbs(g: Ingredients) -> Outputs:
@@ -111,7 +129,7 @@ def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
     )
 
 
-def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
+def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
     """Return the function's body as loops and four calls. Besides those of `Counts.arrays`, the arrays are:
 
     change    change of the rates
@@ -119,20 +137,21 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     Minv      inverse of the mass matrix
     wanted_B  derivatives by B of the prescribed change of the contacts' velocities
     """
-    counts = Counts.of(frames, named)
+    of = Constraints(frames, named, loops)
+    counts = Counts.of(of)
     nv, rows = counts.nv, counts.rows
     kept: dict[str, list[tuple[int, ...]]] = {}
 
     def placed(read: Reader) -> dict[str, Column]:
-        jacobian, stored = geometry(frames, named, read, "impulses", kept)
+        jacobian, stored = geometry(of, read, "impulses", kept)
         q, before, after = read("q", counts.nq), read(BEFORE.name, nv), read(AFTER.name, nv)
         (restitution,) = read(RESTITUTION.name, 1)
         seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
-        by_q, _ = contact_slopes(frames, named, q, [0.0] * nv, seen)
+        by_q, _ = of.slopes(q, [0.0] * nv, seen, after)
         more: dict[str, list[Scalar]] = {
             "change": [x - rate for x, rate in zip(after, before, strict=True)],
             "wanted_q": [-x for x in flat(by_q)],
-            "wanted_v": [-(1.0 + restitution) * x for x in flat(jacobian)],
+            "wanted_v": flat(_reversed(of, jacobian, restitution)),
         }
         return stored | {name: Column(values) for name, values in more.items()}
 
@@ -142,7 +161,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
     given, found = (tuple((each.name, 0) for each in part) for part in (signature.inputs, signature.outputs))
     entries = Slice("entry", "turn")
     body = (
-        Call(signature.name, given, found, nv + counts.contacts),
+        Call(signature.name, given, found, nv + counts.constraints),
         first,
         Call(
             TORQUES.name, (("q", 0), ("still", 0), ("change", 0)), (("by_q", 0), ("unused", 0), ("mass", 0))
@@ -154,8 +173,7 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
         Product(Block("Minv", nv), Block("turn", nv), Block(rates_q, nv), nv, nv).loop(range(nv)),
         filled(rates_v, nv * nv),
         *responses(
-            frames,
-            named,
+            of,
             "Minv",
             kept,
             (Changes("wanted_q", rates_q, impulses_q), Changes("wanted_v", rates_v, impulses_v)),
@@ -174,9 +192,12 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     slopes = (
         robot.torque_derivatives(q, still, after - before)[0] - robot.torque_derivatives(q, still, still)[0]
     )
-    turn, by_q, _ = slopes_on_arrays(robot, q, still, after + restitution * before, found["impulses"])
-    jacobian = contact_jacobian.RECIPE.reference(robot, given)["J"]
-    wanted = (-by_q, -(1.0 + restitution[..., None]) * jacobian)
+    turn, by_q, _ = slopes_on_arrays(
+        robot, q, still, after + restitution * before, found["impulses"], of_loops=after
+    )
+    jacobian = matrix(constraints_of(robot).jacobian(list(q.T)), len(q))
+    rebound = restitution * (np.arange(jacobian.shape[1]) < sum(robot.chain.rows_of_contacts))
+    wanted = (-by_q, -(1.0 + rebound[..., None]) * jacobian)
     motions, forces, _ = changed_on_arrays(robot, given, (turn - slopes, np.zeros_like(slopes)), wanted)
     return found | _named(motions, forces)
 
@@ -193,8 +214,14 @@ def pinocchio(robot: Reference, given: Given) -> Arrays:
         for block in frame_velocity_derivatives.RECIPE.pinocchio(robot, seen).values()
     )
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]
-    loads = (turn - slopes, np.zeros_like(slopes))
-    wanted = (-by_q, -(1.0 + restitution[..., None]) * jacobian)
+    by_rates = -(1.0 + restitution[..., None]) * jacobian
+    if robot.loops:
+        held = {"q": q, "qd": still, "qdd": after}
+        loops = loop_slopes_by_pinocchio(robot, held, found["impulses"][:, jacobian.shape[1] :], 0.0)
+        turn = turn + loops.pushes
+        by_q, by_rates = joined(by_q, loops.by_q), joined(by_rates, -loops.jacobian)
+        jacobian = joined(jacobian, loops.jacobian)
+    loads, wanted = (turn - slopes, np.zeros_like(slopes)), (-by_q, by_rates)
     return found | _named(*changed_by_pinocchio(robot, given, loads, wanted, jacobian))
 
 
@@ -228,4 +255,5 @@ RECIPE = Recipe(
     matters=("fold_double_angle",),
     regions=regions,
     in_limbs=True,
+    closes=True,
 )

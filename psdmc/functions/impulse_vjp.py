@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.functions import impulse, impulse_derivatives
@@ -16,15 +16,18 @@ from psdmc.recipes.torques import torques
 
 
 def residuals(g: Ingredients, after: Sequence[Scalar], impulses: Sequence[Scalar]) -> list[Scalar]:
-    """Return M times the change of the rates less J^T impulses, and J (after + restitution before)."""
+    """Return M times the change of the rates less J^T impulses, and J (after + restitution before), in the rows of loops
+    J after."""
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
     (restitution,) = g.inputs[RESTITUTION.name]
-    rows = contact_jacobian(g.frames, g.named, q, g.root)
+    of = Constraints(g.frames, g.named, g.loops, g.root)
+    rows = of.jacobian(q)
     kicked = torques(g, g.still, [x - rate for x, rate in zip(after, before, strict=True)], ZERO)
     seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
     return [
         *(x - inner_product(own, impulses) for x, own in zip(kicked, zip(*rows, strict=True), strict=True)),
-        *(inner_product(row, seen) for row in rows),
+        *(inner_product(row, seen) for row in rows[: of.contact_rows]),
+        *(inner_product(row, after) for row in rows[of.contact_rows :]),
     ]
 
 

@@ -17,7 +17,9 @@ from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Re
 def trace(g: Ingredients) -> Outputs:
     arrow = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     if any_limbs(g.frames):
-        return {"Minv": arrow.thin_inverse, "pivot": arrow.pivots, THIN: arrow.thin_factors}
+        is_solved = arrow.has_small_core
+        factors = arrow.thin_factors(is_solved)
+        return {"Minv": arrow.thin_inverse(is_solved), "pivot": arrow.pivots, THIN: factors}
     return {"Minv": inverse(arrow.factors), "pivot": arrow.pivots}
 
 

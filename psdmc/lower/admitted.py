@@ -20,6 +20,7 @@ REMEDY = {
     Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency; use --unknown for a massless link",
     Needs.STANDARD: "derive the model from a file with the inertias of all links",
     Needs.LOOPS: "declare loops with --loops",
+    Needs.PASSIVE: 'name the joints without motor in tables [[loop]] of --loops, such as passive = ["rod"]',
 }
 
 
@@ -34,7 +35,11 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
         leave = f"without {name}: --functions {others}" if others else ""
         chain, remedy = model.mechanism, REMEDY[need] if need else ""
         if recipe_of(name).lack_of_loops(chain):
-            remedy = remedy if need is Needs.LOOPS else "derive the model without loops for the open tree"
+            remedy = (
+                remedy
+                if need in (Needs.LOOPS, Needs.PASSIVE)
+                else "derive the model without loops for the open tree"
+            )
         if need is Needs.POSITIVE_MASS and chain.massless and idle_joints(chain):
             remedy = f"add <inertial>, or derive again with {unknown_option(chain)}"
         raise InputError(

@@ -18,7 +18,7 @@ import numpy as np
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.frames import Follows, Frame
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.errors import InputError
 from psdmc.lower.factored import RobotConstants, stored_entries
@@ -111,11 +111,11 @@ class _Measured:
     def frame(self, frame: Frame) -> Frame:
         follows = frame.follows
         if follows is not None:
-            leader, ratio, offset = follows
-            own, other = (Dimension(0, f.joint.length_order) for f in (frame, self.reframed.frames[leader]))
-            if own != other:
-                ratio = self.value(times(own, other, -1))
-            follows = (leader, ratio, offset and self.value(own))
+            own, shares = Dimension(0, frame.joint.length_order), []
+            for leader, ratio in follows.shares:
+                other = Dimension(0, self.reframed.frames[leader].joint.length_order)
+                shares.append((leader, ratio if own == other else self.value(times(own, other, -1))))
+            follows = Follows(tuple(shares), follows.offset and self.value(own))
         return replace(frame, translation=self.vector(frame.translation, LENGTH), follows=follows)
 
     def bodies(self, of: Callable[[Dimension], Scalar]) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:

@@ -264,7 +264,8 @@ class _Lowered:
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
         if recipe.regions and self.model.nv > recipe.straight:
             unmoved = self.geometry.unmoved
-            regions = recipe.regions(unmoved.frames, unmoved.named)
+            of_loops = {"loops": unmoved.loops} if recipe.closes else {}
+            regions = recipe.regions(unmoved.frames, unmoved.named, **of_loops)
             program = NOTHING
             if self.model.nv <= TRACED:
                 arranged = self._arrangement(self._known(recipe.shares or recipe.name), theta)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.frames import BASE, Frame
+from psdmc.dynamics.frames import BASE, Follows, Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.program.lanes import lanes
 from psdmc.robot.limbs import Limbs, limb_groups
@@ -43,16 +43,16 @@ def possible_groups(frames: Sequence[Frame]) -> tuple[tuple[Limbs, ...], ...]:
 def _follow_alike(frames: Sequence[Frame], limbs: Limbs) -> bool:
     """Whether joints of these limbs are followed from within their limb alone, and follow there what is at one place."""
     place = {joint: (number, k) for number, limb in enumerate(limbs) for k, joint in enumerate(limb)}
-    alike: dict[int, set[int]] = {}
+    alike: dict[int, set[tuple[int, ...]]] = {}
     for joint, frame in enumerate(frames):
         if frame.follows is None:
             continue
-        own, leader = place.get(joint), place.get(frame.follows[0])
-        if own is None and leader is None:
+        own, led_by = place.get(joint), [place.get(leader) for leader in frame.follows.leaders]
+        if own is None and not any(led_by):
             continue
-        if own is None or leader is None or own[0] != leader[0]:
+        if own is None or any(leader is None or leader[0] != own[0] for leader in led_by):
             return False
-        alike.setdefault(own[1], set()).add(leader[1])
+        alike.setdefault(own[1], set()).add(tuple(leader[1] for leader in led_by if leader is not None))
     return all(len(leaders) == 1 for leaders in alike.values())
 
 
@@ -172,15 +172,16 @@ def one_limb(frames: Sequence[Frame], among: Sequence[Place]) -> tuple[Frame, ..
     )
 
 
-def _followed(
-    frames: Sequence[Frame], place: Place, new: Mapping[int, int]
-) -> tuple[int, Scalar, Scalar] | None:
-    """Return the place that the joint of a place follows, with a constant per limb if ratios or offsets differ."""
+def _followed(frames: Sequence[Frame], place: Place, new: Mapping[int, int]) -> Follows | None:
+    """Return the places that the joint of a place follows, with a constant per limb if ratios or offsets differ."""
     follows = [frame.follows for frame in frames if frame.follows is not None]
     if not follows:
         return None
-    leaders, ratios, offsets = zip(*follows, strict=True)
-    return new[leaders[0]], place.constant(ratios), place.constant(offsets)
+    shares = tuple(
+        (new[own[0][0]], place.constant([ratio for _, ratio in own]))
+        for own in zip(*(each.shares for each in follows), strict=True)
+    )
+    return Follows(shares, place.constant([each.offset for each in follows]))
 
 
 def _merged(frames: Sequence[Frame], group: int | None) -> Frame:

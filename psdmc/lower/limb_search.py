@@ -39,7 +39,7 @@ from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged
 from psdmc.program.passes.free_registers import free_registers
-from psdmc.program.pipeline import ordered, shortened
+from psdmc.program.pipeline import ordered, ordered_for_limbs, shortened
 from psdmc.program.program import Program
 from psdmc.program.thin_products import AT_ONCE
 from psdmc.recipes.recipe import Recipe
@@ -238,13 +238,17 @@ class LimbSearch:
     def _ordered(self, traced: TracedLimbs) -> LimbProgram:
         short = shortened(traced.program, self.search.has_many_joints)
         stages = staged(short, traced.groups)
-        in_order = (free_registers(ordered(stage.program, self.costs)[0]) for stage in stages)
         return LimbProgram(
             traced.groups,
-            tuple(Stage(s.group, program) for s, program in zip(stages, in_order, strict=True)),
+            tuple(Stage(stage.group, self._in_order(stage)) for stage in stages),
             products=traced.products,
             checked=has_contacts(self.recipe.signature),
         )
+
+    def _in_order(self, stage: Stage) -> Program:
+        if stage.group is None:
+            return free_registers(ordered(stage.program, self.costs)[0])
+        return free_registers(ordered_for_limbs(stage.program, self.costs))
 
     def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:
         """Choose articulated bodies if limbs hang on a body. Elimination in a mass matrix has not been compared (0154)."""

@@ -339,16 +339,18 @@ class _Trace:
         if any(each.below for each in self.signature.thin):
             shares += self._shares(found, self._along("contact_rows"), core, len(rates))
         is_free, rows = has_free_root(self.reframed.frames), tuple(rates[k][1][0] for k in core)
+        is_solved = found[Slot(THIN, core[0] * len(rates) + core[0])] == 0.0
         columns = {each.name: each.axes[1] for each in self.signature.outputs if len(each.axes) > 1}
         for axis in dict.fromkeys(columns[each.name] for each in self.signature.thin):
             thin = [each for each in self.signature.thin if columns[each.name] == axis]
             yield ThinProducts(
                 tuple(each.name for each in thin),
-                tuple(each.known if is_free else 0 for each in thin),
+                tuple(len(core) if is_solved else each.known if is_free else 0 for each in thin),
                 self.first[axis][-1],
                 rows,
                 tuple(shares),
                 tuple(each.below for each in thin if each.below),
+                is_solved,
             )
 
     def _shares(

@@ -87,7 +87,10 @@ def _tree_to_json(chain: Mechanism) -> dict[str, Any]:
     """What each joint hangs on and follows, and where the tip is."""
     if is_plain_chain(chain):
         return {}
-    followed = [[c.leader, c.ratio, c.offset] for c in chain.coordinates]
+    followed = [
+        [c.leader, c.ratio, c.offset, *(value for other in c.others for value in other)]
+        for c in chain.coordinates
+    ]
     return {"parents": list(chain.parents), "tip_body": chain.tip_body, "coordinates": followed}
 
 
@@ -107,14 +110,18 @@ def _tree_from_json(data: object, n: int) -> dict[str, Any]:
 
 
 def _coordinate_from_json(data: object, n: int) -> Coordinate:
-    values = entries(data, "a coordinate", 3)
-    if len(values) != 3:
+    values = entries(data, "a coordinate", 1 + 2 * n)
+    if len(values) < 3 or len(values) % 2 == 0:
         raise ValueError(f"a coordinate has {len(values)} values, expected leader, ratio and offset")
-    leader, ratio, offset = values
+    leader, ratio, offset, *others = values
     return Coordinate(
         None if leader is None else whole(leader, "a coordinate's leader", 0, n - 1),
         number(ratio, "a coordinate's ratio"),
         number(offset, "a coordinate's offset"),
+        tuple(
+            (whole(leader, "a coordinate's leader", 0, n - 1), number(ratio, "a coordinate's ratio"))
+            for leader, ratio in zip(others[::2], others[1::2], strict=True)
+        ),
     )
 
 
@@ -139,17 +146,20 @@ def _frame_to_json(frame: NamedFrame) -> dict[str, Any]:
 
 def _loop_to_json(loop: Loop) -> dict[str, Any]:
     ends = {"first": _frame_to_json(loop.first), "second": _frame_to_json(loop.second)}
-    return {"name": loop.name, **ends, "rows": list(loop.rows)}
+    passive = {"passive": list(loop.passive)} if loop.passive else {}
+    return {"name": loop.name, **ends, "rows": list(loop.rows), **passive}
 
 
 def _loop_from_json(data: object, joints: int) -> Loop:
     first, second = (_frame_from_json(part(data, end, "a loop"), joints, BASE) for end in ("first", "second"))
     rows = entries(part(data, "rows", "a loop"), "a loop's rows", len(ROW_NAMES))
+    passive = entries(data.get("passive", []), "passive joints", joints) if isinstance(data, dict) else ()
     return Loop(
         text(part(data, "name", "a loop"), "a loop's name"),
         first,
         second,
         tuple(whole(row, "a loop's row", 0, len(ROW_NAMES) - 1) for row in rows),
+        tuple(whole(joint, "a passive joint", 0, joints - 1) for joint in passive),
     )
 
 

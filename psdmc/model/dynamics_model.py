@@ -83,10 +83,10 @@ class DynamicsModel(Answers):
         object.__setattr__(self, "certificate", frozen_array(self.certificate, (self.nv,), "certificate"))
         if self.theta_b is not None:
             object.__setattr__(self, "theta_b", frozen_array(self.theta_b, (l,), "theta_b"))
-        if self.expansion is not None and (self.expansion.n, self.expansion.l) != (n, l):
+        if self.expansion is not None and (self.expansion.n, self.expansion.l) != (self.nv, l):
             raise ValueError(
                 f"E and P are for {self.expansion.n} joints and {self.expansion.l} base parameters, "
-                f"expected {n} and {l}"
+                f"expected {self.nv} and {l}"
             )
 
     def __repr__(self) -> str:
@@ -176,7 +176,7 @@ class DynamicsModel(Answers):
         """Return the matrix E of exponents: each column describes one of the p monomials in the robot's torques.
 
         A monomial is a product of powers of q, sin q, cos q, qd and qdd. E has the shape (5n, p) and the type uint8: n rows
-        of exponents of q (one row per joint), then n rows of sin q, and so on. E is None if the model was derived with
+        of exponents of q, one per entry of q, then n rows of sin q, and so on. E is None if the model was derived with
         `expand=False`.
         """
         return None if self.expansion is None else self.expansion.E

@@ -50,17 +50,15 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
     is wrong, what was found and what was expected."""
     _check_kinds(arrays)
     chain = chain_from_json(json.part(manifest, "chain", "the manifest"))
-    n, l = len(chain), arrays["B"].shape[0]
+    l = arrays["B"].shape[0]
     is_expanded = json.flag(json.part(manifest, "expanded", "the manifest"), "'expanded'")
     is_known = json.flag(json.part(manifest, "theta_b_known", "the manifest"), "'theta_b_known'")
     certificate = json.part(manifest, "certificate", "the manifest")
     _check_base_parameters(arrays, chain, l, is_known)
     if is_expanded and not all(kind.about_z for kind in chain.types):
         raise ValueError("E and P are of joints of one coordinate, and a joint has several")
-    if is_expanded and chain.has_followers:
-        raise ValueError("E and P are of joints that follow no other, and a joint does")
     return DynamicsModel(
-        expansion=_expansion(arrays, n, l) if is_expanded else None,
+        expansion=_expansion(arrays, chain.nv, l) if is_expanded else None,
         theta_b=arrays["theta_b"] if is_known else None,
         B=arrays["B"],
         mechanism=chain,

@@ -19,7 +19,6 @@ from psdmc.dynamics.slices import positions
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
-from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism
 
 POSES = 2000
@@ -156,8 +155,8 @@ def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
                 result[i][k] += masses[body] if along else turned
             far += steps[i]
     for i, coordinate in enumerate(mechanism.coordinates):
-        if coordinate.leader is not None and coordinate.leader != i:
-            result[coordinate.leader][0] += coordinate.ratio**2 * result[i][0]
+        for leader, ratio in coordinate.shares if coordinate.leader != i else ():
+            result[leader][0] += ratio**2 * result[i][0]
     return np.array([own for i in mechanism.own_joints for own in result[i]])
 
 
@@ -165,14 +164,11 @@ def _travels(mechanism: Mechanism, travel: Array) -> list[Any]:
     """Of each joint how far its own coordinates go; a follower's is that of its leader by its ratio, and its offset."""
     own = dict(zip(mechanism.own_joints, positions(frames_of(mechanism), travel.tolist()), strict=True))
     return [
-        own[i] if i in own else abs(other.ratio) * own.get(_leader(other, i), 0.0) + abs(other.offset)
+        own[i]
+        if i in own
+        else sum(abs(ratio) * own[leader] for leader, ratio in other.shares) + abs(other.offset)
         for i, other in enumerate(mechanism.coordinates)
     ]
-
-
-def _leader(coordinate: Coordinate, held: int) -> int:
-    """The joint that a coordinate is of; `held`, which has none of its own, where it is a constant."""
-    return held if coordinate.leader is None else coordinate.leader
 
 
 def _way(joint: Joint, travel: Any) -> float:

@@ -118,7 +118,7 @@ def _manifest(model: Model) -> dict[str, Any]:
     schema = schema if calibrated is None else CALIBRATED_SCHEMA
     return {
         "format": FORMAT,
-        "schema": SCHEMA if model.mechanism.loops else schema,
+        "schema": SCHEMA if model.mechanism.loops or model.mechanism.has_sums else schema,
         "psdmc": psdmc_version(),
         "expanded": model.expansion is not None,
         "theta_b_known": model.theta_b is not None,

@@ -100,7 +100,7 @@ def term_texts(model: DynamicsModel) -> Iterator[str]:
     s2 is sin q2 and c2 is cos q2; g is the strength of gravity.
     """
     exponents = model.expanded().E
-    n, rows = model.n, RowBlocks.of(model.n)
+    n, rows = model.nv, RowBlocks.of(model.nv)
     names = [f"{symbol}{j + 1}" for symbol in ("q", "s", "c", "qd", "qdd") for j in range(n)]
     order = np.concatenate([np.arange(len(names))[each] for each in (rows.qdd, rows.qd, rows.position)])
     for column in exponents.T:

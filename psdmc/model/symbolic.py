@@ -40,7 +40,7 @@ def torque_expression(
     used, place = np.unique(entries.row[own], return_inverse=True)
     if len(used) > MOST_MONOMIALS:
         raise InputError(
-            f"the torque of joint {shown(robot.joints[number].name)} has {len(used)} monomials, "
+            f"the torque of joint {shown(robot.v_names[number])} has {len(used)} monomials, "
             f"expressions are made of up to {MOST_MONOMIALS}",
             "lock joints or cut the chain; model.E, model.P and psdmc show --terms have all of them",
         )
@@ -48,7 +48,7 @@ def torque_expression(
     weights: list[list[Any]] = [[] for _ in used]
     for k, entry in zip(place.tolist(), own.tolist(), strict=True):
         weights[k].append(_number(sp, float(entries.value[entry])) * thetas[entries.column[entry]])
-    factors = _factors(sp, len(robot))
+    factors = _factors(sp, robot.nv)
     strength = _number(sp, length(np.asarray(robot.gravity)))
     terms = (
         sp.Add(*weight) * _monomial(sp, expansion, int(column), factors, strength)
@@ -59,11 +59,11 @@ def torque_expression(
 
 
 def _joint_number(robot: Mechanism, joint: int | str) -> int:
-    numbers = {name: i for i, name in enumerate(robot.joint_names)} | {i: i for i in range(len(robot))}
+    numbers = {name: i for i, name in enumerate(robot.v_names)} | {i: i for i in range(robot.nv)}
     if joint not in numbers:
         raise InputError(
             f"no joint {shown(joint)}",
-            f"the joints are 0 to {len(robot) - 1}: {', '.join(robot.joint_names)}",
+            f"the joints are 0 to {robot.nv - 1}: {', '.join(robot.v_names)}",
         )
     return numbers[joint]
 

@@ -26,8 +26,9 @@ def takes_gravity(function: Signature) -> Signature:
     return replace(function, inputs=(*function.inputs, GRAVITY))
 
 
-def pass_gravity_on(body: Regions, functions: Collection[str]) -> Regions:
-    """Return the function body with gravity as a further argument of its calls of these functions."""
+def pass_gravity_on(body: Regions, functions: Collection[str], is_input: bool) -> Regions:
+    """Return the function body with gravity as a further argument of its calls of these functions. If gravity is no
+    input of the calling function, it is zero."""
 
     def passed(region: Region) -> Region:
         if isinstance(region, For):
@@ -36,4 +37,5 @@ def pass_gravity_on(body: Regions, functions: Collection[str]) -> Regions:
             return replace(region, given=(*region.given, (GRAVITY.name, 0)))
         return region
 
-    return replace(body, regions=tuple(map(passed, body.regions)))
+    zero = {} if is_input or not functions else {GRAVITY.name: (0.0, 0.0, 0.0)}
+    return replace(body, regions=tuple(map(passed, body.regions)), constants={**body.constants, **zero})

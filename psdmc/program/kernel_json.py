@@ -151,7 +151,7 @@ def _products_from_plain(plain: Mapping[str, Any]) -> ThinProducts:
         for each in plain["groups"]
     )
     outputs, known, core, below = (tuple(plain[name]) for name in ("outputs", "known", "core", "below"))
-    return ThinProducts(outputs, known, plain["n"], core, groups, below)
+    return ThinProducts(outputs, known, plain["n"], core, groups, below, plain["is_solved"])
 
 
 def _spread(plain: Any) -> tuple[Spread, ...]:

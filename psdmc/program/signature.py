@@ -273,7 +273,7 @@ class Signature:
         positive. Pivots are numbered from 0 over all matrices."""
         lengths = [" ".join(matrix.axes) for matrix in self.factorises]
         later = f", + ({' + '.join(lengths)}) times the stage of the step" if self.stages > 1 else ""
-        later = later.replace("constraints", "contacts")  # no such function has closed loops
+        later = later.replace("constraints", "contacts")  # closed loops count as contacts there
         return tuple(
             "".join(f"{length} + " for length in lengths[:k]) + matrix.number + later
             for k, matrix in enumerate(self.factorises)

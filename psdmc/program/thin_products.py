@@ -60,6 +60,10 @@ class Shares:
         """Entries of T."""
         return len(self.rows) * len(self.carriers)
 
+    def entry(self, number: int, carrier: int) -> Slot:
+        """Return the place in memory of the entry of T in the row `rows[number]` and the column `carriers[carrier]`."""
+        return Slot(self.vector, number * len(self.carriers) + carrier)
+
 
 @dataclass(frozen=True, slots=True)
 class ThinProducts:
@@ -68,14 +72,16 @@ class ThinProducts:
 
     The rows x of the core (the other joints) are x = -V E. The rows of a limb are Y - T x. Here V is the core's block
     of the inverse mass matrix, E the right side, T the factor of the limb. The code for limbs computes V, T and E, and
-    stores Y in the outputs first.
+    stores Y in the outputs first. If a floating base is the whole core, the code for limbs stores x there instead of
+    computing V and E.
 
-    outputs  names of the outputs
-    known    for each output, the number of first columns that are stored without the products
-    n        number of columns
-    core     rows of the core
-    groups   the factor T of each group of limbs, for rows of the outputs or of those below
-    below    for each output, the name of an output with the rows of contacts on limbs; () if there are none
+    outputs    names of the outputs
+    known      for each output, the number of first columns that are stored without the products
+    n          number of columns
+    core       rows of the core
+    groups     the factor T of each group of limbs, for rows of the outputs or of those below
+    below      for each output, the name of an output with the rows of contacts on limbs; () if there are none
+    is_solved  whether the code for limbs stores x
     """
 
     outputs: tuple[str, ...]
@@ -84,6 +90,7 @@ class ThinProducts:
     core: tuple[int, ...]
     groups: tuple[Shares, ...]
     below: tuple[str, ...] = ()
+    is_solved: bool = False
 
     @staticmethod
     def right(output: str) -> str:
@@ -94,8 +101,10 @@ class ThinProducts:
     def sizes(self) -> dict[str, int]:
         """Return the vectors of the factors V, T and E: name -> length."""
         wide = len(self.core)
-        found = {INVERSE: wide**2} | {group.vector: group.size for group in self.groups}
-        return found | {self.right(output): wide * self.n for output in self.outputs}
+        found = {group.vector: group.size for group in self.groups}
+        if self.is_solved:
+            return found
+        return {INVERSE: wide**2} | found | {self.right(output): wide * self.n for output in self.outputs}
 
     @property
     def narrowest(self) -> int:
@@ -108,6 +117,8 @@ class ThinProducts:
         products compute, and entries of E that the products do not read."""
         wide, n = len(self.core), self.n
         found: set[Slot] = set()
+        if self.is_solved:
+            return found
         for output, known in zip(self.outputs, self.known, strict=True):
             found |= {Slot(output, row * n + k) for row in self.core for k in range(known, n)}
             found |= {Slot(self.right(output), row * n + k) for row in range(wide) for k in range(known)}
@@ -118,13 +129,14 @@ class ThinProducts:
         """Return the cost of the products. C code computes AT_ONCE columns together, and one operation on them counts
         once. Each entry of V and T costs a multiply-add, the first of each row of V a multiplication."""
         blocks = sum(-(-(self.n - known) // AT_ONCE) for known in self.known)
-        mul = blocks * (len(self.core) ** 2 + sum(group.size for group in self.groups))
-        add = mul - blocks * len(self.core)
+        wide = 0 if self.is_solved else len(self.core)
+        mul = blocks * (wide**2 + sum(group.size for group in self.groups))
+        add = mul - blocks * wide
         return Cost(mul, add, div=0, neg=0, sincos=0, fused=add)
 
     def place(self, slot: Slot) -> Slot:
         """Return the place (slot) in memory of an entry that the recorded arithmetic computes."""
-        if slot.vector not in self.outputs:
+        if self.is_solved or slot.vector not in self.outputs:
             return slot
         row, column = divmod(slot.index, self.n)
         if row in self.core and column >= self.known[self.outputs.index(slot.vector)]:
@@ -139,7 +151,7 @@ class ThinProducts:
             return Slot(INVERSE, self.core.index(row) * len(self.core) + number)
         own = row - rows if row >= rows else row
         group = next(each for each in self.groups if own in each.rows and each.is_below == (row >= rows))
-        return Slot(group.vector, group.rows.index(own) * len(group.carriers) + group.carriers.index(number))
+        return group.entry(group.rows.index(own), group.carriers.index(number))
 
     def multiplied(self, stored: Mapping[Slot, Any]) -> Iterator[tuple[Slot, Any]]:
         """Yield each entry of the outputs that the products compute, as (slot, value). `stored` are the factors V, T, E
@@ -148,19 +160,22 @@ class ThinProducts:
         beneath = self.below or ("",) * len(self.outputs)
         for output, below, known in zip(self.outputs, beneath, self.known, strict=True):
             for column in range(known, n):
-                given = [stored.get(Slot(self.right(output), c * n + column), 0.0) for c in range(wide)]
-                found = []
-                for number, row in enumerate(self.core):
-                    weights = [stored.get(Slot(INVERSE, number * wide + c), 0.0) for c in range(wide)]
-                    found.append(-_times(weights, given))
-                    yield Slot(output, row * n + column), found[-1]
+                places = [Slot(output, row * n + column) for row in self.core]
+                if self.is_solved:
+                    found = [stored.get(place, 0.0) for place in places]
+                else:
+                    given = [stored.get(Slot(self.right(output), c * n + column), 0.0) for c in range(wide)]
+                    rows = [[Slot(INVERSE, c * wide + k) for k in range(wide)] for c in range(wide)]
+                    found = [-_times([stored.get(slot, 0.0) for slot in row], given) for row in rows]
+                    yield from zip(places, found, strict=True)
                 for group in self.groups:
                     used = [found[c] for c in group.carriers]
                     for number, row in enumerate(group.rows):
-                        first = number * len(used)
-                        weights = [stored.get(Slot(group.vector, first + k), 0.0) for k in range(len(used))]
                         place = Slot(below if group.is_below else output, row * n + column)
-                        yield place, stored.get(place, 0.0) - _times(weights, used)
+                        total = stored.get(place, 0.0)
+                        for k, value in enumerate(used):
+                            total = total - stored.get(group.entry(number, k), 0.0) * value
+                        yield place, total
 
 
 def _times(weights: Sequence[Any], values: Sequence[Any]) -> Any:

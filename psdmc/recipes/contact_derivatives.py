@@ -12,13 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from psdmc.dynamics.arrow import Arrow
-from psdmc.dynamics.contacts import (
-    contact_jacobian,
-    contact_slopes,
-    of_active,
-    pushed_slopes,
-)
-from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.constraints import Constraints
+from psdmc.dynamics.contacts import of_active
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.slices import first_rates, leading
 from psdmc.dynamics.solve import factorize
@@ -29,7 +24,7 @@ from psdmc.recipes.contacts import ACTIVE, MU, Held, dense_solution
 from psdmc.recipes.loops import Block, Product, copied, nonzero
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix
 from psdmc.reproducible import inverse, times
-from psdmc.robot.mechanism import Array, NamedFrame
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
@@ -41,24 +36,28 @@ MINUS = {"minus": (-1.0,)}
 
 
 class Counts(NamedTuple):
-    """Numbers of coordinates, of rates, of contacts and of their rows."""
+    """Numbers of coordinates, of rates, of contacts, of contacts and loops, and of the rows of either."""
 
     nq: int
     nv: int
     contacts: int
+    constraints: int
+    contact_rows: int
     rows: int
 
     @staticmethod
-    def of(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Counts:
-        counts = [each.rows for each in named if each.rows]
-        nq = sum(frame.joint.nq for frame in leading(frames))
-        return Counts(nq, first_rates(frames)[-1], len(counts), sum(counts))
+    def of(of: Constraints) -> Counts:
+        counts = [each.rows for each in of.named if each.rows]
+        closed = [len(loop.rows) for loop in of.loops]
+        nq = sum(frame.joint.nq for frame in leading(of.frames))
+        both = [*counts, *closed]
+        return Counts(nq, first_rates(of.frames)[-1], len(counts), len(both), sum(counts), sum(both))
 
     @property
     def arrays(self) -> dict[str, int]:
         """The lengths of the internal arrays that the loops of this file use.
 
-        J           contact Jacobian
+        J           Jacobian of contacts and loops
         seen        J M^-1
         push        the compliance times this
         compliance  the inverse of J M^-1 J^T + mu I in the active rows and columns, zeros in the others
@@ -69,18 +68,16 @@ class Counts(NamedTuple):
 
 
 def geometry(
-    frames: Sequence[Frame],
-    named: Sequence[NamedFrame],
+    of: Constraints,
     read: Reader,
     forces: str,
     kept: dict[str, list[tuple[int, ...]]],
 ) -> tuple[Rows, dict[str, Column]]:
-    """Return the contact Jacobian, and what `Counts.arrays` calls J and turn. `kept` gets the entries of each row of
-    J, and of each column of turn, that are not zero."""
-    counts = Counts.of(frames, named)
+    """Return the Jacobian of contacts and loops, and what `Counts.arrays` calls J and turn. `kept` gets the entries of each
+    row of J, and of each column of turn, that are not zero."""
+    counts = Counts.of(of)
     q = read("q", counts.nq)
-    jacobian = contact_jacobian(frames, named, q)
-    turn = pushed_slopes(frames, named, q, read(forces, counts.rows))
+    jacobian, turn = of.jacobian(q), of.pushes(q, read(forces, counts.rows))
     kept |= {"J": nonzero(jacobian), "turn": nonzero(list(zip(*turn, strict=True)))}
     return jacobian, {"J": Column(flat(jacobian)), "turn": Column(flat(turn))}
 
@@ -90,16 +87,14 @@ def flat(rows: Rows) -> list[Scalar]:
     return [x for row in rows for x in row]
 
 
-def compliant(
-    frames: Sequence[Frame], named: Sequence[NamedFrame], kept: Sequence[Sequence[int]]
-) -> Straight:
+def compliant(of: Constraints, kept: Sequence[Sequence[int]]) -> Straight:
     """Compute the compliance from J and J M^-1."""
-    counts = Counts.of(frames, named)
+    counts = Counts.of(of)
     nv, rows = counts.nv, counts.rows
 
     def inverted(read: Reader) -> dict[str, Column]:
         jacobian, seen = read("J", rows * nv), read("seen", rows * nv)
-        mask = Held(named, read(ACTIVE.name, counts.contacts), read(MU.name, 1)[0])
+        mask = Held(of.named, read(ACTIVE.name, counts.contacts), read(MU.name, 1)[0], loops=of.loops)
         products = [[0.0] * rows for _ in range(rows)]
         for i, own in enumerate(kept):
             for j in range(i + 1):
@@ -127,20 +122,19 @@ class Changes(NamedTuple):
 
 
 def responses(
-    frames: Sequence[Frame],
-    named: Sequence[NamedFrame],
+    of: Constraints,
     inverse_matrix: str,
     kept: Mapping[str, list[tuple[int, ...]]],
     changes: Sequence[Changes],
 ) -> Iterator[Region]:
     """Loops that change derivatives of a motion without contacts to those with contacts, and compute those of the contact
     forces. The array `inverse_matrix` has M^-1."""
-    counts = Counts.of(frames, named)
+    counts = Counts.of(of)
     nv, rows = counts.nv, counts.rows
     jacobian, seen, push = (Block(name, nv) for name in ("J", "seen", "push"))
     compliance, every = Block("compliance", rows), range(rows)
     yield from Product(jacobian, Block(inverse_matrix, nv), seen, rows, nv).by_rows(kept["J"])
-    yield compliant(frames, named, kept["J"])
+    yield compliant(of, kept["J"])
     yield Product(compliance, seen, push, rows, nv).loop(every)
     for own in changes:
         wanted, motion, forces = (Block(name, nv) for name in own)
@@ -158,12 +152,10 @@ def pushed_motion(
     return Product(*turned, nv, nv, True).by_rows(kept)
 
 
-def held_inverse(
-    frames: Sequence[Frame], named: Sequence[NamedFrame], motion: str, forces: str
-) -> Iterator[Region]:
+def held_inverse(of: Constraints, motion: str, forces: str) -> Iterator[Region]:
     """Loops that change the array `motion` from M^-1 to the derivatives of the motion with contacts by the load, and store
     those of the contact forces."""
-    counts = Counts.of(frames, named)
+    counts = Counts.of(of)
     nv, rows = counts.nv, counts.rows
     seen, push = Block("seen", nv), Block("push", nv)
     yield Product(push.turned(), seen, Block(motion, nv), nv, nv, True, True).loop(range(rows))
@@ -178,7 +170,7 @@ def thin_outputs(
     changes  for each quantity, the result of `Arrow.thin` for its derivatives of minus the residuals, whose last rows
              belong to minus the contact forces
     """
-    thin = [row[:nv] for row in arrow.thin_factors]
+    thin = [row[:nv] for row in arrow.thin_factors()]
     return {
         **{f"d{motion}_d{by}": [list(row) for row in rows[:nv]] for by, rows in changes.items()},
         **{f"d{forces}_d{by}": minus(rows[nv:]) for by, rows in changes.items()},
@@ -212,8 +204,9 @@ def changed_on_arrays(
     compliance.
     """
     count = len(given["q"])
-    rows = matrix(contact_jacobian(robot.frames, robot.chain.frames, list(given["q"].T)), count)
-    held = Held.on_arrays(robot, given)
+    loops = robot.chain.loops
+    rows = matrix(constraints_of(robot).jacobian(list(given["q"].T)), count)
+    held = Held.on_arrays(robot, given, loops)
     on, shift, unit = (matrix([values], count)[:, 0] for values in held.rows)
     turned = np.swapaxes(rows, -1, -2)
     free = inverse(robot.mass_matrix(given["q"]))
@@ -230,14 +223,31 @@ def changed_on_arrays(
     return motions, forces, (fixed, -push, compliance)
 
 
+def constraints_of(robot: RobotOnArrays) -> Constraints:
+    """Return the contacts and loops of a robot in NumPy."""
+    return Constraints(robot.frames, robot.chain.frames, robot.chain.loops)
+
+
 def slopes_on_arrays(
-    robot: RobotOnArrays, q: Array, qd: Array, motion: Array, forces: Array
+    robot: RobotOnArrays,
+    q: Array,
+    qd: Array,
+    motion: Array,
+    forces: Array,
+    of_loops: Array | None = None,
+    kp: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Return, for k states, the derivatives by q of J^T f, (k, nv, nv), and those by q and by qd of the contacts'
-    accelerations J motion + dJ/dt qd, (k, rows, nv)."""
-    frames, named, count = robot.frames, robot.chain.frames, len(q)
-    turn = pushed_slopes(frames, named, list(q.T), list(forces.T))
-    by_q, by_qd = contact_slopes(frames, named, list(q.T), list(qd.T), list(motion.T))
+    """Return, for k states, the derivatives by q of J^T f, (k, nv, nv), and those by q and by qd of the accelerations
+    J motion + dJ/dt qd of contacts and loops, (k, rows, nv).
+
+    of_loops  the motion in the loops' rows; left out: `motion`
+    kp        what multiplies the loops' errors, which are added to their accelerations, (k,); left out: 0
+    """
+    of, count, here = constraints_of(robot), len(q), list(q.T)
+    turn = of.pushes(here, list(forces.T))
+    by_q, by_qd = of.slopes(here, list(qd.T), list(motion.T), None if of_loops is None else list(of_loops.T))
+    if kp is not None:
+        by_q = of.drawn_closed(by_q, here, kp)
     return matrix(turn, count), matrix(by_q, count), matrix(by_qd, count)
 
 

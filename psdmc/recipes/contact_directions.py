@@ -112,6 +112,7 @@ class ContactFunction:
             lambda robot, given: blocks(self.derivatives.pinocchio(robot, given), given),
             shares="inverse_dynamics",
             matters=self.values.matters,
+            closes=True,
         )
 
     def _gradient_trace(self, g: Ingredients) -> Outputs:

@@ -89,9 +89,9 @@ class Held(NamedTuple):
     loops: Sequence[Loop] = ()
 
     @staticmethod
-    def of(g: Ingredients, loops: Sequence[Loop] = ()) -> Held:
-        """Return the contacts of a trace, by the inputs active and mu."""
-        return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si, loops)
+    def of(g: Ingredients) -> Held:
+        """Return the contacts and the loops of a trace, by the inputs active and mu."""
+        return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si, g.loops)
 
     @staticmethod
     def on_arrays(robot: RobotOnArrays, given: Mapping[str, Array], loops: Sequence[Loop] = ()) -> Held:
@@ -207,6 +207,11 @@ def held_on_arrays(
         columns(found.forces, count),
         columns([*factors.pivots, *signs], count),
     )
+
+
+def joined(of_contacts: Array, of_loops: Array) -> Array:
+    """Return values for the rows of contacts and then of closed loops, (k, rows, ...)."""
+    return np.concatenate([of_contacts, of_loops], axis=1)
 
 
 def active_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool_]:

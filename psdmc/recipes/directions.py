@@ -181,4 +181,5 @@ def with_parameter_gradient(
         pinocchio,
         shares=state.shares,
         gradient=GRADIENT_THETA.name,
+        closes=state.closes,
     )

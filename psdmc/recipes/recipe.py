@@ -125,6 +125,7 @@ class Needs(StrEnum):
 
     POSITIVE_MASS = "a positive definite mass matrix"
     LOOPS = "closed loops"
+    PASSIVE = "closed loops with passive joints"
     STANDARD = "standard parameters of its links"
 
 
@@ -218,7 +219,9 @@ class Recipe:
     def lack_of_loops(self, robot: Mechanism) -> str | None:
         """Return why a robot has no such function, because it has closed loops or has none; None: it may have it."""
         if not robot.loops:
-            return "the robot has no closed loops" if self.needs is Needs.LOOPS else None
+            return "the robot has no closed loops" if self.needs in (Needs.LOOPS, Needs.PASSIVE) else None
+        if self.needs is Needs.PASSIVE and not robot.passive_rates:
+            return "its closed loops name no passive joints"
         signature = self.signature
         touching = {"contacts", *OF_ROWS}
         touches = any(touching & {*q.axes} for q in (*signature.inputs, *signature.outputs))

@@ -92,23 +92,26 @@ def with_friction(recipe: Recipe, friction: FrictionInDynamics | None) -> Recipe
 
 
 def with_gravity_input(recipe: Recipe, functions: Mapping[str, Recipe]) -> Recipe:
-    """Return the recipe of a function to which callers give gravity. Functions that do not depend on gravity are
-    returned unchanged, but without loops that call such a function.
+    """Return the recipe of a function to which callers give gravity. A function that does not depend on gravity keeps its
+    inputs. If its loops call one that does, they give it no gravity: the effects of gravity cancel.
 
     Code with this input has no expanded form, because gravity in P has one direction.
 
     functions  all recipes by name, among them those of the functions that the function calls
     """
+    loops, depends = recipe.regions, recipe.signature.depends_on_gravity
     called = {name for name in recipe.signature.calls if functions[name].signature.depends_on_gravity}
-    if not recipe.signature.depends_on_gravity:
-        return replace(recipe, regions=None) if called else recipe
-    loops = recipe.regions
+    if loops is not None:
+        recipe = replace(
+            recipe, regions=lambda *frames, **more: pass_gravity_on(loops(*frames, **more), called, depends)
+        )
+    if not depends:
+        return recipe
     return replace(
         recipe,
         signature=takes_gravity(recipe.signature),
         trace=lambda g: recipe.trace(replace(g, base_acceleration=_against_gravity(g))),
         reference=lambda robot, given: recipe.reference(pulled(robot, given), given),
-        regions=None if loops is None else lambda *frames: pass_gravity_on(loops(*frames), called),
         polynomials=None,
     )
 
@@ -130,8 +133,8 @@ def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
     frames, owners = g.frames, joints_of_rates(g.frames)
     moved: set[int] = set()
     for i, frame in enumerate(frames):
-        leader = i if frame.follows is None else frame.follows[0]
-        if leader == owners[rate] or frame.parent in moved:
+        led_by = (i,) if frame.follows is None else frame.follows.leaders
+        if owners[rate] in led_by or frame.parent in moved:
             moved.add(i)
     kept = with_carriers(frames, moved)
     rates = tuple(k for k, joint in enumerate(owners) if joint in kept)

@@ -138,7 +138,7 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")
     require_actuators_folder(model, folder)
-    view = calibrated_actuators(model.mechanism.name, model.joint_names, found)
+    view = calibrated_actuators(model.mechanism.name, model.v_names, found)
     files = actuator_files(view)
     write_together(Path(folder), files)
     return [Path(folder) / path for path in files]

@@ -32,7 +32,7 @@ from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.snap import snap_rotation
 
 FORMAT = "see the format of loops in docs/how-to/loops.md"
-LOOP_KEYS = ("name", "rows", "first", "second")
+LOOP_KEYS = ("name", "rows", "first", "second", "follows", "passive")
 FRAME_KEYS = ("link", "xyz", "rpy", "quaternion")
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
@@ -65,18 +65,26 @@ def loop_tables(path: Path, text: str) -> Tables:
 def closed_loops(
     tables: Tables,
     frame_of: Callable[[str], NamedFrame],
+    joints: Sequence[str],
     snap: float,
     source: str,
 ) -> tuple[Loop, ...]:
     """Return the loops that tables describe. Raises one InputError that names all faults.
 
     frame_of  returns the frame of a link, with the joint BASE if the link is fixed to the base
+    joints    names of the joints
     snap      rad; rotations that differ by at most this much from a right angle become exact
     """
     problems: list[str] = []
-    loops = [_loop(table, number, frame_of, snap, problems) for number, table in enumerate(tables, start=1)]
+    try:
+        loops = [
+            _loop(table, number, frame_of, joints, snap, problems)
+            for number, table in enumerate(tables, start=1)
+        ]
+    except InputError as error:
+        raise InputError(f"{source}: {error}", error.hint) from None
     problems += naming_faults([name for name, *_ in loops], "loop")
-    for name, first, second, _ in loops:
+    for name, first, second, *_ in loops:
         if first.joint == second.joint and not problems:
             problems.append(f"loop {shown(name)}: both frames are on one body: no joint moves between them")
     if problems:
@@ -85,13 +93,18 @@ def closed_loops(
 
 
 def _loop(
-    value: object, number: int, frame_of: Callable[[str], NamedFrame], snap: float, problems: list[str]
-) -> tuple[str, NamedFrame, NamedFrame, tuple[int, ...]]:
+    value: object,
+    number: int,
+    frame_of: Callable[[str], NamedFrame],
+    joints: Sequence[str],
+    snap: float,
+    problems: list[str],
+) -> tuple[str, NamedFrame, NamedFrame, tuple[int, ...], tuple[int, ...]]:
     given = value.get("name") if isinstance(value, Mapping) else None
     name = given if isinstance(given, str) and given else f"loop{number}"
     table = CheckedTable(value, f"loop {shown(name)}", LOOP_KEYS, problems)
     table.read("name", plain_text, "")
-    problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:] if key not in table.table]
+    problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:4] if key not in table.table]
     first, second = (
         _frame(
             table.read(key, as_it_is, None),
@@ -101,9 +114,22 @@ def _loop(
             snap,
             problems,
         )
-        for key in LOOP_KEYS[2:]
+        for key in LOOP_KEYS[2:4]
     )
-    return name, first, second, table.read("rows", _rows, CLOSED[6])
+    table.read("follows", _names, [])
+    passive = table.read("passive", lambda value: _joints(value, joints), ())
+    return name, first, second, table.read("rows", _rows, CLOSED[6]), passive
+
+
+def _joints(value: object, joints: Sequence[str]) -> tuple[int, ...]:
+    """The numbers of joints, from their names."""
+    if not isinstance(value, list | tuple) or not value or any(name not in joints for name in value):
+        raise ValueError(f"found {shown(value)}, expected a list of joints: {', '.join(map(shown, joints))}")
+    return tuple(sorted(joints.index(name) for name in value))
+
+
+def _names(value: object) -> list[str]:
+    return [plain_text(name) for name in any_list(value)]
 
 
 def _rows(value: object) -> tuple[int, ...]:
@@ -164,5 +190,8 @@ def _frame(
     if not link:
         problems += [] if "link" in table.table or value is None else [f"{where}: link is missing"]
         return NamedFrame(name, BASE, place, 0)
-    own = frame_of(link)
+    try:
+        own = frame_of(link)
+    except InputError as error:
+        raise InputError(f"{where}: {error}", error.hint) from None
     return NamedFrame(name, own.joint, own.placement @ place, 0)

@@ -1,5 +1,6 @@
-"""Describes how the position q of each joint is determined: it is an entry of the robot's q, follows another joint, or
-is constant. A mimic joint follows by q_joint = ratio q_leader + offset."""
+"""Describes how the position q of each joint is determined: it is an entry of the robot's q, follows other joints, or
+is constant. A mimic joint follows by q_joint = ratio q_leader + offset. A joint of a parallelogram may follow the sum
+of several joints, each with its ratio."""
 
 from __future__ import annotations
 
@@ -16,21 +17,36 @@ from psdmc.robot.joints import JointType
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """Describes the position q of one joint as ratio * q[leader] + offset.
+    """Describes the position q of one joint as ratio * q[leader] + offset, plus a ratio times q of each further leader.
 
     leader   index of the joint that is followed; for a joint that is no mimic joint, the joint itself. None: the joint
              is locked at `offset`
     ratio    rate of the joint divided by that of the leader, in the joint's unit per the leader's unit
     offset   rad or m
+    others   further leaders, each with its ratio
     """
 
     leader: int | None
     ratio: float = 1.0
     offset: float = 0.0
+    others: tuple[tuple[int, float], ...] = ()
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.ratio) and math.isfinite(self.offset)):
-            raise ValueError(f"a coordinate with ratio {self.ratio} and offset {self.offset}")
+        ratios = (self.ratio, *(ratio for _, ratio in self.others))
+        if not all(map(math.isfinite, (*ratios, self.offset))):
+            raise ValueError(f"a coordinate with ratios {ratios} and offset {self.offset}")
+
+    def in_words(self, names: Sequence[str], of: str = "") -> str:
+        """Return the position as a sum in words. `of` is written between each ratio and the name of a joint."""
+        signs = {} if of else {1.0: "", -1.0: "-"}
+        terms = [signs.get(ratio, f"{ratio:g} ") + of + names[leader] for leader, ratio in self.shares]
+        terms += [f"{self.offset:g}"] if self.offset else []
+        return " + ".join(terms).replace("+ -", "- ")
+
+    @property
+    def shares(self) -> tuple[tuple[int, float], ...]:
+        """All leaders, each with its ratio; none if the joint is locked."""
+        return () if self.leader is None else ((self.leader, self.ratio), *self.others)
 
 
 def own_coordinates(n: int) -> tuple[Coordinate, ...]:
@@ -53,10 +69,9 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
         raise ValueError(f"{len(coordinates)} coordinates for {n} joints")
     own = leaders(coordinates)
     for i, coordinate in enumerate(coordinates):
-        if coordinate.leader is not None and coordinate.leader not in own:
-            raise ValueError(
-                f"joint {i} follows joint {coordinate.leader}, which has no coordinate of its own"
-            )
+        for leader, _ in coordinate.shares:
+            if leader not in own:
+                raise ValueError(f"joint {i} follows joint {leader}, which has no coordinate of its own")
     return tuple(coordinates)
 
 
@@ -109,8 +124,8 @@ def _shares(coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> NDArra
     rows = []
     for coordinate, length in zip(coordinates, lengths, strict=True):
         row = np.zeros((length, sum(lengths[i] for i in own)))
-        if coordinate.leader is not None:
-            start = first[coordinate.leader]
-            row[:, start : start + length] = coordinate.ratio * np.eye(length)
+        for leader, ratio in coordinate.shares:
+            start = first[leader]
+            row[:, start : start + length] = ratio * np.eye(length)
         rows.append(row)
     return np.concatenate(rows)

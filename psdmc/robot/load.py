@@ -13,11 +13,12 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.reading import in_words, read_file
 from psdmc.robot import limits
-from psdmc.robot.closed_loops import closed_loops, loop_tables
+from psdmc.robot.closed_loops import Tables, closed_loops, loop_tables
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
+from psdmc.robot.linear_loops import with_linear_loops
 from psdmc.robot.load_options import DEFAULT_SNAP, TOOL, LoadOptions, checked_options, parsed_contact
 from psdmc.robot.mechanism import DRIVE, ROW_NAMES, Array, Loop, Mechanism, NamedFrame
 from psdmc.robot.missing_inertia import with_massless_warning
@@ -70,14 +71,14 @@ def load_robot(
     `packages` are folders of ROS packages, by name, that a xacro file uses. Raises InputError if the file or an option
     is wrong.
     """
-    file = Path(path)
+    file, tables = Path(path), None
     if isinstance(options.get("loops"), str | PathLike):
         tables = Path(options["loops"])
         options["loops"] = loop_tables(tables, robot_text(tables))
     text = robot_text(file)
     text, source_format, found = as_source(file, text, checked_options(**options), checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
-    return _loaded(text, source_format, file.name, found)
+    return _loaded(text, source_format, file.name, found, tables.name if tables else None)
 
 
 def load_robot_text(
@@ -89,11 +90,15 @@ def load_robot_text(
     return _loaded(text, source_format, source_name, checked_options(**options))
 
 
-def _loaded(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> LoadedRobot:
+def _loaded(
+    text: str, source_format: SourceFormat, source: str, options: LoadOptions, loops_file: str | None = None
+) -> LoadedRobot:
     if not text.strip():
         raise InputError(f"{source}: the file is empty", "give a URDF or a DH .toml file")
     draft = _draft(text, source_format, source, options)
-    return LoadedRobot(_settled(draft, options, source), text, source_format, source, draft.snaps, options)
+    return LoadedRobot(
+        _settled(draft, options, source, loops_file), text, source_format, source, draft.snaps, options
+    )
 
 
 def _refuse_size(size: int, source: str) -> None:
@@ -143,7 +148,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
 
-def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
+def _settled(draft: Draft, options: LoadOptions, source: str, loops_file: str | None) -> Mechanism:
     """The chain with drive inertias and assumed zeros applied."""
     link_names = [joint.link_name for joint in draft.joints]
     joint_names = [joint.name for joint in draft.joints]
@@ -162,7 +167,8 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in draft.snaps
     )
     frames = _with_contacts(_frames(draft, options, source), options)
-    loops = _loops(draft, options, frames, source)
+    tables, file = (*draft.loops, *options.loops), loops_file or source
+    loops = _loops(draft, tables, options, frames, file)
     mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
@@ -173,7 +179,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         parameter_span=block_diagonal([link_span(zero) for zero in zeros]),
         gravity=draft.gravity,
         tip=draft.tip,
-        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values), *map(_loop_note, loops)),
+        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values)),
         frames=frames,
         parents=draft.parents,
         tip_body=draft.tip_body,
@@ -181,6 +187,10 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         massless=draft.massless,
         loops=loops,
     )
+    if loops:
+        mechanism = with_linear_loops(mechanism, [table.get("follows") for table in tables], file)
+        notes = (*mechanism.notes, *map(_loop_note, mechanism.loops))
+        mechanism = replace(mechanism, notes=notes)
     return with_massless_warning(mechanism)
 
 
@@ -203,24 +213,26 @@ def _with_contacts(frames: tuple[NamedFrame, ...], options: LoadOptions) -> tupl
     return tuple(replace(frame, rows=rows.get(frame.name, 0)) for frame in frames)
 
 
-def _loops(draft: Draft, options: LoadOptions, frames: Sequence[NamedFrame], source: str) -> tuple[Loop, ...]:
+def _loops(
+    draft: Draft, tables: Tables, options: LoadOptions, frames: Sequence[NamedFrame], source: str
+) -> tuple[Loop, ...]:
     """The closed loops of the file, then those of the options."""
     named = {frame.name: frame for frame in frames}
     find = draft.frame_of
-    tables = (*draft.loops, *options.loops)
     if not tables or find is None:
         return ()
     return closed_loops(
-        tables, lambda name: named[name] if name in named else find(name), options.snap, source
+        tables,
+        lambda name: named[name] if name in named else find(name),
+        [joint.name for joint in draft.joints],
+        options.snap,
+        source,
     )
 
 
 def _loop_note(loop: Loop) -> str:
     rows = ", ".join(ROW_NAMES[row] for row in loop.rows)
-    return (
-        f"loop '{loop.name}' closes {rows} in constrained_forward_dynamics; functions without contacts compute the open "
-        "tree"
-    )
+    return f"loop '{loop.name}' closes {rows} in functions of contacts and loops; all other functions compute the open tree"
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:

@@ -157,17 +157,36 @@ def _contacts(contacts: Sequence[str]) -> tuple[str, ...]:
 
 
 def _loops(tables: object) -> tuple[Mapping[str, Any], ...]:
-    """Plain tables. Their contents are checked with the robot's links."""
-    try:
-        plain = json.loads(json.dumps(tables, allow_nan=False))
-    except (TypeError, ValueError, RecursionError):
-        plain = None
+    """Plain tables, in which NumPy's arrays and numbers are lists and numbers. Their contents are checked with the robot's
+    links."""
+    plain = _plain(tables)
+    faults = [
+        (number, key, value)
+        for number, table in enumerate(tables if isinstance(tables, list | tuple) else (), start=1)
+        if isinstance(table, Mapping)
+        for key, value in table.items()
+        if _plain([value]) is None
+    ]
+    if plain is None and faults:
+        number, key, value = faults[0]
+        raise InputError(
+            f"loops: table {number}: {key} is {shown(value)}, expected texts and finite numbers",
+            "give lists, texts and numbers, as in TOML",
+        )
     if not isinstance(plain, list) or not all(isinstance(table, dict) for table in plain):
         raise InputError(
             f"loops are {shown(tables)}, expected tables of loops",
             'such as [{"rows": ["x", "z"], "first": "link3", "second": "base"}], or the path of a TOML file',
         )
     return tuple(plain)
+
+
+def _plain(value: object) -> Any:
+    """A value as JSON gives it back; None if JSON cannot hold it."""
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=lambda own: own.tolist()))
+    except (AttributeError, TypeError, ValueError, RecursionError):
+        return None
 
 
 def _with_contacts(options: LoadOptions) -> LoadOptions:

@@ -101,12 +101,14 @@ class Loop:
     name           untrusted text
     first, second  the frames; the joint is BASE for a frame on the base
     rows           axes of the first frame along which the frames cannot move apart (0 to 2) or turn (3 to 5), ascending
+    passive        joints without motor whose motion follows from that of the others, by number; empty: not declared
     """
 
     name: str
     first: NamedFrame
     second: NamedFrame
     rows: tuple[int, ...]
+    passive: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.rows or sorted({*self.rows} & {*range(len(ROW_NAMES))}) != list(self.rows):
@@ -247,6 +249,12 @@ class Mechanism:
         return tuple(loop.rows for loop in self.loops)
 
     @property
+    def passive_rates(self) -> tuple[int, ...]:
+        """The numbers of the rates of passive joints, whose motion follows from that of the other joints."""
+        passive = {joint for loop in self.loops for joint in loop.passive}
+        return tuple(k for k, joint in enumerate(self.rate_joints) if joint in passive)
+
+    @property
     def types(self) -> tuple[JointType, ...]:
         return tuple(joint.type for joint in self.joints)
 
@@ -293,8 +301,23 @@ class Mechanism:
         return leaders(self.coordinates)
 
     @property
+    def leading_joints(self) -> tuple[Joint, ...]:
+        """The joints that are not mimic joints, in order."""
+        return tuple(self.joints[i] for i in self.own_joints)
+
+    @property
+    def own_types(self) -> tuple[JointType, ...]:
+        """Types of the joints that are not mimic joints, in order."""
+        return tuple(joint.type for joint in self.leading_joints)
+
+    @property
     def has_followers(self) -> bool:
         return len(self.own_joints) < len(self)
+
+    @property
+    def has_sums(self) -> bool:
+        """Whether some joint follows the sum of several joints, as in parallelograms."""
+        return any(coordinate.others for coordinate in self.coordinates)
 
     def parent_link(self, body: int) -> str:
         """Return the name of the link to which the joint of a body is attached."""

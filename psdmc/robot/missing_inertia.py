@@ -147,8 +147,7 @@ def unknown_option(chain: Mechanism) -> str:
 def idle_joints(chain: Mechanism) -> tuple[int, ...]:
     """Return the joints that move no mass, no inertia and no drive inertia. Masses that a joint moves through mimic
     joints count."""
-    leaders = [i if c.leader is None else c.leader for i, c in enumerate(chain.coordinates)]
-    moving = {
-        leaders[i] for body, x in enumerate(chain.parameters) if x[:DRIVE].any() for i in chain.path_to(body)
-    } | {leaders[i] for i, x in enumerate(chain.parameters) if x[DRIVE] != 0.0}
+    moved = {i for body, x in enumerate(chain.parameters) if x[:DRIVE].any() for i in chain.path_to(body)}
+    moved |= {i for i, x in enumerate(chain.parameters) if x[DRIVE] != 0.0}
+    moving = {leader for i in moved for leader, _ in chain.coordinates[i].shares}
     return tuple(i for i in chain.own_joints if i not in moving)

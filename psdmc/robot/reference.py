@@ -33,6 +33,7 @@ class Reference:
     frame_names  the named frames; empty: the tip alone
     rows         for each named frame, 3 for a contact point, 6 for a surface, 0 for none; empty: all are points
     loops        for each closed loop, the numbers of its two frames, and its rows
+    passive      the numbers of the rates of passive joints
     """
 
     model: pinocchio.Model
@@ -40,6 +41,7 @@ class Reference:
     frame_names: tuple[str, ...] = ()
     rows: tuple[int, ...] = ()
     loops: tuple[tuple[int, int, tuple[int, ...]], ...] = ()
+    passive: tuple[int, ...] = ()
 
     @property
     def contacts(self) -> list[tuple[int, int]]:
@@ -321,7 +323,8 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
         (*(model.getFrameId(frame) for frame in loop_frames(loop)), loop.rows)
         for loop in loaded.mechanism.loops
     )
-    return Reference(model, loaded.mechanism.tip_name, names, rows, loops)
+    passive = loaded.mechanism.passive_rates
+    return Reference(model, loaded.mechanism.tip_name, names, rows, loops, passive)
 
 
 def pinocchio_version() -> str:

@@ -81,9 +81,11 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
         kind = pinocchio.FrameType.OP_FRAME
         model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
     own = () if is_urdf else tomllib.loads(loaded.source_text).get("loop", ())
-    for loop, table in zip(loaded.mechanism.loops, (*own, *loaded.options.loops), strict=True):
+    tables = enumerate((*own, *loaded.options.loops), start=1)
+    named = {table.get("name", f"loop{number}"): table for number, table in tables}
+    for loop in loaded.mechanism.loops:
         for name, key in zip(loop_frames(loop), ("first", "second"), strict=True):
-            _add_loop_frame(model, name, table[key], loaded.mechanism.base_name)
+            _add_loop_frame(model, name, named[loop.name][key], loaded.mechanism.base_name)
     return model
 
 

@@ -22,7 +22,7 @@ from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_versi
 from psdmc.robot.reference import OnCoordinates, Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
 from psdmc.verification.functions import function_errors
-from psdmc.verification.source import compared_parameters, require_same_robot, source_of
+from psdmc.verification.source import compared_parameters, require_same_robot, source_of, with_passive_joints
 
 STATES = 200
 SEED = 14_630
@@ -85,6 +85,7 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     """
     loaded = source_of(model) if source is None else source
     require_same_robot(model, loaded)
+    loaded = with_passive_joints(model, loaded)
     theta, parameters = compared_parameters(model, loaded)
     written = reference(loaded, snapped=False, parameters=parameters)
     snapped = bool(loaded.snap_report)

@@ -3,6 +3,8 @@ that both the model and this robot can have."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from psdmc.errors import InputError
@@ -19,6 +21,13 @@ def source_of(model: DynamicsModel) -> LoadedRobot:
         raise InputError(f"the model of '{model.mechanism.name}' holds no source", "give the robot's file")
     name = str(kept.get("source_name", "robot"))
     return load_robot_text(kept["source_text"], kept["source_format"], source_name=name, **kept["options"])
+
+
+def with_passive_joints(model: DynamicsModel, loaded: LoadedRobot) -> LoadedRobot:
+    """Return the source with the passive joints of the model, which `derive` may have chosen."""
+    pairs = zip(loaded.mechanism.loops, model.mechanism.loops, strict=False)
+    loops = tuple(replace(loop, passive=own.passive) for loop, own in pairs)
+    return replace(loaded, mechanism=replace(loaded.mechanism, loops=loops)) if loops else loaded
 
 
 def require_same_robot(model: DynamicsModel, loaded: LoadedRobot) -> None:

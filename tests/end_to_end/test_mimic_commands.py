@@ -14,7 +14,7 @@ from test_tree_commands import joint, link
 from unoptimised import without_optimisation, wrapper
 
 import psdmc
-from psdmc.errors import InputError
+from psdmc.errors import DerivationError, InputError
 from psdmc.robot.load import load_robot_text
 
 MIMIC = '<mimic joint="left" multiplier="-0.8" offset="0.02"/></joint>'
@@ -145,8 +145,8 @@ def test_a_wrong_shape_names_the_coordinates(work: Path) -> None:
     assert "shoulder, wrist, left" in str(refused.value.hint)
 
 
-def test_e_and_p_are_refused() -> None:
+def test_e_and_p_of_an_angle_that_follows_a_sliding_joint_are_refused() -> None:
     from psdmc.derivation.derive import derive_model
 
-    with pytest.raises(InputError, match="E and P are of joints that follow no other"):
+    with pytest.raises(DerivationError, match="E and P: an angle follows a sliding joint"):
         derive_model(load_robot_text(GRIPPER, "urdf").mechanism, expand=True)

@@ -25,7 +25,7 @@ from psdmc.errors import InputError
 from psdmc.friction.law import Law, Value
 from psdmc.friction.own import data_of
 from psdmc.friction.scalars import cos, sin
-from psdmc.functions import DEFAULT, RECIPES
+from psdmc.functions import DEFAULT, OF_TREES, RECIPES
 from psdmc.functions.forward_dynamics_second_derivatives import _solved
 from psdmc.lower.kernels import lower
 from psdmc.model.calibrated_json import from_json
@@ -56,7 +56,9 @@ NUMBERS = (
     "waves",
     "swell",
 )
-MOTORS = tuple(name for name, each in RECIPES.items() if each.signature.has_motor_torques and not each.packs)
+MOTORS = tuple(
+    name for name in OF_TREES if RECIPES[name].signature.has_motor_torques and not RECIPES[name].packs
+)
 HESSIANS = ("inverse_dynamics_second_derivatives", "forward_dynamics_second_derivatives")
 RIPPLE = Law(
     name="ripple",

@@ -18,7 +18,7 @@ from unoptimised import compiled
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
-from psdmc.functions import DEFAULT, RECIPES
+from psdmc.functions import DEFAULT, OF_TREES, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
@@ -160,7 +160,7 @@ def robot(name: str) -> Subject:
 
 def kernels(name: str) -> dict[str, Kernel]:
     """Of the functions that are not in LONG."""
-    return _lowered(name, tuple(one for one in RECIPES if one not in DEFAULT and one not in LONG))
+    return _lowered(name, tuple(one for one in OF_TREES if one not in DEFAULT and one not in LONG))
 
 
 @cache

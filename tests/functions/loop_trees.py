@@ -17,14 +17,33 @@ from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
+from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
+from psdmc.verification.source import with_passive_joints
 
 Array = np.ndarray
 
-FUNCTIONS = ("loop_error", "loop_jacobian", "loop_drift", "constrained_forward_dynamics")
+FUNCTIONS = (
+    "loop_error",
+    "loop_jacobian",
+    "loop_drift",
+    "constrained_forward_dynamics",
+    "constrained_forward_dynamics_derivatives",
+    "constrained_forward_dynamics_vjp",
+    "constrained_forward_dynamics_jvp",
+    "constrained_semi_implicit_euler",
+    "constrained_semi_implicit_euler_derivatives",
+    "constrained_rk4_step",
+    "passive_motion",
+    "loop_inverse_dynamics",
+    "impulse",
+    "impulse_derivatives",
+    "impulse_vjp",
+    "impulse_jvp",
+)
 COUNT = 16
 
 ROWS = (3, ["y", "rx", "rz"], ["x", "z", "ry", "rz"], ["x", "y", "rx", "ry", "rz"])
@@ -54,20 +73,41 @@ class LoopTree:
         rng = np.random.default_rng(5)
         q, qd, tau = states_of(robot, rng, COUNT)
         q[-1] = self.closed
-        return {
+        found = {
             "q": q,
             "qd": qd,
+            "qd_before": qd,
+            "restitution": rng.uniform(0.0, 1.0, COUNT),
             "tau": tau,
+            "qdd": rng.normal(size=qd.shape),
+            "dt": np.linspace(0.001, 0.02, COUNT),
             "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_free_root,
             "mu": np.zeros(COUNT),
             "kp": rng.uniform(0.0, 50.0, COUNT),
             "kd": rng.uniform(0.0, 10.0, COUNT),
             "error": 0.01 * rng.normal(size=(COUNT, sum(robot.rows_of_contacts))),
         }
+        sizes = Sizes(len(robot), robot.nq, robot.nv, 0, 1, 0, robot.rows_of_contacts, robot.rows_of_loops)
+        others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
+        return found | {
+            name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))
+            for name, each in others.items()
+            if name not in found
+        }
+
+    @cached_property
+    def far(self) -> Array:
+        """Which states are far from those where rows of loops depend on each other: derivatives keep their digits there."""
+        q, counts = self.given["q"], []
+        for mass, rows in zip(self.model.mass_matrix(q), self.model.loop_jacobian(q), strict=True):
+            counts.append(np.linalg.cond(rows @ np.linalg.solve(mass, rows.T)))
+        return np.array(counts) < 1e5
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
         """The values from Pinocchio's own reading of the file and of the loops' frames."""
-        return RECIPES[function].pinocchio(reference(self.loaded, snapped=False), self.given | other)
+        return RECIPES[function].pinocchio(
+            reference(with_passive_joints(self.model, self.loaded), snapped=False), self.given | other
+        )
 
     def found(self, function: str, **other: Array) -> list[tuple[Array, ...]]:
         """The values of C for many states, of C for each state, and of the model in NumPy."""

@@ -64,6 +64,8 @@ def test_python_raises_only_for_matrices_with_an_error() -> None:
         "contact_inverse",
         "constrained",
         "impulse",
+        "passive_motion",
+        "loop_inverse_dynamics",
     )
     assert raising == [name for name in SIGNATURES if name.startswith(starts)]
     assert SIGNATURES["forward_dynamics"].factorises

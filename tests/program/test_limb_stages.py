@@ -11,6 +11,7 @@ from psdmc.program.limb_program import LimbGroup, LimbProgram, unpacked
 from psdmc.program.limb_stages import staged
 from psdmc.program.program import Slot
 from psdmc.program.text import parse, show
+from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.thin_products import Shares, ThinProducts
 
 TWO = LimbGroup(
@@ -78,8 +79,10 @@ def test_what_is_no_function_of_core_and_limbs_is_refused(text: str, fault: str)
         staged(parse(text), [TWO, other])
 
 
-def test_products_behind_limbs_are_written_out_entry_by_entry():
-    """Two limbs of one rate on one rate: x = -V E in the core's row, y - T x in a limb's; one column is known."""
+@pytest.mark.parametrize("is_solved", [False, True])
+def test_products_behind_limbs_are_written_out_entry_by_entry(is_solved: bool):
+    """Two limbs of one rate on one rate: x = -V E in the core's row, y - T x in a limb's; one column is known. If
+    is_solved, the code for limbs stores x itself."""
     group = LimbGroup(
         number=0,
         count=2,
@@ -87,22 +90,27 @@ def test_products_behind_limbs_are_written_out_entry_by_entry():
         constants=(),
         outputs=(
             (Slot("group0_output", 0), (Slot("shares", 0), Slot("shares", 1))),
-            (Slot("group0_output", 1), (Slot("M_core", 1), Slot("M_core", 2))),
+            (
+                Slot("group0_output", 1),
+                (Slot("M", 1), Slot("M", 2)) if is_solved else (Slot("M_core", 1), Slot("M_core", 2)),
+            ),
             (Slot("group0_output", 2), (Slot("M", 4), Slot("M", 8))),
         ),
     )
-    whole = parse("""
+    lines = """
         v = load q[0]
         leg = load group0_q[0]
         e = sin leg
         y = cos leg
-        out core_inverse[0] = v
+        p = mul v e
+        x = neg p
         out M[0] = v
         out group0_output[0] = leg
-        out group0_output[1] = e
         out group0_output[2] = y
-    """)
-    products = ThinProducts(("M",), (1,), 3, (0,), (Shares("shares", (1, 2), (0,)),))
+    """ + ("out group0_output[1] = x" if is_solved else "out core_inverse[0] = v\n out group0_output[1] = e")
+    whole = drop_unused(parse(lines))
+    shares = (Shares("shares", (1, 2), (0,)),)
+    products = ThinProducts(("M",), (1,), 3, (0,), shares, is_solved=is_solved)
     limbs = LimbProgram((group,), staged(whole, [group]), products=(products,))
     v, a, b = q = np.array([0.7, 0.3, -0.4])
 
@@ -112,4 +120,4 @@ def test_products_behind_limbs_are_written_out_entry_by_entry():
     np.testing.assert_allclose(found[0], [v, *x], rtol=1e-15)
     np.testing.assert_allclose(found[1:, 0], 0.0)
     np.testing.assert_allclose(found[1:, 1:], np.diag(np.cos(q[1:])) - np.outer([a, b], x), rtol=1e-15)
-    assert (products.cost.mul, products.cost.add) == (3, 2)
+    assert (products.cost.mul, products.cost.add) == ((2, 2) if is_solved else (3, 2))

@@ -208,9 +208,9 @@ class SharesView:
     The rows are Y - T x, where x are rows of the core (all joints outside the limbs).
 
     vector   C name of the factor T
-    width    number of limbs
+    width    number of columns of T
     places   where the rows of each limb begin in an output
-    product  C text of the product T x
+    product  C text of the products T x, which are subtracted from Y
     is_below  whether the rows are those of the outputs `below`
     """
 
@@ -232,7 +232,8 @@ class ThinView:
         T = M_ll^-1 M_lc        V = (M_cc - sum over limbs of M_cl T)^-1
         Y = -M_ll^-1 D_l        E = D_c - sum over limbs of T^T D_l
 
-    The code here computes the rows X_c = -V E of the core, and then the rows X_l = Y - T X_c of each limb.
+    The code here computes the rows X_c = -V E of the core, unless earlier code did, and then the rows X_l = Y - T X_c of
+    each limb.
 
     outputs  names of the output matrices X; at first, their rows of limbs contain Y
     rights   for each output, the name of the array E
@@ -240,9 +241,11 @@ class ThinView:
     n        number of columns of an output
     places   for each row of the core, the index of its first entry in an output
     begins   for each row of the core, the index of its first entry in E
-    rows     for each row of the core, C text of the row's entry of V E
+    rows     for each row of the core, C text of the row's entry of V E; () if earlier code computed X_c
     groups   for each group of equal limbs, the code of the limbs' rows
     below    for each output, the name of the output matrix with the rows of contacts on limbs; () if there are none
+    reread   names of the arrays T that are read from memory; () if there is one output. The compiler would otherwise take
+             each entry from a vector register, where it lies from its computation, with more instructions
     """
 
     outputs: tuple[str, ...]
@@ -254,32 +257,35 @@ class ThinView:
     rows: tuple[str, ...]
     groups: tuple[SharesView, ...]
     below: tuple[str, ...]
+    reread: tuple[str, ...]
 
 
 def _thin_view(products: ThinProducts) -> ThinView:
     n, wide = products.n, len(products.core)
     return ThinView(
         products.outputs,
-        tuple(map(products.right, products.outputs)),
+        () if products.is_solved else tuple(map(products.right, products.outputs)),
         products.known,
         n,
         tuple(row * n for row in products.core),
         tuple(row * n for row in range(wide)),
         tuple(
-            " + ".join(f"{INVERSE}[{row * wide + k}] * right_{k}" for k in range(wide)) for row in range(wide)
+            " + ".join(f"{INVERSE}[{row * wide + k}] * right_{k}" for k in range(wide))
+            for row in range(0 if products.is_solved else wide)
         ),
         tuple(
             SharesView(
                 group.vector,
                 len(group.carriers),
                 tuple(row * n for row in group.rows),
-                " + ".join(f"share[{k}] * new_{number}" for k, number in enumerate(group.carriers)),
+                " - ".join(f"share[{k}] * new_{number}" for k, number in enumerate(group.carriers)),
                 group.is_below,
             )
             for group in products.groups
             if group.carriers
         ),
         products.below,
+        tuple(group.vector for group in products.groups if group.carriers and len(products.outputs) > 1),
     )
 
 
@@ -383,6 +389,12 @@ def _stage(stage: Stage, group: LimbGroup | None, suffix: str) -> StageView:
 
 
 def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
-    for slot, _ in stage.program.outputs:
-        if slot.vector == group.partial:
-            yield f"{group.sum}[{slot.index}] = limbs{group.count}_sum({slot})"
+    left = sorted(slot.index for slot, _ in stage.program.outputs if slot.vector == group.partial)
+    name, sums, partials = f"limbs{group.count}_sum", group.sum, group.partial
+    while left:
+        if group.count % FOUR == 0 and left[:FOUR] == list(range(left[0], left[0] + FOUR)):
+            yield f"{name}s({partials} + {left[0]}, {sums} + {left[0]})"
+            left = left[FOUR:]
+        else:
+            yield f"{sums}[{left[0]}] = {name}({partials}[{left[0]}])"
+            left = left[1:]

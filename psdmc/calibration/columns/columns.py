@@ -58,10 +58,10 @@ def rubbing(terms: Sequence[tuple[int, Term]], chain: Mechanism) -> Rubbing:
     terms  terms of friction laws, such as Coulomb friction, each with the index of its joint
     """
     unknowns = [
-        Unknown(chain.joint_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
+        Unknown(chain.v_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
         for joint, term in terms
         for name, unit, value in zip(
-            term.names, term.units(chain.joints[joint].type.effort_unit), term.law.values, strict=True
+            term.names, term.units(chain.leading_joints[joint].type.effort_unit), term.law.values, strict=True
         )
     ]
     return Rubbing(tuple(terms), tuple(unknowns))
@@ -262,12 +262,10 @@ def _with_offsets(
     key = OPTIONAL.name
     said = content.get(key)
     if said is True and not offsets:
-        return {**content, key: list(chain.joint_names)}
+        return {**content, key: list(chain.v_names)}
     instead = [content[name] for name, law in laws.items() if law.instead == key and content.get(name)]
     instead = [value for value in instead if isinstance(value, bool | list)]
     if said is not None or not offsets or not instead:
         return dict(content)
-    lacking = [
-        name for value in instead for name in (chain.joint_names if isinstance(value, bool) else value)
-    ]
-    return {**content, key: [name for name in chain.joint_names if name not in lacking]}
+    lacking = [name for value in instead for name in (chain.v_names if isinstance(value, bool) else value)]
+    return {**content, key: [name for name in chain.v_names if name not in lacking]}

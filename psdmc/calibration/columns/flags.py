@@ -22,11 +22,11 @@ def joint_of(table: TomlTable, chain: Mechanism) -> int:
     """Return the index of the joint that the key `joint` names. If the robot has no such joint, a text is added to the
     list of faults, and 0 is returned."""
     name = table.text("joint")
-    if name in chain.joint_names:
-        return chain.joint_names.index(name)
+    if name in chain.v_names:
+        return chain.v_names.index(name)
     if name:
         table.faults.append(
-            f"{table.where}: joint {quoted(name)} is not the robot's, it has {listed(chain.joint_names)}"
+            f"{table.where}: joint {quoted(name)} is not the robot's, it has {listed(chain.v_names)}"
         )
     return 0
 
@@ -35,13 +35,11 @@ def joints_of(value: object, where: str, chain: Mechanism, faults: list[str]) ->
     """Return the indices of the joints that a value of a log description selects. The value true selects all joints,
     false none, and a list selects joints by name. A text is added to `faults` if the value is wrong."""
     if isinstance(value, bool):
-        return tuple(range(len(chain))) if value else ()
+        return tuple(range(chain.nv)) if value else ()
     if not isinstance(value, list) or any(not isinstance(name, str) for name in value):
         faults.append(f"{where}: found {shown(value)}, expected true, false, or a list of joint names")
         return ()
-    odd = [quoted(name) for name in value if name not in chain.joint_names]
+    odd = [quoted(name) for name in value if name not in chain.v_names]
     if odd:
-        faults.append(
-            f"{where}: joint(s) {listed(odd)} are not the robot's, it has {listed(chain.joint_names)}"
-        )
-    return tuple(k for k, name in enumerate(chain.joint_names) if name in value)
+        faults.append(f"{where}: joint(s) {listed(odd)} are not the robot's, it has {listed(chain.v_names)}")
+    return tuple(k for k, name in enumerate(chain.v_names) if name in value)

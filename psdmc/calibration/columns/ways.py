@@ -140,16 +140,16 @@ def jointed_way(table: TomlTable, chain: Mechanism) -> Way:
     given = value if isinstance(value, dict) else {}
     if not given:
         table.faults.append(f"{table.where}: joints: expected a table such as {{ J2 = 0.05, J3 = -0.05 }}")
-    ratios = np.zeros(len(chain))
+    ratios = np.zeros(chain.nv)
     for name, ratio in given.items():
-        if name not in chain.joint_names:
+        if name not in chain.v_names:
             table.faults.append(
-                f"{table.where}: joint {quoted(name)} is not the robot's, it has {listed(chain.joint_names)}"
+                f"{table.where}: joint {quoted(name)} is not the robot's, it has {listed(chain.v_names)}"
             )
         elif not is_number(ratio) or not 0.0 < abs(ratio) <= LARGEST_RATIO:
             table.faults.append(f"{table.where}: joints: {quoted(name)}: expected a number, not zero")
         else:
-            ratios[chain.joint_names.index(name)] = float(ratio)
+            ratios[chain.v_names.index(name)] = float(ratio)
     return AlongJoints(ratios, "m")
 
 
@@ -157,7 +157,7 @@ def poses(chain: Mechanism) -> Array:
     """Return random joint positions (STATES, n joints) within the limits of the joints. Positions do not exceed plus or
     minus half a revolution (half a metre)."""
     rng = np.random.default_rng(SEED)
-    wide = np.array([np.pi if joint.type.position_unit == "rad" else 0.5 for joint in chain.joints])
-    lower = np.maximum([joint.limits.lower for joint in chain.joints], -wide)
-    upper = np.minimum([joint.limits.upper for joint in chain.joints], wide)
-    return np.asarray(rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (STATES, len(chain))))
+    wide = np.array([np.pi if joint.type.position_unit == "rad" else 0.5 for joint in chain.leading_joints])
+    lower = np.maximum([joint.limits.lower for joint in chain.leading_joints], -wide)
+    upper = np.minimum([joint.limits.upper for joint in chain.leading_joints], wide)
+    return np.asarray(rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (STATES, chain.nv)))

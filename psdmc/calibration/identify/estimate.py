@@ -177,7 +177,7 @@ def base_parameter_scale(chain: Mechanism, model: Regressor, sizes: Array, theta
     theta_b  (l,) base parameters of the robot file, which are plausible sizes, too; None: the file gives none
     """
     rng = np.random.default_rng(SEED)
-    n = len(chain)
+    n = chain.nv
     q = rng.uniform(-np.pi, np.pi, (STATES, n))
     qd = rng.uniform(-ORDINARY_SPEED, ORDINARY_SPEED, (STATES, n))
     qdd = rng.uniform(-ORDINARY_ACCELERATION, ORDINARY_ACCELERATION, (STATES, n))

@@ -83,7 +83,7 @@ def prepared_runs(
 ) -> dict[str, JointRun]:
     """Return the friction runs (recordings in which one joint moves) by joint, in the order of the robot's joints. Each
     has its gravity torque, which is computed from the base parameters theta_b."""
-    places = {name: k for k, name in enumerate(robot.chain.joint_names)}
+    places = {name: k for k, name in enumerate(robot.chain.v_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
     return {run.joint: prepared(robot, theta_b, run, places[run.joint], options) for run in own}
 

@@ -97,7 +97,7 @@ def calibrate_inertial(
     target = rows.torque - static - rows.friction
     out = held_out(len(target), options.split)
     consider = _considered(robot.motors, gravity, friction, rows)
-    kept = np.repeat(~out[:, None], len(robot.chain), axis=1)
+    kept = np.repeat(~out[:, None], robot.chain.nv, axis=1)
     scale = base_parameter_scale(robot.chain, robot.regressor, torque_sizes(rows.torque), file_theta)
     start = np.zeros(len(split.rest)) if file_theta is None else file_theta[split.rest]
     prior = Prior(start, scale[split.rest], rows.noise @ split.from_psi())
@@ -111,7 +111,7 @@ def calibrate_inertial(
         estimate=solved,
         unseen=np.hstack([by_phi @ _believable(gravity.estimate), by_psi @ _believable(solved)]),
         scale=scale,
-        warnings=noise_warnings("inertial", robot.chain.joint_names, solved),
+        warnings=noise_warnings("inertial", robot.chain.v_names, solved),
     )
 
 
@@ -131,7 +131,7 @@ def judge_inertial(
     static = rows.columns @ still + rows.known + rows.friction
     moving = rows.columns @ (theta_b - still)
     out = held_out(len(rows.time), options.split)
-    names = robot.chain.joint_names
+    names = robot.chain.v_names
     return (
         judged("Inertial", names, rows.time, rows.torque - static, moving, out),
         judged("All", names, rows.time, rows.torque, static + moving, out),
@@ -162,7 +162,7 @@ def _rows(
     )
     rubbed = np.zeros_like(states.q)
     slopes: list[Array] = []
-    for k, name in enumerate(robot.chain.joint_names):
+    for k, name in enumerate(robot.chain.v_names):
         if name in friction.joints:
             rubbed[:, k] = friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
             if sensitive:
@@ -175,7 +175,7 @@ def _rows(
         columns=columns,
         noise=by_noise,
         friction=late(rubbed),
-        friction_columns=np.stack(slopes, axis=-1) if slopes else np.zeros((len(at), len(robot.chain), 0)),
+        friction_columns=np.stack(slopes, axis=-1) if slopes else np.zeros((len(at), robot.chain.nv, 0)),
     )
 
 

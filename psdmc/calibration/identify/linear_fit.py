@@ -56,7 +56,7 @@ class LinearResult:
     @property
     def samples(self) -> int:
         """Return the number of fitted samples that count as independent, summed over all joints."""
-        return int((~self.problem.held_out).sum()) * len(self.problem.chain)
+        return int((~self.problem.held_out).sum()) * self.problem.chain.nv
 
     @property
     def theta_b(self) -> Array:
@@ -73,7 +73,7 @@ class LinearResult:
     @property
     def friction(self) -> Array:
         """Return the friction values (n joints, f values of each joint), in the order of `problem.friction`."""
-        start, n = self.problem.l, len(self.problem.chain)
+        start, n = self.problem.l, self.problem.chain.nv
         return self.estimate.values[start : self.problem.first_extra].reshape(n, -1)
 
     @property
@@ -101,7 +101,7 @@ def calibrate_linear(
     progress  function that is called with the share of the logs that has been read
     """
     options = options or LinearOptions()
-    motors = motors or Motors.torques(len(chain))
+    motors = motors or Motors.torques(chain.nv)
     checked_logs = [checked(log, chain, options.filter.cutoff, options.check) for log in logs]
     remarks = tuple(note for log in checked_logs for note in log.notes)
 
@@ -130,11 +130,11 @@ def _solved(
     problem: LinearProblem, prior: Prior, motors: Motors, options: FitOptions, remarks: tuple[str, ...]
 ) -> LinearResult:
     """The values that fit a problem's rows best, and what was remarked on the way."""
-    kept = np.repeat(~problem.held_out[:, None], len(problem.chain), axis=1)
+    kept = np.repeat(~problem.held_out[:, None], problem.chain.nv, axis=1)
     uncertain = motors.relative_covariance
     rows = problem.rows if uncertain is None else RowsByMotors(problem.rows, problem.torque)
     solved = estimate_rows(rows, problem.torque, options, uncertain, kept, prior)
-    noisy = noise_warnings("linear fit", problem.chain.joint_names, solved)
+    noisy = noise_warnings("linear fit", problem.chain.v_names, solved)
     return LinearResult(solved, problem, prior, motors, (*remarks, *noisy))
 
 
@@ -148,7 +148,7 @@ def linear_prior(
     rigid = base_parameter_scale(chain, model, sizes, theta_b)
     own = np.repeat(sizes, len(problem.friction))
     extra = extra_scale(chain, options.columns, options.sign_speed, sizes)
-    plain = [value.start for term in problem.terms for value in term.law.values] * len(chain)
+    plain = [value.start for term in problem.terms for value in term.law.values] * chain.nv
     rigid_part = np.zeros(problem.l) if theta_b is None else theta_b
     values = np.concatenate([rigid_part, np.array(plain), options.columns.start])
     return Prior(values, np.concatenate([rigid, own, extra]))

@@ -60,17 +60,17 @@ class LinearProblem:
     @property
     def plain(self) -> tuple[tuple[str, str], ...]:
         """Return the joint and the name of each value of plain friction, joint by joint."""
-        return tuple((joint, name) for joint in self.chain.joint_names for name in self.friction)
+        return tuple((joint, name) for joint in self.chain.v_names for name in self.friction)
 
     @property
     def first_extra(self) -> int:
-        return self.l + len(self.chain) * len(self.friction)
+        return self.l + self.chain.nv * len(self.friction)
 
     @property
     def never_negative(self) -> NDArray[np.bool_]:
         """Return, for each unknown, whether it may not be negative. Friction coefficients may not, because friction
         only dissipates energy. The order is base parameters, plain friction, springs and further friction."""
-        own = [value.low >= 0.0 for term in self.terms for value in term.law.values] * len(self.chain)
+        own = [value.low >= 0.0 for term in self.terms for value in term.law.values] * self.chain.nv
         return np.concatenate([np.zeros(self.l, dtype=bool), np.array(own), self.columns.never_negative])
 
     @property
@@ -113,8 +113,8 @@ def linear_problem(
     carried  (l,) base parameters from which the torque on the joints is computed, if friction depends on this torque
     """
     terms = options.terms
-    width = l + len(chain) * len(names_of(terms)) + len(options.columns)
-    rows = KeptRows(len(chain), width, options.held_bytes)
+    width = l + chain.nv * len(names_of(terms)) + len(options.columns)
+    rows = KeptRows(chain.nv, width, options.held_bytes)
     torques, outs, remarks = [], [], []
     for log in logs:
         count = 0

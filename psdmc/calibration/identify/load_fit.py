@@ -110,12 +110,12 @@ def fit_load(
     blocks = _considering(problem, known[:, :, used])
     sizes = torque_sizes(problem.torque[~problem.held_out])
     width = len(problem.friction)
-    own = np.zeros((len(chain), width)) if friction is None else friction
+    own = np.zeros((chain.nv, width)) if friction is None else friction
     prior = Prior(
         np.concatenate([np.zeros(LOAD), own.reshape(-1)]),
         np.concatenate([base_parameter_scale(chain, load, sizes, None), np.repeat(sizes, width)]),
     )
-    kept = np.repeat(~problem.held_out[:, None], len(chain), axis=1)
+    kept = np.repeat(~problem.held_out[:, None], chain.nv, axis=1)
     covariance = np.diag(theta_std[used] ** 2) if len(used) else None
     solved = estimate_rows(blocks, problem.torque - rigid, options.fit, covariance, kept, prior)
     return LoadFit(solved, problem, rigid, prior)

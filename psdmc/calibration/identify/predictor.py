@@ -35,7 +35,7 @@ class ChainRegressor:
         self._frames = frames_of(chain)
         self._link_frames = [joint.link_frame for joint in chain.joints]
         self._base = base_acceleration(chain)
-        self._shape = (len(chain), model.l)
+        self._shape = (chain.nv, model.l)
         self._expand = expansion(model)
         self._wanted = [int(k) for k in np.flatnonzero(np.abs(self._expand).any(axis=1))]
 
@@ -88,7 +88,7 @@ def payload_torque(chain: Mechanism, q: Array, mass: float, com: tuple[float, fl
     com   m, centre of mass in the tip frame
     """
     frames = frames_of(chain)
-    states = [q[:, k] for k in range(len(chain))]
+    states = [q[:, k] for k in range(chain.nv)]
     rotation, _ = frame_placement(frames, chain.tip_body, chain.tip, states)
     arm = [sum(rotation[r][c] * com[c] for c in range(3)) for r in range(3)]
     weight = (mass * chain.gravity).tolist()

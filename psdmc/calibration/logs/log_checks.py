@@ -96,7 +96,7 @@ def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions
         raise InputError(
             f"{log.name}: too short: {len(log)} row(s)", f"at least {options.shortest:g} s are needed"
         )
-    log = log.ordered(chain.joint_names)
+    log = log.ordered(chain.v_names)
     of = Looked(log, surveyed(log, options.saturated_share), chain, cutoff, options)
     for stage in _FAULTS:
         found = [check(of) for check in stage]
@@ -194,7 +194,7 @@ def _gaps_and_length(of: Looked, steps: Array) -> Iterator[Fault]:
 
 def _units(of: Looked) -> Iterator[Fault]:
     """Faults of columns in rad for joints that slide, or in m for joints that turn."""
-    for joint in of.chain.joints if of.log.sliding is not None else ():
+    for joint in of.chain.leading_joints if of.log.sliding is not None else ():
         found, right = ("m" if joint.name in (of.log.sliding or ()) else "rad"), joint.type.position_unit
         if found != right:
             yield Fault(
@@ -204,7 +204,7 @@ def _units(of: Looked) -> Iterator[Fault]:
 
 
 def _positions(of: Looked) -> Iterator[Fault]:
-    for joint, reach in zip(of.chain.joints, of.survey.reach.tolist(), strict=True):
+    for joint, reach in zip(of.chain.leading_joints, of.survey.reach.tolist(), strict=True):
         bound = max(abs(joint.limits.lower), abs(joint.limits.upper))
         bound = _allowed(bound, of.options.free_position, of.options)
         if not reach > bound:
@@ -225,7 +225,7 @@ def _allowed(limit: float, free: float, options: CheckOptions) -> float:
 
 
 def _speeds(of: Looked) -> Iterator[Fault]:
-    for joint, speed in zip(of.chain.joints, of.survey.speed.tolist(), strict=True):
+    for joint, speed in zip(of.chain.leading_joints, of.survey.speed.tolist(), strict=True):
         bound = _allowed(joint.limits.speed, of.options.free_speed, of.options)
         if speed > bound:
             yield Fault(

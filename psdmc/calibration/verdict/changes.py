@@ -112,7 +112,7 @@ class Changes:
     def __init__(self, found: Delivered, fit: LinearResult, rows: PredictedRows) -> None:
         problem = fit.problem
         self.found, self.fit, self.rows = found, fit, rows
-        use = np.repeat(~problem.held_out[:, None], len(problem.chain), axis=1)
+        use = np.repeat(~problem.held_out[:, None], problem.chain.nv, axis=1)
         prior = replace(fit.prior, values=np.zeros_like(fit.prior.values))
         residual = rows.measured - rows.predicted
         options = found.linear.fit

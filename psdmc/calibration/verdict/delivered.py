@@ -94,7 +94,7 @@ class Delivered:
     @property
     def motors(self) -> Motors:
         """The motors, which convert logged effort to torque."""
-        names = self.model.joint_names
+        names = self.model.v_names
         constants = (
             np.array([self.constants[name] for name in names]) if self.constants else np.ones(len(names))
         )
@@ -190,7 +190,7 @@ def delivered_quality(
 def _read(found: Delivered, given: Sequence[AnyLog | str | Path]) -> Sequence[AnyLog] | Runs:
     """What was given, with paths read."""
     paths = [Path(each) for each in given if isinstance(each, str | Path)]
-    names, law = found.model.joint_names, found.prediction
+    names, law = found.model.v_names, found.prediction
     campaign = campaign_of(paths) if paths else None
     if campaign is not None:
         return read_campaign(campaign, names)
@@ -231,7 +231,7 @@ def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) 
     out = np.concatenate(
         [held_out_of(log, len(part.time), step.split) for log, part in zip(logs, parts, strict=True)]
     )
-    return judged("All", chain.joint_names, time, measured, predicted, out)
+    return judged("All", chain.v_names, time, measured, predicted, out)
 
 
 def predicted_rows(
@@ -270,7 +270,7 @@ def linear_torque(found: Delivered, q: Array, qd: Array, qdd: Array) -> Array:
     terms = friction_columns(law.terms, speed, law.sign_speed)
     extra = found.columns.values(motion_of(q, qd, law.sign_speed, rigid, coupling)) @ found.extra
     for name, term in zip(names_of(law.terms), terms, strict=True):
-        torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
+        torque = term * np.array([found.friction[joint, name] for joint in found.model.v_names])
         rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
     return np.asarray(rigid + extra)
 
@@ -282,7 +282,7 @@ def _torque_with_state(
     model = found.model
     motion = [states.q, states.qd, states.qdd]
     torque = recursive.torques(model.mechanism, model.equivalent_parameters(), motion)
-    for k, name in enumerate(model.joint_names):
+    for k, name in enumerate(model.v_names):
         if name in friction.joints:
             torque[:, k] += friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
     return Late(states, friction.delay, at)(torque)

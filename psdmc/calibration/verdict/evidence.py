@@ -179,14 +179,16 @@ def evidence_of(
     motors   factors from logged effort to torque
     springs  function from the states of a log and row indices to the springs' torques (rows, n); None: no springs
     """
-    most = max(1, MOST_SHIFTED // model.n // len(motions))
+    most = max(1, MOST_SHIFTED // model.nv // len(motions))
     parts = [_samples(model, motion, motors, options, coupling, springs, most) for motion in motions]
     q, qd, qdd, sign, torque = (np.concatenate(x) for x in zip(*(part[:5] for part in parts), strict=True))
     noise = np.sqrt(np.mean([part[5] ** 2 for part in parts], axis=0))
     shifted = tuple(part[6] for part in parts)
     share = CheckOptions().saturated_share
-    logs = [motion.log.ordered(model.joint_names) for motion in motions]
-    units = dict(zip(model.joint_names, (j.type.effort_unit for j in model.mechanism.joints), strict=True))
+    logs = [motion.log.ordered(model.v_names) for motion in motions]
+    units = dict(
+        zip(model.v_names, (j.type.effort_unit for j in model.mechanism.leading_joints), strict=True)
+    )
     piled = tuple(
         found
         if coupling is not None
@@ -217,14 +219,14 @@ def _samples(
     """For one motion: q, qd, qdd, sign and torque of its samples, the RMS noise that passes the filter if noise has the
     same density below the cut-off as above, and at most about so many samples with torques of other times."""
     log = checked(motion.log, model.mechanism, options.cutoff)
-    parts, above, count = [], np.zeros(model.n), 0
+    parts, above, count = [], np.zeros(model.nv), 0
     lags, moved = delays_tried(options.cutoff), []
     every = max(1, round(2.0 * options.cutoff * log.duration / most))
     for stretch in stretches(log, options):
         states, at = stretch.states, stretch.at
         speed = states.qd if coupling is None else coupling.to_motors(states.qd)
         sign = states.low_pass(np.tanh(speed / SIGN_SPEED))
-        other = np.zeros((len(at), model.n))
+        other = np.zeros((len(at), model.nv))
         if motion.tool is not None:
             other = other + payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)
         if springs is not None:

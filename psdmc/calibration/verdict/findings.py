@@ -86,7 +86,7 @@ class Findings:
         return np.asarray((self.speed >= self.limits.hardly) & (self.variation > 0))[:, None]
 
     def unit(self, k: int) -> str:
-        return self.evidence.model.mechanism.joints[k].type.effort_unit
+        return self.evidence.model.mechanism.leading_joints[k].type.effort_unit
 
     def gained(self, joints: Sequence[int]) -> list[dict[str, Any]]:
         """Return names, gains and standard deviations of some joints, as a verdict's reason or doubt lists them.

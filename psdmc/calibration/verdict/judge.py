@@ -303,7 +303,7 @@ def _odd_gains(found: Findings) -> Iterator[Ground]:
 
 def _unlike_limits(found: Findings) -> Iterator[Ground]:
     """Torques that are far below the file's limits for the motors, or several times as large."""
-    limits = np.array([joint.limits.effort for joint in found.evidence.model.mechanism.joints])
+    limits = np.array([joint.limits.effort for joint in found.evidence.model.mechanism.leading_joints])
     known = np.isfinite(limits) & (limits > 0)
     if not known.any():
         return

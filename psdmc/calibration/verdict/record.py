@@ -167,7 +167,7 @@ def four_step_record(
         Calibration(
             robot=model.mechanism.name,
             method="four steps",
-            joint_names=model.joint_names,
+            joint_names=model.v_names,
             model=model,
             parameters=_parameter_rows(model, theta_b, inertial.std, groups, seen),
             motors=_motor_rows(model, found.motors, found.motor),
@@ -187,9 +187,9 @@ def four_step_record(
 
 def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
     """The seven per joint; the uncertainty of forces includes the torque constant's."""
-    relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
+    relative = dict(zip(model.v_names, found.motors.relative_std.tolist(), strict=True))
     rows: list[NumberRow] = []
-    joints = {joint.name: joint for joint in model.mechanism.joints}
+    joints = {joint.name: joint for joint in model.mechanism.leading_joints}
     units = Term(STATE_LAW).units()
     for name, joint in found.friction.joints.items():
         values = zip(STATE_LAW.parameters, joint.friction.tolist(), joint.std.tolist(), units, strict=True)
@@ -236,7 +236,7 @@ def linear_record(
             owner, name, float(values[k]), float(std[k]), unit, is_seen, word, parameters_of(name)
         )
 
-    joints = {joint.name: joint for joint in model.mechanism.joints}
+    joints = {joint.name: joint for joint in model.mechanism.leading_joints}
     turning = {
         name: unit for term in problem.terms for name, unit in zip(term.names, term.units(), strict=True)
     }
@@ -252,7 +252,7 @@ def linear_record(
         Calibration(
             robot=model.mechanism.name,
             method="linear fit",
-            joint_names=model.joint_names,
+            joint_names=model.v_names,
             model=model,
             parameters=_parameter_rows(model, values, solved.std, ["all"] * model.l, seen),
             motors=_motor_rows(model, found.motors, None),
@@ -339,7 +339,7 @@ def _unit_of(joint: Joint, turning: str) -> str:
 
 def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
     """Values (n,) by their joints' names."""
-    return dict(zip(model.joint_names, values.tolist(), strict=True))
+    return dict(zip(model.v_names, values.tolist(), strict=True))
 
 
 def _parameter_rows(
@@ -369,7 +369,7 @@ def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) 
     if step is None and np.all(constants == 1.0):
         return ()
     seen = relative > 0.0 if step is None else step.identified
-    own = zip(model.mechanism.joints, constants, relative, seen, strict=True)
+    own = zip(model.mechanism.leading_joints, constants, relative, seen, strict=True)
     return tuple(
         NumberRow(
             joint.name,

@@ -107,7 +107,7 @@ def suspect(evidence: Evidence, positions: bool = True) -> Ground | None:
     readings = list({tuple(one.reading.values()): one.reading for one in alike}.values())
     named = readings if len(readings) <= MOST_NAMED else readings[:1]
     explained, logged = (max(one.score, 0.0) / evidence.n for one in (best, stated))
-    values = {"joints": evidence.model.joint_names, "readings": named}
+    values = {"joints": evidence.model.v_names, "readings": named}
     return Ground("columns", {**values, "explained": explained, "logged": logged})
 
 

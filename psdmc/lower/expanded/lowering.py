@@ -78,7 +78,7 @@ def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool, noise: float
     """Candidate diagrams. Baked parameters enter in one of two ways: as rows that become constants afterwards (equal
     parts are then found whatever the parameters' values are, and constants stand innermost), or in the coefficients
     at once."""
-    n = model.n
+    n = model.nv
     if part is Polynomials.REGRESSOR:
         yield from _in_all_orders(with_gravity(regressor_terms(model, noise), model.mechanism), tip_first(n))
         return
@@ -124,7 +124,7 @@ def _traced(model: DynamicsModel, recipe: Recipe, theta: bool, diagram: Diagram,
 
 
 def _outputs(tracer: Tracer, model: DynamicsModel, recipe: Recipe, values: dict[int, Scalar]) -> Outputs:
-    n, signature = model.n, recipe.signature
+    n, signature = model.nv, recipe.signature
     output = signature.outputs[0]
     if recipe.polynomials is Polynomials.MASS:
         return _vector(output.name, [entry for row in _symmetric(values, n) for entry in row])
@@ -194,11 +194,11 @@ def _by_block(joints: Sequence[int], blocks: Sequence[int], n: int) -> Order:
 def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
     """Return a symbol for each variable of the polynomials: q, sin q, cos q, qd, qdd of all joints, then theta_b if
     `theta`. The symbols record operations."""
-    n = model.n
+    n = model.nv
     q = tracer.symbols("q", n)
     sincos = [
         value.sincos() if joint.basis.has_sincos else (0.0, 0.0)
-        for value, joint in zip(q, model.mechanism.types, strict=True)
+        for value, joint in zip(q, model.mechanism.own_types, strict=True)
     ]
     rates = [*tracer.symbols("qd", n), *tracer.symbols("qdd", n)]
     parameters = tracer.symbols("theta_b", model.l) if theta else []

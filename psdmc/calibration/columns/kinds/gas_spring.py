@@ -21,7 +21,7 @@ def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
     name, way = table.text("name"), anchored_way(table, chain)
     if table.faults:
         return ()
-    at_zero = float(way.length(np.zeros((1, len(chain))))[0][0])
+    at_zero = float(way.length(np.zeros((1, chain.nv)))[0][0])
     reference = table.number("length", 0.0, LONGEST, at_zero)
     unknowns, laws = [Unknown(name, "force", "N"), Unknown(name, "rate", "N/m")], [push, stretch]
     if flag(table, "friction"):

@@ -27,7 +27,7 @@ def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
     if table.faults:
         return ()
     unknowns, laws = [Unknown(name, "stiffness", "N/m")], [stretch]
-    at_zero = float(way.length(np.zeros((1, len(chain))))[0][0])
+    at_zero = float(way.length(np.zeros((1, chain.nv)))[0][0])
     if not along and not table.has("rest"):
         unknowns.insert(0, Unknown(name, "force", "N", never_negative=False))
         laws.insert(0, pull)

@@ -21,9 +21,9 @@ def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
     joint = joint_of(table, chain)
     if table.faults:
         return ()
-    own = chain.joints[joint].type
+    own = chain.leading_joints[joint].type
     unit = f"{own.effort_unit.replace(' ', '')}/{own.position_unit}"
-    way = AlongJoints(np.eye(len(chain))[joint], own.position_unit)
+    way = AlongJoints(np.eye(chain.nv)[joint], own.position_unit)
     return (Spring((Unknown(name, "stiffness", unit),), (stretch,), way, rest),)
 
 
