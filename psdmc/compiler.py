@@ -201,9 +201,9 @@ def emit_c(
     smoothing_speed  for friction="in-dynamics": friction contains a smooth function, tanh(v / smoothing_speed), instead
                of the sign of a joint's speed v. The unit is rad/s, or m/s for sliding joints. None: the value of the
                calibration, usually 0.03
-    gravity_input  True: functions whose results depend on gravity get gravity as an input, for a robot whose base tilts: 3
-               numbers for each state, m/s^2 along the axes of the base frame (with a floating base: the world frame).
-               The model must be derived with `gravity_input=True`, unless its base parameters are the same
+    gravity_input  True: functions whose results depend on gravity get it as an input. This is for a robot whose base tilts.
+               Gravity has 3 numbers for each state, m/s^2 along the axes of the base frame, or of the world frame if the
+               base is floating. The model must be derived with `gravity_input=True`, unless its base parameters are the same
 
     Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises InputError also
     if the model assumes that parameters are zero (`assume_zero` of `derive`) and `payload` or `bodies` would change them.

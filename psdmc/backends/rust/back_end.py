@@ -55,7 +55,6 @@ BACK_END = BackEnd(
         "friction",
         "bodies",
         "estimator",
-        "gravity-input",
         "with",
         "functions NAME_theta_rows",
     ),
