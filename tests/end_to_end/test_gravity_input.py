@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -272,7 +274,7 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model, package = tmp_path / "arm.npz", tmp_path / "c"
     assert not commanded("derive", robot_path("scara"), "-o", model, "--gravity-input")
     assert not commanded("check", model)
-    names = "inverse_dynamics,inverse_dynamics_theta_rows,mass_matrix,regressor_packed,rk4_step_derivatives"
+    names = "gravity,inverse_dynamics,inverse_dynamics_theta_rows,mass_matrix,regressor_packed,rk4_step_derivatives"
     words = ("emit-c", model, "-o", package, "--gravity-input", "--functions", names)
     assert not commanded(*words)
     header = (package / "include" / "scara" / "scara.h").read_text(encoding="utf-8")
@@ -280,6 +282,9 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "const double *gravity, const double *theta_b, double *tau);" in header
     assert "read it from the input gravity[3], m/s^2 in this frame" in header
     build_package(package)
+    if shutil.which("c++"):  # a method has the name of its argument
+        command = ["c++", "-std=c++17", "-fsyntax-only", "-x", "c++", f"-I{package / 'include'}"]
+        subprocess.run([*command, package / "include" / "scara" / "scara.hpp"], check=True)
     capsys.readouterr()
     assert not commanded("emit-c", model, "-o", package, "--check")
     assert "up to date" in capsys.readouterr().out
