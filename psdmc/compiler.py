@@ -186,7 +186,7 @@ def emit_c(
                "freestanding": without libm; "libm": always with libm; None: the method of the target
     name       name of the robot in C, with which all symbols begin; None: the name of the model
     force      True: write even if the folder contains other files, or package files that you edited. psdmc overwrites
-               edited package files. It keeps other files, and renames one with the name of a package file to NAME.orig
+               edited package files. A file of yours with the name of a package file becomes NAME.orig. All others stay
     progress   function, such as print, that psdmc calls with the name of each stage
     payload    True: add the functions that change the base parameters theta_b to those of the robot with a load
     adapters   programs for which psdmc adds files to the package: "casadi", "wheel" (Python), "fmu", "fmu2" (FMI 2.0), "mex"

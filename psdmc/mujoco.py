@@ -181,8 +181,8 @@ class _Layout:
         return tuple(np.broadcast_to(x, (*lead, x.shape[-1])) for x in (q, rates))  # type: ignore[return-value]
 
     def turned(self, q: Array, rates: Array, back: bool) -> Array:
-        """Return joint rates at q. If the robot has a floating base, its linear velocity is rotated from the base's axes
-        to the world's axes; if `back` is true, from the world's axes to the base's axes."""
+        """Convert joint rates at q to or from MuJoCo's axes. The linear velocity of a floating base is rotated from the
+        base's axes to the world's axes; if `back` is true, from the world's axes to the base's axes."""
         if not self.free:
             return np.array(rates)
         quaternion = unit([q[..., k] for k in range(3, 7)])

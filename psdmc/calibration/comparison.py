@@ -35,6 +35,9 @@ def compare(
 ) -> Comparison:
     """Compare two models of one robot: base parameters, friction, torques, and errors on logs.
 
+    Returns an object with the differences. For example, its attributes are `parameters`, `friction`, `joints` (torques by
+    joint) and `on_log` (errors on logs).
+
     a                 a model, or the path of its file
     b                 another model of the robot, the path of its file, or the path of a robot file (URDF, MJCF, DH table)
     logs              logs on which psdmc tests both models; at least one of the models must then be calibrated

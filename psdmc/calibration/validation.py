@@ -184,9 +184,10 @@ def validate(
     and the attribute `named` lists the other changed parameters.
 
     model             a calibrated model, or the path of its file
-    logs              paths of logs, the path of a log description (TOML), or a campaign folder that `psdmc excite` wrote.
-                      Of a campaign, psdmc uses the logs of the validation runs. If there are none, psdmc uses the logs of
-                      the step "inertial" without a load. psdmc gives one verdict on all logs together
+    logs              paths of logs, the path of a log description (TOML), or a campaign folder (planned motions and their
+                      logs) that `psdmc excite` wrote. In a campaign folder, psdmc uses the logs of the motions that were
+                      planned for validation. If there are none, psdmc uses the logs of the exciting motions (sums of sines)
+                      without a load. psdmc gives one verdict on all logs together
     torque_constants  torque per current of each joint, for logs of motor currents: a dictionary from joint names to N m/A
                       at the joint (after the gear); None: those of the log description or of the model
     naming            names in the logs that differ from those of the model: psdmc.calibration.sources.LogNaming(topic,

@@ -30,6 +30,9 @@ RECIPES = {name: _FOUND[name] for name in SIGNATURES}
 OF_TREES = tuple(name for name, recipe in RECIPES.items() if recipe.needs not in (Needs.LOOPS, Needs.PASSIVE))
 """Names of the functions of robots without closed loops."""
 
+OF_FILE_MASSES = frozenset(name for name, recipe in RECIPES.items() if recipe.needs is Needs.STANDARD)
+"""Names of the functions that use the masses and inertias of the robot file. Base parameters do not suffice for them."""
+
 BY_ROWS = {f"{each.name}{THETA_ROWS}": by_rows(each) for each in SIGNATURES.values() if each.theta}
 """By name, the variants that read one theta_b per state, in the same order."""
 

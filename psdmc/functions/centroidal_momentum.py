@@ -19,7 +19,7 @@ MOMENTUM = Quantity(
     "h",
     ("6",),
     means="linear momentum (kg m/s), then angular momentum about the centre of mass (kg m^2/s), along the axes of the base "
-    "frame; drive inertias are not included",
+    "frame; drive inertias (motors and gears) are not included",
     unit="J s",
     powers=(-1,),
 )

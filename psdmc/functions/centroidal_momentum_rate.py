@@ -19,7 +19,7 @@ RATE = Quantity(
     "hdot",
     ("6",),
     means="rate of the linear momentum (N), then of the angular momentum about the centre of mass (N m), along the axes of "
-    "the base frame; drive inertias are not included",
+    "the base frame; drive inertias (motors and gears) are not included",
     unit="J",
     powers=(-1,),
 )

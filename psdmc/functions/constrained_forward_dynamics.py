@@ -66,8 +66,9 @@ FORCES = Quantity(
     powers=(-1,),
 )
 OF_LOOPS = (
-    "Then follow the forces (N) and moments (N m) that keep closed loops closed, if the robot has any. These are "
-    "loop_rows entries, along and about the axes of each loop's first frame"
+    "Then follow the forces (N) and moments (N m) that keep closed loops closed, if the robot has any. A closed loop "
+    "keeps two frames together, and has one entry for each direction of relative motion that it blocks. The entries are "
+    "along and about the axes of the loop's first frame"
 )
 
 
@@ -189,8 +190,8 @@ RECIPE = Recipe(
         (QDD, replace(FORCES, means=f"first the {FORCES.means}. {OF_LOOPS}")),
         theta=True,
         summary="Compute the joint accelerations and the contact forces that torques cause. By default, active "
-        "contacts do not accelerate. If you give kp, kd or mu, their acceleration is -kp * error - kd * J qd - mu "
-        "* forces, with the Jacobian J of the contacts.",
+        "contacts do not accelerate. If you give kp, kd or mu, active contacts have the acceleration -kp * error - "
+        "kd * J qd - mu * forces. J is the Jacobian of the contacts (`contact_jacobian`).",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "constrained forward dynamics",

@@ -52,7 +52,7 @@ RECIPE = FUNCTION.gradient(
     344,
     "qdd and forces of constrained_forward_dynamics, and the gradient of cotangent_qdd . qdd + cotangent_forces . forces "
     "by q, qd, tau and error",
-    "Compute the accelerations qdd and contact forces that torques cause. Also compute gradients, by q, qd, tau "
-    "and error, of their weighted sum. This is the sum of all entries of qdd and forces, multiplied by their "
-    "weights. The input `error` is the displacement of the contacts.",
+    "Compute the accelerations qdd and contact forces that torques cause. Also compute gradients of a weighted "
+    "sum by q, qd, tau and error. The weighted sum adds all cotangent_qdd[i] * qdd[i] and all "
+    "cotangent_forces[i] * forces[i]. The input `error` is the displacement of the contacts.",
 )

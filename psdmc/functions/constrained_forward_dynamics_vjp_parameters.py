@@ -37,9 +37,9 @@ RECIPE = with_parameter_gradient(
     345,
     "qdd and forces of constrained_forward_dynamics, and the gradient of cotangent_qdd . qdd + cotangent_forces . forces "
     "by q, qd, tau, error and theta_b",
-    "Compute the accelerations qdd and contact forces that torques cause. Also compute gradients, by q, qd, tau, "
-    "error and theta_b, of their weighted sum. This is the sum of all entries of qdd and forces, multiplied by "
-    "their weights. The input `error` is the displacement of the contacts.",
+    "Compute the accelerations qdd and contact forces that torques cause. Also compute gradients of a weighted "
+    "sum by q, qd, tau, error and theta_b. The weighted sum adds all cotangent_qdd[i] * qdd[i] "
+    "and all cotangent_forces[i] * forces[i]. The input `error` is the displacement of the contacts.",
     trace,
     reference,
     pinocchio,

@@ -170,7 +170,7 @@ RECIPE = Recipe(
         (
             Q_NEXT,
             QD_NEXT,
-            replace(FORCES, means=f"mean over the step of the {FORCES.means}"),
+            replace(FORCES, means=f"means over the step: {FORCES.means}"),
         ),
         theta=True,
         summary="Compute the state of a robot with contacts after one classical fourth-order Runge-Kutta step with "

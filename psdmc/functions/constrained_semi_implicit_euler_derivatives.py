@@ -44,7 +44,7 @@ OF_RATES, OF_FORCES = BLOCKS[:4], BLOCKS[4:]
 B_ERROR = Quantity(
     "B_error",
     ("nx", *ERROR.axes),
-    means="derivatives of the new state (q_next, qd_next) by error",
+    means="derivatives of the new state (q_next, qd_next) by error, with the rows of A",
     unit="1",
     powers=(1, *(-power for power in ERROR.powers)),
 )
@@ -117,10 +117,9 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B, B_ERROR, *OF_FORCES),
         theta=True,
-        summary="Compute the state after a semi-implicit Euler step with contacts. Also compute the contact "
-        "forces, and derivatives by q, qd, tau and error. The derivatives are those of the next state and of the "
-        "forces. The input `error` is the displacement of the contacts. The derivatives by q hold `error` "
-        "constant.",
+        summary="Compute the state after a semi-implicit Euler step with contacts, and the contact forces. Also "
+        "compute their derivatives by q, qd, tau and error. The input `error` is the displacement of the contacts. "
+        "The derivatives by q hold `error` constant.",
         factorises=STEP.signature.factorises,
         calls=(ACCELERATIONS.name, *ACCELERATIONS.signature.calls),
     ),

@@ -36,8 +36,8 @@ LINEAR = 3
 
 MU = replace(
     held.MU,
-    means="regularisation, 0 or more (not a friction coefficient): the weight of the squared contact forces (N; N "
-    "m) in the minimum",
+    means="regularisation, 0 or more (not a friction coefficient): the weight of |forces|^2 in the sum that psdmc "
+    "minimises, with forces in N and moments in N m",
     unit="1",
 )
 
@@ -125,17 +125,18 @@ RECIPE = Recipe(
         (
             replace(
                 TAU,
-                means=f"{TAU.means}; of a floating base, the first six entries are the part of the base's force and moment "
-                "that the active contacts cannot exert, zero within rounding if they can exert the whole and mu = 0",
+                means=f"{TAU.means}. If the robot has a floating base, tau[:6] is the force and moment that the base still "
+                "needs in addition to the contact forces. It is zero within rounding if mu = 0 and the active contacts can "
+                "exert all that the motion needs",
             ),
             FORCES,
         ),
         theta=True,
         summary="Compute the contact forces of a motion, and the joint torques tau = M qdd + h - J^T forces. M is "
         "the mass matrix, h the sum of the Coriolis, centrifugal and gravity torques, and J the Jacobian of the "
-        "contacts. Because no motor acts on a floating base, psdmc chooses the forces that minimise |tau[:6]|^2 + "
-        "mu |forces|^2. If this minimum has several solutions, psdmc returns the forces with the smallest norm. "
-        "Without a floating base, the forces are zero.",
+        "contacts. No motor acts on a floating base, so tau[:6], its part of tau, should be zero. psdmc chooses the "
+        "forces that minimise |tau[:6]|^2 + mu |forces|^2. If several forces give this minimum, psdmc returns "
+        "those with the smallest norm. Without a floating base, the forces are zero.",
         factorises=(MASK,),
     ),
     "inverse dynamics with contacts",

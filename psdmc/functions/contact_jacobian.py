@@ -49,7 +49,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of all contacts (places where the robot can touch the world). J qd are "
+        summary="Compute the Jacobian J of all contacts (links or frames that can touch the world). J qd are "
         "the velocities of the contacts along the axes of the base frame.",
     ),
     "contact Jacobian",

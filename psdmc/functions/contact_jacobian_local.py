@@ -44,7 +44,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian J of all contacts (places where the robot can touch the world) along each "
+        summary="Compute the Jacobian J of all contacts (links or frames that can touch the world) along each "
         "contact's own axes. J qd are the velocities of the contacts. If f are contact forces, J^T f are the "
         "joint torques that they cause.",
     ),

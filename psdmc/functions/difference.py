@@ -15,7 +15,7 @@ FROM, TO = (
         "q0",
         ("nq",),
         np.pi,
-        means="joint positions at the start, in the same form as q1",
+        means="joint positions at the start, rad or m; a ball joint or floating base has a unit quaternion (x, y, z, w)",
         unit="1",
         powers=(1,),
     ),
@@ -23,7 +23,7 @@ FROM, TO = (
         "q1",
         ("nq",),
         np.pi,
-        means="joint positions at the end",
+        means="joint positions at the end, in the same form as q0",
         unit="1",
         powers=(1,),
     ),
@@ -31,8 +31,9 @@ FROM, TO = (
 WAY = Quantity(
     "v",
     ("nv",),
-    means="displacement: q1 - q0 for joints with one coordinate; for a quaternion, the rotation vector (rad) "
-    "of the shorter rotation from q0 to q1, along the axes of the body at q0",
+    means="displacement: q1 - q0 for joints with one coordinate. For a ball joint, it is the rotation vector (rad) "
+    "of the shorter rotation from q0 to q1, along the axes of the body. For a floating base, it is the constant linear "
+    "and angular velocity along the base's own axes, times the time from q0 to q1",
     unit="1",
     powers=(1,),
 )

@@ -59,7 +59,7 @@ RECIPE = Recipe(
         OUTPUTS,
         theta=False,
         summary="Compute the derivatives by q, qd and qdd of the acceleration a of each named frame. a has three "
-        "linear entries, then three angular ones, along the axes of the base frame.",
+        "linear entries (of the frame's origin), then three angular ones, along the axes of the base frame.",
     ),
     "derivatives of frame accelerations",
     *on_both(values, INPUTS),

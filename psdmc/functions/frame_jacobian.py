@@ -41,8 +41,8 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("frames", "6", "nv"),
-                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j is for qd[j]",
+                means="three rows for the linear velocity of the frame's origin (m/s), three for the angular velocity "
+                "(rad/s); column j is for qd[j]",
                 unit="1",
                 powers=(0, 1, -1),
             ),

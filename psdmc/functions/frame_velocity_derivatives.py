@@ -56,8 +56,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the derivatives by q of the velocity v of each named frame. v has three linear entries, "
-        "then three angular ones, along the axes of the base frame.",
+        summary="Compute the derivatives by q of the velocity v of each named frame. v has three linear entries "
+        "(of the frame's origin), then three angular ones, along the axes of the base frame.",
     ),
     "derivatives of frame velocities",
     *on_both(values, INPUTS),

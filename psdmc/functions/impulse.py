@@ -38,8 +38,8 @@ RESTITUTION = Quantity(
     "restitution",
     largest=1.0,
     least=0.0,
-    means="coefficient of restitution, 0 to 1. If it is e, the velocity of active contacts after the impact is -e "
-    "times that before",
+    means="coefficient of restitution, 0 to 1. If mu = 0, the velocity of active contacts after the impact is "
+    "-restitution times that before",
     unit="1",
     default=0.0,
 )
@@ -54,8 +54,9 @@ IMPULSES = Quantity(
 )
 
 OF_LOOPS = (
-    "Then come the impulses that keep the closed loops closed: loop_rows entries, along and about the axes of each loop's "
-    "first frame; none without closed loops"
+    "Then follow the impulses (N s, N m s) that keep closed loops closed, if the robot has any. A closed loop keeps two "
+    "frames together, and has one entry for each direction of relative motion that it blocks. The entries are along and "
+    "about the axes of the loop's first frame"
 )
 
 TOUCHING = replace(
@@ -157,7 +158,7 @@ RECIPE = Recipe(
         "J qd_after + restitution J qd_before + mu impulses = 0 for each active contact, and impulses = 0 for each other "
         "one; active is 0 or 1 for each contact, mu is not negative",
         (Q, BEFORE, ACTIVE, RESTITUTION, MU),
-        (AFTER, replace(IMPULSES, means=f"first {IMPULSES.means}. {OF_LOOPS}")),
+        (AFTER, replace(IMPULSES, means=f"first the {IMPULSES.means}. {OF_LOOPS}")),
         theta=True,
         summary="Compute qd_after, the joint rates after an impact, and the contact impulses. The impulses stop "
         "the active contacts or reverse their velocity.",

@@ -39,7 +39,7 @@ RECIPE = FUNCTION.gradient(
     354,
     "qd_after and impulses of an impact, and the gradient of cotangent_qd_after . qd_after + cotangent_impulses . impulses "
     "by q and qd_before",
-    "Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute gradients, by q "
-    "and qd_before, of their weighted sum. This is the sum of all entries of qd_after and impulses, multiplied by "
-    "their weights.",
+    "Compute qd_after, the joint rates after an impact, and the contact impulses. Also compute gradients of a "
+    "weighted sum by q and qd_before. The weighted sum adds all cotangent_qd_after[i] * qd_after[i] and all "
+    "cotangent_impulses[i] * impulses[i].",
 )

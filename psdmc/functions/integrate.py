@@ -11,8 +11,8 @@ WAY = Quantity(
     "v",
     ("nv",),
     3.0,
-    means="displacement of the joints, rad or m; for a quaternion, a rotation vector (rad) along the axes of the "
-    "body at q",
+    means="displacement of the joints, rad or m. For a ball joint, it is a rotation vector (rad) along the axes of the "
+    "body. For a floating base, it is the constant linear and angular velocity along the base's own axes, times a time",
     unit="1",
     powers=(1,),
 )

@@ -42,7 +42,7 @@ RECIPE = Recipe(
             Quantity(
                 "drift",
                 ("frames", "6"),
-                means="linear acceleration (m/s^2), then angular acceleration (rad/s^2)",
+                means="linear acceleration of the frame's origin (m/s^2), then angular acceleration (rad/s^2)",
                 unit="1/s^2",
                 powers=(0, 1),
             ),

@@ -47,8 +47,8 @@ RECIPE = Recipe(
         (Q, QD),
         (Quantity("T", means="kinetic energy, J", unit="J"),),
         theta=True,
-        summary="Compute the kinetic energy T = qd^T M(q) qd / 2 of the links and the drives (rotors of the "
-        "motors).",
+        summary="Compute the kinetic energy T = qd^T M(q) qd / 2 of the links and the drives (motors and "
+        "gears).",
     ),
     "kinetic energy",
     trace,

@@ -44,7 +44,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=True,
-        summary="Compute the joint-space mass matrix M(q), which includes the drive inertias.",
+        summary="Compute the joint-space mass matrix M(q), which includes the drive inertias (motors and gears).",
     ),
     "mass matrix",
     trace,

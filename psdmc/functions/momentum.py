@@ -54,7 +54,7 @@ RECIPE = Recipe(
                 "h",
                 ("6",),
                 means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame; "
-                "drive inertias are not included",
+                "drive inertias (motors and gears) are not included",
                 unit="J s",
                 powers=(-1,),
             ),

@@ -53,7 +53,7 @@ RECIPE = Recipe(
             Quantity(
                 "Y",
                 ("nv", "l"),
-                means="regressor: row i is for the torque of joint rate i, column j for theta_b[j]; SI units",
+                means="regressor: row i is for entry i of the torques, column j for theta_b[j]; SI units",
                 unit="J",
                 powers=(-1, -1),
             ),

@@ -125,12 +125,19 @@ class DynamicsModel(Answers):
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Return the names of the named frames, in the order in which `forward_kinematics` returns their positions."""
+        """Return the names of the named frames, in the order in which `forward_kinematics` returns their positions.
+
+        The options `frames`, `tool` and `contacts` of `derive` choose the named frames. Without them, they are the tip,
+        or the end of each branch.
+        """
         return tuple(frame.name for frame in self.mechanism.frames)
 
     @property
     def contacts(self) -> dict[str, int]:
-        """Return, by name of contact, the number of force components: 3 for a point, 6 for a surface (force, then moment).
+        """Return a dictionary from each contact's name to the number of its force components.
+
+        A contact is a link or frame that can touch the world (option `contacts` of `derive`). A contact point has three
+        components (force), a contact surface six (force, then moment).
 
         `constrained_forward_dynamics` and other functions return contact forces in the order of this dictionary.
         """
@@ -235,8 +242,9 @@ class DynamicsModel(Answers):
         entry of x for each base parameter (its pivot, see `pivots`) has the value of the base parameter. All other entries
         are zero.
 
-        If the model was derived with `assume_zero`, other entries can also differ from zero. For example, the inertias Ixx
-        and Iyy of a point mass on the z axis of a link are equal. If Ixx is a pivot, Iyy then has the same value in x.
+        The option `assume_zero` of `derive` sets link parameters to zero, such as inertias about a centre of mass. Entries
+        of x can then depend on each other, so entries that are no pivots can also differ from zero. For example, let a
+        link be a point mass on its z axis. Its inertias Ixx and Iyy are equal, so if Ixx is a pivot, Iyy has the same value.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -320,13 +328,14 @@ class DynamicsModel(Answers):
             masses          (n,) kg, one per link of `link_names`; each includes everything that is fixed to the link
             coms            (n, 3) m, centres of mass in the link frames
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
-            drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
+            drive_inertias  (n,) inertias of motor and gear as seen at the joint, kg m^2 (kg for a sliding joint); None:
+                            those of the model
 
         Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
 
         Raises InputError in each of these cases:
 
-        - a mass is negative, or a number is not finite or exceeds the limits for robot files
+        - a mass is negative, or a number is not finite or exceeds a limit of psdmc, such as 1e6 kg
         - an inertia is not symmetric, or belongs to a link without mass
         - a parameter is not zero, but the model was derived with the assumption that it is (option `assume_zero`)
         """
@@ -351,16 +360,18 @@ class DynamicsModel(Answers):
 
         This method computes with NumPy. The method of a compiled robot (`psdmc.compile`) is hundreds of times faster.
 
-        The torque of joint i is y @ P[i] @ theta_b. The vector y holds the values of the model's monomials, products of
-        powers of q, sin q, cos q, qd and qdd. A model that was derived with `expand=False` has no monomials. The method
-        then uses the Newton-Euler algorithm.
+        The torque of joint i is y @ P[i] @ theta_b. The vector y holds the values of the model's p monomials, products of
+        powers of q, sin q, cos q, qd and qdd. P[i] is a constant matrix of the model, (p, l) (attribute `P`). A model that
+        was derived with `expand=False` has no monomials. The method then uses the Newton-Euler algorithm.
         """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
     def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
-        theta_b    (l,) base parameters of the robot, SI units
+        The result is that of `inverse_dynamics` with the argument `theta_b`, which is required here.
+
+        theta_b    (l,) base parameters for all states, SI units: combinations of masses and inertias
         q          (..., nq) joint positions, rad or m; ... are batch axes, if any
         qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
         """
@@ -475,7 +486,8 @@ class DynamicsModel(Answers):
             mass      mass of the load, kg
             com       (3,) m, centre of mass of the load in the frame
             inertia   (3, 3) kg m^2 about the load's centre of mass, along the axes of the frame; None: a point mass
-            frame     the frame: a name from `frame_names`, or a Placement relative to the tip frame; None: the tip frame
+            frame     the frame: a name from `frame_names`, or a psdmc.robot.placement.Placement, which is a rotation
+                      matrix and a translation (m) relative to the tip frame; None: the tip frame
 
         Raises InputError if no rigid body has such a mass and inertia, or if a number is too large for a robot file. Raises
         InputError also if the load needs a parameter that the model assumes to be zero (option `assume_zero` of `derive`).

@@ -342,9 +342,10 @@ TAU = Quantity(
 
 BY_Q = (
     "If the robot has a ball joint or a floating base, q contains a quaternion and has more than nv entries. The "
-    "derivatives by q are then by the nv entries x[j] of a small displacement x, at x = 0. The displaced q is "
-    "integrate(q, x). For a joint with one coordinate, x[j] is the change of its position. For a ball joint or floating "
-    "base, x is along and about its own axes."
+    "derivatives by q are then derivatives by the nv entries x[j] of a small displacement x, at x = 0. The displaced q "
+    "is integrate(q, x). For a joint with one coordinate, x[j] is the change of its position. For a ball joint, x has "
+    "three rotations about the axes of the moving body. For a floating base, x has three linear displacements along the "
+    "base's axes, then three rotations about these axes."
 )
 """Explains derivatives by q."""
 

@@ -32,7 +32,7 @@ COTANGENT_OF_QDD = replace(COTANGENT, means=COTANGENT.means.replace("tau", "qdd"
 def direction_of(quantity: Quantity) -> Quantity:
     """A change of this input: a vector that is its direction."""
     name, axes = quantity.name, ("nv",) if quantity is Q else quantity.axes
-    which = name if quantity.default is None else f"the input {name} (see below)"
+    which = name if quantity.default is None else f"the argument `{name}`"
     means = f"derivative of {which} by e: for a small number e, the new value is {name} + e d{name}"
     if quantity is Q:
         means += ", or integrate(q, e dq) if the robot has a ball joint or a floating base"

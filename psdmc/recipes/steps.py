@@ -32,7 +32,8 @@ QD_NEXT = Quantity("qd_next", ("nv",), means="new joint rates, rad/s or m/s", un
 A = Quantity(
     "A",
     ("nx", "nx"),
-    means="derivatives of the new state (q_next, qd_next) by the old state (q, qd)",
+    means="derivatives of the new state (q_next, qd_next) by the old state (q, qd). The first nv rows are for a "
+    "displacement of the joints from q_next, the first nv columns for one from q",
     unit="1",
     powers=(1, -1),
     by_q=True,
@@ -40,7 +41,7 @@ A = Quantity(
 B = Quantity(
     "B",
     ("nx", "nv"),
-    means="derivatives of the new state (q_next, qd_next) by tau",
+    means="derivatives of the new state (q_next, qd_next) by tau, with the rows of A",
     unit="1/J",
     powers=(1, 1),
 )

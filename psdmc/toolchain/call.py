@@ -24,8 +24,8 @@ class CompiledRobot(CompiledFunctions):
     """A compiled robot has one method for each generated function. The methods take and return NumPy arrays.
 
     `psdmc.compile` makes compiled robots. One call computes one state or many. Joint positions q have the shape (..., nq).
-    Rates, accelerations and torques have the shape (..., nv). The dots (...) are batch axes, which count states, and which
-    broadcast as in NumPy. All numbers are in SI units.
+    Rates, accelerations and torques have the shape (..., nv). The dots (...) are batch axes, with one entry per state.
+    They broadcast as in NumPy. All numbers are in SI units.
 
     Results have the NumPy type that the attribute `dtype` names. A method with several results returns a named tuple.
     During a call for many states, other Python threads can run.
@@ -33,14 +33,16 @@ class CompiledRobot(CompiledFunctions):
     All methods have the argument `out`. Methods whose results depend on masses have the argument `theta_b`:
 
     theta_b  base parameters, which are combinations of masses and inertias: (l,) for all states, or (..., l) for one set
-             per state. Without theta_b, the method uses the base parameters of the model
+             per state. Without theta_b, the method uses the base parameters of the model. If these are unknown, give
+             theta_b
     gravity  acceleration of gravity in m/s^2 along the axes of the base frame: (3,) for all states, or (..., 3) for one per
              state. Only robots compiled with `gravity_input=True` have this argument, in the methods whose results depend
              on gravity. Without gravity, the method uses that of the model. A call takes about 10 us longer
     out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
              the shape and dtype of the result, and may be an input array
 
-    Results in the base frame are in the world frame if the robot has a floating base.
+    Several results, such as velocities, are in the base frame. If the robot has a floating base, they are in the world
+    frame instead.
 
     In addition to the arithmetic, a call takes about 0.3 us if all input arrays are contiguous and have the robot's dtype
     and the same batch axes (...). With other input arrays, or if Python's C headers are not installed, it takes about 10 us.

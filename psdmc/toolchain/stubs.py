@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
-from psdmc.functions import SIGNATURES, recipe_of
+from psdmc.functions import OF_FILE_MASSES, SIGNATURES, recipe_of
 from psdmc.program.signature import Quantity, Signature
 
 STUB = Path(__file__).with_name("call.pyi")
@@ -65,7 +65,8 @@ def documentation(function: Signature) -> str:
     ]
     theta = (
         "(l,) base parameters for all states, or (..., l) for one set per state. Base parameters are combinations of masses "
-        "and inertias, in SI units. Without theta_b, the function uses those of the model, if they are known"
+        "and inertias, in SI units. Without theta_b, the function uses those of the model. If these are unknown, give "
+        "theta_b"
     )
     given += [("theta_b", theta)] if function.theta else []
     written = (
@@ -87,6 +88,7 @@ def documentation(function: Signature) -> str:
         returned,
         _rows(made),
         *_note(function),
+        *_masses(function),
         *_failures(function),
         "In these shapes:",
         _rows(lengths),
@@ -116,8 +118,19 @@ _WITHOUT_LOOPS = (
 )
 
 
+_FIXED_MASSES = (
+    "The masses and inertias of the links are those of the robot file, with loads that `DynamicsModel.with_payload` added. "
+    "The function does not use theta_b, because base parameters do not determine its results."
+)
+
+
 def _note(function: Signature) -> list[str]:
     return [_filled(function.note)] if function.note else []
+
+
+def _masses(function: Signature) -> list[str]:
+    """Return a paragraph that says which masses a function without theta_b uses, if it needs any."""
+    return [_filled(_FIXED_MASSES)] if function.name in OF_FILE_MASSES else []
 
 
 def _failures(function: Signature) -> list[str]:
