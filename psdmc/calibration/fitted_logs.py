@@ -4,25 +4,30 @@ parameters or only those that the data need."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from psdmc.calibration.identify.essential import Essential, EssentialOptions, essential
+from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.knowledge import Knowledge
 from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.log_information import ALONE, MAIN_SHARE, LogInformation, log_information
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.stated_prior import theta_covariance, with_prior
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.verdict.judge import NOT_PHYSICAL
+from psdmc.calibration.verdict.judge import NOT_PHYSICAL, ODD_LOGS
 from psdmc.calibration.verdict.record import Calibration, judged_record, linear_record, with_data, with_model
 from psdmc.errors import InputError, InternalError
 from psdmc.links.link_terms import PhysicalOptions
+from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 
 MOST_NAMED = 12
 """Dropped parameters that a note names."""
+MOST_ALONE = 3
+"""Parameters that depend on one log alone and that a note names."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,10 +56,16 @@ class LogFit:
                 "[[bodies]] bounds masses or centres of mass, and the unconstrained fit knows none",
                 "leave out --no-physical, or the bounds",
             )
-        found = self._with_prior(found)
+        self.progress("comparing logs")
+        logs = log_information(found.problem, found.estimate, [log.name for log in self.logs])
+        drifts = friction_drift(found.problem, found.estimate, [log.name for log in self.logs])
+        unstated, found = found, self._with_prior(found)
         self.progress("reading the result back")
-        whole = self._consistent(found)
-        return whole if self.known.essential is None else self._essential(found, whole, self.known.essential)
+        result = self._consistent(found)
+        if self.known.essential is not None:
+            result = self._essential(found, result, self.known.essential)
+        result = result if logs is None else with_log_information(result, logs, unstated)
+        return with_drift(result, drifts)
 
     def _with_prior(self, found: LinearResult) -> LinearResult:
         if not self.known.confidence:
@@ -137,3 +148,58 @@ def with_price(
         + f"; change of held-out R^2: {words}"
     )
     return with_model(replace(fewer, facts={**fewer.facts, **facts}, notes=(*fewer.notes, note)))
+
+
+def with_log_information(record: Calibration, logs: LogInformation, found: LinearResult) -> Calibration:
+    """Return the result of a fit of several logs with the share of each log in the information of each parameter.
+
+    The result also has the logs that contradict the others, from which the verdict's doubts follow. Notes name
+    parameters that depend on one log alone, and logs with a larger residual than the others.
+    """
+    of_bodies = [row.name for row in record.parameters]
+    names = (*of_bodies, *found.problem.names)
+    seen = [k for k, is_seen in enumerate(found.estimate.identifiable.tolist()) if is_seen]
+    rows = [
+        {
+            "name": names[k],
+            "shares": logs.shares[:, k].tolist(),
+            "std_without": logs.std_without[:, k].tolist(),
+        }
+        for k in seen
+    ]
+    notes = []
+    grown, share = logs.std_without.max(axis=0), logs.shares.max(axis=0)
+    alone = [k for k in seen if grown[k] > ALONE and share[k] > MAIN_SHARE]
+    alone.sort(key=lambda k: (-grown[k], -share[k]))
+    if alone:
+        named = [
+            f"{names[k]} ({logs.logs[i]}: {logs.shares[i, k]:.0%} of its information)"
+            for k in alone[:MOST_ALONE]
+            for i in [int(logs.shares[:, k].argmax())]
+        ]
+        more = f" and {len(alone) - MOST_ALONE} more" if len(alone) > MOST_ALONE else ""
+        notes.append(f"parameters that depend on one log alone: {', '.join(named)}{more}")
+    notes += [
+        f"{name}: its residual is {ratio:.1f} times that of the other logs (median), which agree with it"
+        for name, ratio in logs.noisier
+        if name not in [each["log"] for each in logs.odd]
+    ]
+    facts = {
+        **record.facts,
+        LOG_INFORMATION: {
+            "logs": list(logs.logs),
+            "chi_square_per_degree": logs.statistics.tolist(),
+            "parameters": rows,
+        },
+        ODD_LOGS: {"disagree": logs.disagree, "items": [dict(each) for each in logs.odd]},
+    }
+    return with_model(replace(record, facts=facts, notes=(*record.notes, *notes)))
+
+
+def with_drift(record: Calibration, drifts: Sequence[FrictionDrift]) -> Calibration:
+    """Return the result with the change of each joint's friction over each log, from which a doubt may follow."""
+    if not drifts:
+        return record
+    return with_model(
+        replace(record, facts={**record.facts, FRICTION_DRIFT: [asdict(each) for each in drifts]})
+    )

@@ -14,7 +14,7 @@ from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.formats import has_topics
 from psdmc.calibration.logs.log_files import open_log
-from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.logs.stored_log import AnyLog, without_start
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.progress import Progress
@@ -105,6 +105,22 @@ def log_sources(
 
     Raises InputError if a file cannot be used, or if a log description is given together with other files.
     """
+    found = _log_sources(paths, validation, joint_names, linear, choice, naming, progress)
+    if choice.warm is None:
+        return found
+    return replace(found, logs=tuple(without_start(log, choice.warm) for log in found.logs))
+
+
+def _log_sources(
+    paths: Sequence[Path],
+    validation: Sequence[Path],
+    joint_names: tuple[str, ...],
+    linear: LinearOptions,
+    choice: FitChoice,
+    naming: LogNaming,
+    progress: Progress,
+) -> LogSources:
+    """The logs with all their rows."""
     described = [path for path in paths if is_description(path)]
     if described and len(paths) + len(validation) > 1:
         raise InputError(

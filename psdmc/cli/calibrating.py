@@ -90,6 +90,10 @@ def calibrate(
             help="share of each log that is used for the test: 0.3, the last part; or 0.15,40",
         ),
     ] = None,
+    warm: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", min=0.0, help="leave out the first seconds of each log"),
+    ] = None,
     friction: Annotated[
         list[str] | None,
         typer.Option(metavar="TERM,...", help="friction terms: coulomb,viscous,viscous^2,offset"),
@@ -123,6 +127,7 @@ def calibrate(
             "--validate": validate,
             "--split": split,
             "--friction": friction,
+            "--warm": warm is not None,
             "--joint-map": joint_map,
         }
         require_none([flag for flag, value in of_a_fit.items() if value])
@@ -132,7 +137,7 @@ def calibrate(
         lacks = "no LOG" if len(given) < 2 else "no -o MODEL.npz"
         raise InputError(f"calibrate: {lacks}", "psdmc calibrate MODEL.npz LOG... -o CALIBRATED.npz")
     logs = given[1:]
-    choice = fit_choice(cutoff, split, friction)
+    choice = fit_choice(cutoff, split, friction, warm)
     from psdmc.calibration.calibrate import CalibrateOptions
     from psdmc.calibration.identify.essential import EssentialOptions
     from psdmc.calibration.sources import LogNaming
@@ -224,7 +229,9 @@ def require_none(flags: Sequence[str]) -> None:
         )
 
 
-def fit_choice(cutoff: float | None, split: str | None, friction: Sequence[str] | None) -> FitChoice:
+def fit_choice(
+    cutoff: float | None, split: str | None, friction: Sequence[str] | None, warm: float | None
+) -> FitChoice:
     """Return the options of the linear fit that the command line gives. Raise InputError if a value is wrong."""
     from psdmc.calibration.description.table_fit import FitChoice, split_of
     from psdmc.friction.terms import EXAMPLE, options_of
@@ -239,7 +246,7 @@ def fit_choice(cutoff: float | None, split: str | None, friction: Sequence[str] 
     chosen = None if shares is None else split_of(shares)
     if isinstance(chosen, str):
         raise InputError(f"--split: {chosen}", SPLIT_HINT)
-    return FitChoice(cutoff, chosen, exponents, offset)
+    return FitChoice(cutoff, chosen, exponents, offset, warm=warm)
 
 
 SPLIT_HINT = "write --split 0.3 for the last 30 %, or --split 0.15,40 for 15 % in 40 blocks"

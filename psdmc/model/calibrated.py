@@ -28,6 +28,10 @@ Word = Literal["usable", "usable, with doubts", "not usable"]
 
 NOT_USABLE_STATUS = 6
 """Exit status of `psdmc calibrate` where the verdict is `not usable`."""
+LOG_INFORMATION = "log_information"
+"""Name of the fact that holds the share of each log in the information of each parameter."""
+FRICTION_DRIFT = "friction_drift"
+"""Name of the fact that holds the change of each joint's friction over each log."""
 WHOLE = "All"
 """The step whose quality is that of the whole torque."""
 

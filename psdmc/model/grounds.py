@@ -200,6 +200,22 @@ def _lacking(values: Values) -> str:
     )
 
 
+def _odd_log(values: Values) -> str:
+    return (
+        "{log} contradicts the other logs: they predict its torque at joint {joint} with RMSE {rmse:.3g} {unit}, its own "
+        "fit with {own:.3g} {unit} (chi-square {statistic:.4g} per degree of freedom): look for another load, friction or "
+        "robot; leave it out of the fit".format(**values)
+    )
+
+
+def _logs_disagree(values: Values) -> str:
+    return (
+        "the {logs} logs contradict each other: the fit of the others predicts {log} at joint {joint} with RMSE "
+        "{rmse:.3g} {unit}, its own fit with {own:.3g} {unit} (chi-square {statistic:.4g} per degree of freedom): look for "
+        "another load, friction or robot; calibrate each log alone and compare".format(**values)
+    )
+
+
 def _by_step(values: Values) -> str:
     return "{samples} independent samples for {unknowns} unknowns ({step})".format(**values)
 
@@ -219,6 +235,13 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
     "perhaps_saturated": lambda v: (
         f"the effort may be cut off at a limit, or this may be friction alone: joint {_at_levels(v)} of its moving rows: "
         "if the drive or sensor has that limit, record again with slower motions"
+    ),
+    "odd_log": _odd_log,
+    "logs_disagree": _logs_disagree,
+    "friction_drifts": lambda v: (
+        f"friction changes over the {v['seconds']:.3g} s that are fitted of {v['log']}: "
+        f"{_each(v, 'joint {joint} by {change:+.3g} +- {std:.1g} {unit} ({share:+.0%})', MOST_LISTED)}: move the robot "
+        "until it is warm before you record, or leave out the first part by --warm SECONDS"
     ),
     "late": _late,
     "not_physical": lambda v: f"no mass distribution of a real robot is near the fit ({v['why']})",

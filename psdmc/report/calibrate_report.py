@@ -14,7 +14,9 @@ from psdmc.model.calibrated_json import document
 from psdmc.report.calibrate_plots import excitation_panels, step_panels
 from psdmc.report.calibrate_tables import (
     accuracy_table,
+    drift_table,
     fact_table,
+    information_table,
     joint_table,
     log_table,
     parameter_table,
@@ -75,6 +77,8 @@ class ReportView:
     joint_table: str
     spring_table: str
     log_table: str
+    information_table: str
+    drift_table: str
     step_table: str
     versions: tuple[str, ...]
     fact_table: str
@@ -113,6 +117,8 @@ def report_html(record: Calibrated, found: Excitation | None = None, truth: Trut
         joint_table=joint_table(record),
         spring_table=spring_table(record),
         log_table=log_table(record),
+        information_table=information_table(record),
+        drift_table=drift_table(record),
         step_table=step_table(record),
         versions=tuple(f"{name} {value}" for name, value in record.versions.items()),
         fact_table=fact_table(record),

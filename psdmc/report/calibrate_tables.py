@@ -7,11 +7,13 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from psdmc.model.calibrated import Calibrated, NumberRow, Quality, Verdict
+from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION, Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.joined_units import joined_units
 
 NOTHING = "–"
 """A cell without a number."""
+OWN_TABLES = (LOG_INFORMATION, FRICTION_DRIFT, "odd_logs")
+"""Facts that the table of facts leaves out."""
 USES = {"validate": "held out whole", "with_load": "with the known load"}
 """How a log is used that is not fitted."""
 
@@ -128,6 +130,41 @@ def log_table(record: Calibrated) -> str:
     return table(["Log", "Rows", "Duration [s]", "Date", "Used"], rows) if rows else ""
 
 
+def information_table(record: Calibrated) -> str:
+    """Return the table of each log's share in the information of each parameter; empty text for a single log. For each
+    parameter, the log without which its standard deviation would grow most comes first."""
+    found = record.facts.get(LOG_INFORMATION)
+    if found is None:
+        return ""
+    rows = []
+    for row in found["parameters"]:
+        grown = [math.inf if value is None else value for value in row["std_without"]]
+        most = max(range(len(grown)), key=grown.__getitem__)
+        shares = sorted(zip(found["logs"], row["shares"], strict=True), key=lambda each: -each[1])
+        words = ", ".join(f"{log} {share:.0%}" for log, share in shares)
+        growth = f"{grown[most]:.3g} times" if math.isfinite(grown[most]) else "not determined"
+        rows.append([row["name"], found["logs"][most], growth, words])
+    head = ["Parameter", "Most important log", "Standard deviation without it", "Shares of all logs"]
+    return table(head, rows, text_columns=(0, 3))
+
+
+def drift_table(record: Calibrated) -> str:
+    """Return the table of the change of each joint's friction over each log; empty text if it was not computed."""
+    rows = [
+        [
+            row["log"],
+            row["joint"],
+            f"{row['seconds']:.4g}",
+            f"{with_std(row['change'], row['std'])} {row['unit']}",
+            f"{row['share']:+.1%}",
+            "yes" if row["shown"] else "no",
+        ]
+        for row in record.facts.get(FRICTION_DRIFT, ())
+    ]
+    head = ["Log", "Joint", "Duration [s]", "Change of friction", "Share of friction", "Significant"]
+    return table(head, rows) if rows else ""
+
+
 def step_table(record: Calibrated) -> str:
     """Return the table of calibration steps: the cut-off frequency of the filter, and how the data were split. The text
     is empty if they are unknown."""
@@ -145,7 +182,8 @@ def step_table(record: Calibrated) -> str:
 
 def fact_table(record: Calibrated) -> str:
     """Ranks, condition numbers and the like."""
-    rows = [[name.replace("_", " "), _plain(value)] for name, value in record.facts.items()]
+    own = {name: value for name, value in record.facts.items() if name not in OWN_TABLES}
+    rows = [[name.replace("_", " "), _plain(value)] for name, value in own.items()]
     return table(["Quantity", "Value"], rows, text_columns=(1,))
 
 

@@ -50,6 +50,7 @@ VALUES: dict[str, tuple[str, ...]] = {
     "--split": ("0.3", "0.15,40", "1", "nan", "0.1,1e9", ",", "x"),
     "--validate": ("log.csv", "log.npz", "campaign", "missing", "empty"),
     "--topic": ("/joint_states", "x", "\u00e9", ""),
+    "--warm": ("0", "5", "-1", "1e9", "nan", "x"),
     "--joint-map": ("shoulder=elbow,elbow=shoulder", "x=shoulder", "=", "shoulder=", "a=b=c"),
     "--cutoff": ("8", "0", "nan", "1e300"),
     "--drive-inertia": ("all", "0", "1,2", "0.1,-1", "nan", "1e300,1e300", "1,,2", ",", "x"),

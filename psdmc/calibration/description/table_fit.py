@@ -30,6 +30,7 @@ class FitChoice:
     exponents   exponents d of the viscous friction terms |qd|^d sign(qd)
     offset      whether each joint has a constant torque
     sign_speed  speed over which Coulomb friction changes sign, rad/s (m/s)
+    warm        s, the first part of each log that is left out; only the command line gives it
     """
 
     cutoff: float | None = None
@@ -37,10 +38,16 @@ class FitChoice:
     exponents: tuple[float, ...] | None = None
     offset: bool | None = None
     sign_speed: float | None = None
+    warm: float | None = None
 
     def by_flag(self) -> dict[str, object]:
         """Return the values that the user chose, by the command-line option that sets each value, such as --cutoff."""
-        return {"--cutoff": self.cutoff, "--split": self.split, "--friction": self.exponents}
+        return {
+            "--cutoff": self.cutoff,
+            "--split": self.split,
+            "--friction": self.exponents,
+            "--warm": self.warm,
+        }
 
 
 def _read(value: object, reading: Reading) -> FitChoice:

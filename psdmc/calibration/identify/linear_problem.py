@@ -36,6 +36,8 @@ class LinearProblem:
     held_out  (N,) whether a sample is held out for validation
     terms     plain friction terms of every joint, which have f values together
     columns   springs and further friction
+    counts    number of samples of each log, in their order
+    time      (N,) s, of the samples
     """
 
     chain: Mechanism
@@ -45,6 +47,8 @@ class LinearProblem:
     l: int
     terms: tuple[Term, ...]
     columns: Columns = field(default_factory=Columns)
+    counts: tuple[int, ...] = ()
+    time: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -115,21 +119,31 @@ def linear_problem(
     terms = options.terms
     width = l + chain.nv * len(names_of(terms)) + len(options.columns)
     rows = KeptRows(chain.nv, width, options.held_bytes)
-    torques, outs, remarks = [], [], []
+    torques, outs, remarks, times = [], [], [], []
     for log in logs:
         count = 0
         for stretch in stretches(log, options.filter, options.check, options.stretch):
             states, at = stretch.states, stretch.at
             rows.append(*_columns(model, states, at, options, carried))
             torques.append(motors.torque(states.effort)[at])
+            times.append(states.time[at])
             if not count:
                 remarks += _ripples(log, states, options)
             count += len(at)
             share = (states.first + at[-1]) / len(log)
             progress(Step(f"linear fit: {log.name}: {share:.0%}", share))
         outs.append(held_out_of(log, count, options.split))
+    counts = tuple(len(out) for out in outs)
     problem = LinearProblem(
-        chain, rows, np.concatenate(torques), np.concatenate(outs), l, terms, options.columns
+        chain,
+        rows,
+        np.concatenate(torques),
+        np.concatenate(outs),
+        l,
+        terms,
+        options.columns,
+        counts,
+        np.concatenate(times),
     )
     return problem, tuple(remarks)
 

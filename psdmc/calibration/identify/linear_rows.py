@@ -61,7 +61,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
     start    (l,) values of the unknowns, whose torques are subtracted from `target` first; None: zero
     """
     triangle, noise, l = np.zeros((0, 0)), None, 0
-    for block, own in _with_rows(rows):
+    for block, own in with_rows(rows):
         l = block.columns.shape[2]
         weight = weights[own]
         ahead = target[own] if start is None else target[own] - block.columns @ start
@@ -79,7 +79,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
 def residual_of(rows: Rows, target: Array, values: Array) -> Array:
     """Return the residual at all samples, an array (N samples, n joints): target minus columns @ values."""
     residual = np.empty_like(target)
-    for block, own in _with_rows(rows):
+    for block, own in with_rows(rows):
         residual[own] = target[own] - block.columns @ values
     return residual
 
@@ -108,7 +108,7 @@ def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Col
     """
     count, n = weighted.shape
     squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
-    for block, own in _with_rows(rows):
+    for block, own in with_rows(rows):
         flat = block.columns * weights[own][:, :, None]
         if not squares.shape[1]:
             l, k = flat.shape[2], 0 if block.consider is None else block.consider.shape[2]
@@ -122,7 +122,7 @@ def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Col
     return Collected(squares, scores, consider)
 
 
-def _with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:
+def with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:
     """Each block with its place among all samples."""
     start = 0
     for block in rows:
@@ -158,9 +158,29 @@ class KeptRows:
             store.append(np.ascontiguousarray(values.reshape(len(values), -1)))
 
     def __iter__(self) -> Iterator[Block]:
-        for start in range(0, len(self), BLOCK_SAMPLES):
-            stop = min(start + BLOCK_SAMPLES, len(self))
+        return self.blocks(0, len(self))
+
+    def between(self, first: int, end: int) -> Rows:
+        """Return the rows of the samples from `first` to before `end`, which are read when they are needed."""
+        return _Between(self, first, end)
+
+    def blocks(self, first: int, end: int) -> Iterator[Block]:
+        """Yield the blocks of the samples from `first` to before `end`."""
+        for start in range(first, end, BLOCK_SAMPLES):
+            stop = min(start + BLOCK_SAMPLES, end)
             shape = (stop - start, *self.shape)
             yield Block(
                 self._columns.rows(start, stop).reshape(shape), self._noise.rows(start, stop).reshape(shape)
             )
+
+
+@dataclass(frozen=True, slots=True)
+class _Between:
+    """Some consecutive samples of kept rows."""
+
+    rows: KeptRows
+    first: int
+    end: int
+
+    def __iter__(self) -> Iterator[Block]:
+        return self.rows.blocks(self.first, self.end)

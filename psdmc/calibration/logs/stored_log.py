@@ -9,6 +9,7 @@ from typing import IO
 import numpy as np
 
 from psdmc.calibration.logs.log import Array, Log, Quantity, Timed, Use, places_of
+from psdmc.errors import InputError
 
 HELD_BYTES = 128 * 1024**2
 """Bytes of rows kept in memory: 800,000 rows of seven joints; beyond, they go to a temporary file."""
@@ -74,6 +75,7 @@ class StoredLog(Timed):
     store         rows, each with the positions, velocities and efforts of `stored` joints
     has_velocity  False: the velocities in the store have no meaning
     places        (n,) indices of the log's n joints among the `stored` joints
+    first         row of the store that is the log's first
     """
 
     name: str
@@ -88,6 +90,7 @@ class StoredLog(Timed):
     sliding: tuple[str, ...] | None = None
     date: str = ""
     use: Use = "fit"
+    first: int = 0
 
     def ordered(self, joint_names: tuple[str, ...]) -> StoredLog:
         """Return a copy of the log with its columns in the order of `joint_names`.
@@ -99,7 +102,7 @@ class StoredLog(Timed):
 
     def rows(self, start: int, stop: int) -> Log:
         """Return the rows from `start` to `stop` as a log in memory."""
-        values, places = self.store.rows(start, stop), list(self.places)
+        values, places = self.store.rows(self.first + start, self.first + stop), list(self.places)
         position, velocity, effort = values[:, : self.stored], None, values[:, -self.stored :]
         if self.has_velocity:
             velocity = values[:, self.stored : 2 * self.stored][:, places]
@@ -120,3 +123,16 @@ class StoredLog(Timed):
 
 
 AnyLog = Log | StoredLog
+
+
+def without_start(log: AnyLog, seconds: float) -> AnyLog:
+    """Return a log without its first `seconds`. Raises InputError if nothing is left."""
+    first = int(np.searchsorted(log.time, log.time[0] + seconds)) if len(log) else 0
+    if first >= len(log):
+        lasts = f"it lasts {log.duration:.4g} s"
+        raise InputError(
+            f"{log.name}: no rows after the first {seconds:g} s: {lasts}", "leave out less: --warm"
+        )
+    if isinstance(log, StoredLog):
+        return replace(log, time=log.time[first:], first=log.first + first)
+    return log.rows(first, len(log))

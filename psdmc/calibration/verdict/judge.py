@@ -27,12 +27,14 @@ from psdmc.calibration.verdict.findings import Demand, Findings
 from psdmc.calibration.verdict.record import Calibration, with_verdict
 from psdmc.calibration.verdict.suspects import suspect, unit_suspect
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
-from psdmc.model.calibrated import Verdict
+from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION, Verdict
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Delay, Ground
 
 NOT_PHYSICAL = "not_physical"
 """Name of the fact that tells why a record has no physically consistent version."""
+ODD_LOGS = "odd_logs"
+"""Name of the fact that holds the logs which contradict the others of their fit."""
 ALONE = ("Motor", "Friction")
 """Steps that move one joint alone, so that each of them must fit."""
 
@@ -197,6 +199,8 @@ def _poor(found: Findings) -> Iterator[Ground]:
 
 def doubts(found: Findings) -> Iterator[Ground]:
     """Yield all doubts about a calibration."""
+    yield from _odd_logs(found)
+    yield from _drifting(found)
     yield from _perhaps_saturated(found)
     yield from _a_little_late(found)
     yield from _sampled_slowly(found)
@@ -211,6 +215,22 @@ def doubts(found: Findings) -> Iterator[Ground]:
     yield from _open_parameters(found)
     yield from _indefinite(found)
     yield from _unchecked(found)
+
+
+def _odd_logs(found: Findings) -> Iterator[Ground]:
+    """Doubts about logs that contradict the other logs of the fit."""
+    odd = found.record.facts.get(ODD_LOGS, {"items": []})
+    for item in odd["items"]:
+        fitted = len(found.record.facts[LOG_INFORMATION]["logs"])
+        yield Ground("logs_disagree" if odd["disagree"] else "odd_log", {**item, "logs": fitted})
+
+
+def _drifting(found: Findings) -> Iterator[Ground]:
+    """A doubt about each log over which friction changes."""
+    drifts = [each for each in found.record.facts.get(FRICTION_DRIFT, ()) if each["shown"]]
+    for log in dict.fromkeys(each["log"] for each in drifts):
+        items = [each for each in drifts if each["log"] == log]
+        yield Ground("friction_drifts", {"log": log, "seconds": items[0]["seconds"], "items": items})
 
 
 def _perhaps_saturated(found: Findings) -> Iterator[Ground]:
