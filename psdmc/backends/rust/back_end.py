@@ -48,14 +48,5 @@ BACK_END = BackEnd(
     identifier,
     lambda robot: ("Cargo.toml", f'the crate, {robot} = {{ path = "..." }}'),
     lambda folder: f"cargo test --manifest-path {folder}/Cargo.toml",
-    (
-        "trig",
-        "target",
-        "payload",
-        "friction",
-        "bodies",
-        "estimator",
-        "with",
-        "functions NAME_theta_rows",
-    ),
+    ("trig", "target", "payload", "friction", "bodies", "estimator", "with", "functions NAME_theta_rows"),
 )
