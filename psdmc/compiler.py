@@ -68,6 +68,7 @@ def derive(
     unknown: Sequence[str] | str = (),
     contacts: Sequence[str] | str = (),
     loops: str | Path | Sequence[Mapping[str, Any]] = (),
+    gravity_input: bool = False,
 ) -> DynamicsModel:
     """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
@@ -104,6 +105,8 @@ def derive(
                    contact point, "foot:6" a contact surface. These links become named frames, too. If `contacts` is empty,
                    each named frame is a contact point
     loops          path of a TOML file with closed loops, or its tables [[loop]] as a list of dictionaries
+    gravity_input  True: derive base parameters that determine the torques under every gravity, so that code for the model
+                   can have gravity as an input. There are often more of them. The model has no E and P
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
     needs other options, for example `expand=False` because E and P need too much memory.
@@ -143,7 +146,13 @@ def derive(
         contacts=listed(contacts),
         loops=loops,
     )
-    return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
+    return derive_model(
+        loaded.mechanism,
+        expand=expand,
+        progress=progress,
+        provenance=provenance(loaded),
+        gravity_input=gravity_input,
+    )
 
 
 def emit_c(
@@ -163,6 +172,7 @@ def emit_c(
     bodies: bool = False,
     estimator: str | None = None,
     smoothing_speed: float | None = None,
+    gravity_input: bool = False,
 ) -> Changes:
     """Write the C package of a model into a folder. Returns the names of the files that psdmc wrote or removed.
 
@@ -191,6 +201,9 @@ def emit_c(
     smoothing_speed  for friction="in-dynamics": friction contains a smooth function, tanh(v / smoothing_speed), instead
                of the sign of a joint's speed v. The unit is rad/s, or m/s for sliding joints. None: the value of the
                calibration, usually 0.03
+    gravity_input  True: functions whose results depend on gravity get it as an input. This is for a robot whose base tilts.
+               Gravity has 3 numbers for each state, m/s^2 along the axes of the base frame, or of the world frame if the
+               base is floating. The model must be derived with `gravity_input=True`, unless its base parameters are the same
 
     Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises InputError also
     if the model assumes that parameters are zero (`assume_zero` of `derive`) and `payload` or `bodies` would change them.
@@ -202,6 +215,7 @@ def emit_c(
     own: dict[str, Any] = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     own["smoothing-speed"] = smoothing_speed
     own["estimator"] = estimator
+    own["gravity-input"] = gravity_input
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
 
 
@@ -309,7 +323,7 @@ def _files(
         )
     more = chosen(adapters)
     facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    further = (own.get("estimator"), own.get("smoothing-speed"))
+    further = (own.get("estimator"), own.get("smoothing-speed"), own.get("gravity-input", False))
     return language.files(emission(model, lowering, functions, options, name, progress, *facts, *further))
 
 
@@ -324,6 +338,7 @@ def compile(
     target: str | Target = ...,
     friction: bool = ...,
     smoothing_speed: float | None = ...,
+    gravity_input: bool = ...,
 ) -> CompiledRobot: ...
 
 
@@ -339,6 +354,7 @@ def compile(
     target: str | Target = ...,
     friction: bool = ...,
     smoothing_speed: float | None = ...,
+    gravity_input: bool = ...,
 ) -> CompiledRobot[np.float32]: ...
 
 
@@ -353,6 +369,7 @@ def compile(
     target: str | Target = ...,
     friction: bool = ...,
     smoothing_speed: float | None = ...,
+    gravity_input: bool = ...,
 ) -> CompiledRobot[np.float32] | CompiledRobot: ...
 
 
@@ -366,6 +383,7 @@ def compile(
     target: str | Target = NATIVE,
     friction: bool = False,
     smoothing_speed: float | None = None,
+    gravity_input: bool = False,
 ) -> CompiledRobot[Any]:
     """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
 
@@ -376,6 +394,8 @@ def compile(
                now, and each other function when you first call it
     friction   True: inverse dynamics, forward dynamics, their derivatives and time steps, also with contacts, contain the
                friction that a calibration of the model found
+    gravity_input  True: methods whose results depend on gravity have the argument `gravity`, (3,) or (..., 3), m/s^2 along
+               the axes of the base frame. Without this argument, gravity is that of the model
 
     `emit_c` explains the other options. Raises InputError if `friction` is True and the model has no calibrated friction.
     Raises InputError also if the target is a microcontroller, because its code lacks the batch functions that Python calls.
@@ -391,7 +411,7 @@ def compile(
     chosen_names = wanted(kept, found.mechanism)
     law: Literal[False, "in-dynamics"] = "in-dynamics" if friction else False
     known = (found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
-    request = _Request(*known, law, smoothing_speed)
+    request = _Request(*known, law, smoothing_speed, gravity_input)
     return request.compiled(progress)
 
 
@@ -415,10 +435,19 @@ class _Request:
     target: str | Target
     friction: Literal[False, "in-dynamics"]
     smoothing_speed: float | None
+    gravity_input: bool = False
 
     def __reduce__(self) -> tuple[Any, ...]:
         filed = self.model if isinstance(self.model, bytes) else zlib.compress(file_bytes(self.model))
-        others = (self.lowering, self.functions, self.real, self.trig, self.target, *self._law)
+        others = (
+            self.lowering,
+            self.functions,
+            self.real,
+            self.trig,
+            self.target,
+            *self._law,
+            self.gravity_input,
+        )
         return _Request, (filed, self.model_hash, self.names, *others)
 
     @property
@@ -432,6 +461,7 @@ class _Request:
             self.trig,
             self.target,
             *self._law,
+            *((self.gravity_input,) if self.gravity_input else ()),
         )
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
@@ -447,12 +477,14 @@ class _Request:
 
         def make() -> PackageView:
             given = (self.opened(), self.lowering, self.functions, options, None, progress)
-            package = package_of(*given, False, (), self.friction, False, None, self.smoothing_speed)
+            own = (self.friction, False, None, self.smoothing_speed, self.gravity_input)
+            package = package_of(*given, False, (), *own)
             progress("compiling")
             return package
 
         parts = (self.model_hash, self.lowering, options.real, options.trig, *self.names)
         parts += (f"friction {self._law}",) if self.friction or self.smoothing_speed is not None else ()
+        parts += (f"gravity input {self.gravity_input!r}",) if self.gravity_input is not False else ()
 
         def more(function: str) -> CompiledRobot[Any]:
             return replace(self, functions=(function,), names=wanted((function,))).compiled(progress)

@@ -47,6 +47,7 @@ def emission(
     bodies: bool = False,
     estimator: str | None = None,
     smoothing_speed: float | None = None,
+    gravity_input: bool = False,
 ) -> Emission:
     """Return what a back end receives for a model: the kernels of its functions, facts and reference states. The arguments
     are those of `compiler.emit_c`. Raises InputError as that does."""
@@ -57,12 +58,17 @@ def emission(
             "an estimator cannot have friction in the dynamics: its torques contain no friction",
             "write --friction, and subtract the torques of R_friction from those of the motors",
         )
+    _check_gravity_input(gravity_input, estimator, adapters)
     require(model, names)
     costs = options.target.costs
     key = (model.content_hash, lowering, repr(costs), *names)
+    key += (law.key,) if law else ()
     kernels = lowered_once(
-        key if law is None else (*key, law.key),
-        lambda: lower(model, lowering, names, progress, costs=costs, friction=law),
+        (*key, "gravity input") if gravity_input else key,
+        lambda: lower(
+            model, lowering, names, progress, costs=costs, friction=law, gravity_input=gravity_input
+        ),
+        gravity_input,
     )
     shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     if estimator:
@@ -70,12 +76,28 @@ def emission(
     momenta = None if estimator is None else lower_estimator(model, estimator, costs)
     if law is not None:
         shown |= {"friction": "in-dynamics", "smoothing-speed": repr(law.friction.sign_speed)}
+    if gravity_input:
+        shown["gravity-input"] = "yes"
     own = None if law is None else law.friction
     info = package_info(model, name, shown, payload, friction is True, bodies, own)
-    references = reference_states(model, names, friction=law)
+    references = reference_states(model, names, friction=law, gravity_input=gravity_input)
     if payload:
         references = replace(references, load=reference_load(model))
     return Emission(info, kernels, options, references, tuple(adapters), momenta)
+
+
+def _check_gravity_input(gravity_input: object, estimator: str | None, adapters: Sequence[str]) -> None:
+    """InputError where gravity cannot be an input."""
+    if not isinstance(gravity_input, bool):
+        raise InputError(
+            f"gravity_input is {gravity_input!r}, expected True or False", "the default is False"
+        )
+    wanting = "an estimator" if estimator else f"--with {adapters[0]}" if adapters else None
+    if gravity_input and wanting:
+        raise InputError(
+            f"{wanting} cannot have gravity as an input: its own functions give none",
+            "leave --gravity-input out, or write two packages",
+        )
 
 
 def _friction_in_dynamics(

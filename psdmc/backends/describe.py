@@ -25,6 +25,7 @@ def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
         *_target(options.target),
         "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
         f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the {info.base_frame}",
+        *((_GRAVITY_INPUT,) if info.gravity_input else ()),
         "",
         "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
         *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
@@ -34,6 +35,11 @@ def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
         *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),
         "",
     )
+
+
+_GRAVITY_INPUT = (
+    "Functions that depend on gravity read it from the input gravity[3], m/s^2 in this frame, one per state."
+)
 
 
 def frame_lines(info: PackageInfo) -> tuple[str, ...]:

@@ -117,6 +117,11 @@ class PackageInfo:
         return sum(joint.nv for joint in self.joints)
 
     @property
+    def gravity_input(self) -> bool:
+        """Return whether gravity is an input of the functions that depend on it."""
+        return "gravity-input" in self.options
+
+    @property
     def is_wide(self) -> bool:
         """Return whether some joint has several coordinates. Then q, the rates and the tables of joints have different
         lengths."""

@@ -79,6 +79,8 @@ def recorded_options(directory: str | os.PathLike[str]) -> dict[str, Any]:
     more: dict[str, Any] = {option: path in files for option, path in MORE_SOURCES.items()}
     if options.get("friction") == "in-dynamics":
         more |= {"friction": "in-dynamics", "smoothing-speed": _number(options.get("smoothing-speed"))}
+    if "gravity-input" in options:
+        more["gravity-input"] = True
     adapters = tuple(name for name in ADAPTERS if any(path.startswith(f"{name}/") for path in files))
     return {**texts, "functions": tuple(named), **more, "with": adapters}
 

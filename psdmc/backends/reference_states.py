@@ -17,13 +17,15 @@ from psdmc.backends.reference_load import ReferenceLoad
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.general_gravity import for_every_gravity
 from psdmc.model.random_parameters import random_parameters
 from psdmc.model.random_states import on_joints
+from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
-from psdmc.recipes.torques import with_friction
+from psdmc.recipes.torques import pulled, with_friction, with_gravity_input
 from psdmc.reproducible import times
 
 Array = NDArray[np.float64]
@@ -85,10 +87,18 @@ def reference_states(
     functions: Collection[str] = DEFAULT,
     count: int = COUNT,
     friction: FrictionInDynamics | None = None,
+    gravity_input: bool = False,
 ) -> ReferenceStates:
     """Return states of a model, and the values of the given functions there. If the base parameters of the model are
-    unknown, function variants that contain these parameters are left out. Motor torques contain `friction`, if any."""
-    given = _drawn(model)
+    unknown, function variants that contain these parameters are left out. Motor torques contain `friction`, if any. With
+    `gravity_input`, each state has its own gravity."""
+    model = for_every_gravity(model) if gravity_input else model
+    given = _drawn(model, gravity_input)
+
+    def made(recipe: Recipe) -> Recipe:
+        own = with_friction(recipe, friction)
+        return with_gravity_input(own, RECIPES) if gravity_input else own
+
     theta_b = _other_parameters(model)
     robots = {"_theta": RobotOnArrays.of(model, theta_b)}
     if model.theta_b is not None:
@@ -97,7 +107,7 @@ def reference_states(
     best = np.sort(np.argsort(np.round(np.log10(conditions), 6), kind="stable")[:count])
     given = {name: array[best] for name, array in given.items()}
     solvable = bool(conditions[best].max() < WORST_CONDITION)
-    recipes = [with_friction(recipe, friction) for name, recipe in RECIPES.items() if name in functions]
+    recipes = [made(recipe) for name, recipe in RECIPES.items() if name in functions]
     expected: dict[str, Array] = {}
     for suffix, robot in robots.items():
         tau = _motor_torques(robot, given, friction)
@@ -108,11 +118,7 @@ def reference_states(
     expected |= _values(free, robots.get("", robots["_theta"]), given, "", solvable)
     if any(name in BY_ROWS for name in functions):
         thetas = theta_b * (1.0 + np.arange(len(given["q"])) / STEPS)[:, None]
-        own = [
-            with_friction(recipe, friction)
-            for recipe in RECIPES.values()
-            if f"{recipe.name}{THETA_ROWS}" in functions
-        ]
+        own = [made(recipe) for recipe in RECIPES.values() if f"{recipe.name}{THETA_ROWS}" in functions]
         robots_by_rows = [RobotOnArrays.of(model, theta) for theta in thetas]
         added, values = _by_rows(own, robots_by_rows, given, solvable, friction)
         given |= {THETAS.name: thetas, **added}
@@ -124,8 +130,8 @@ def _motor_torques(
     robot: RobotOnArrays, given: Mapping[str, Array], friction: FrictionInDynamics | None
 ) -> Array:
     """(k, nv) torques of the motors at q, qd and qdd."""
-    resisted = replace(robot, friction=friction)
-    return resisted.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)
+    resisted = pulled(replace(robot, friction=friction), given)
+    return resisted.torques(given["q"], given["qd"], given["qdd"], resisted.base_acceleration)
 
 
 def _by_rows(
@@ -147,7 +153,7 @@ def _by_rows(
     return {label: whole.pop(label)}, whole
 
 
-def _drawn(model: DynamicsModel) -> dict[str, Array]:
+def _drawn(model: DynamicsModel, gravity_input: bool) -> dict[str, Array]:
     """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
     robot, rng = model.mechanism, np.random.default_rng(SEED)
     sizes = Sizes(
@@ -160,6 +166,7 @@ def _drawn(model: DynamicsModel) -> dict[str, Array]:
         rows_of_loops=robot.rows_of_loops,
     )
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
+    read |= {GRAVITY.name: GRAVITY} if gravity_input else {}
     drawn = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q)))) for q in read.values()}
     return drawn | {q.name: on_joints(robot, drawn[q.name]) for q in read.values() if q.axes == Q.axes}
 

@@ -119,6 +119,13 @@ def emit(
             autocompletion=lambda: ["mass", "inertia"],
         ),
     ] = None,
+    gravity_input: Annotated[
+        bool,
+        typer.Option(
+            "--gravity-input",
+            help="gravity is an input of functions that depend on it; for a model derived with --gravity-input",
+        ),
+    ] = False,
     adapters: Annotated[
         list[str] | None,
         typer.Option(
@@ -176,6 +183,7 @@ def emit(
             target,
             **{"payload": payload, "with": names(adapters), "friction": friction or False, "bodies": bodies},
             **{"smoothing-speed": smoothing_speed},
+            **{"gravity-input": gravity_input},
             estimator=estimator,
         )
     written = len(changed) - len(changed.removed)
@@ -217,8 +225,7 @@ def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
         raise InputError(
             "--check writes nothing, and --force is about what is overwritten", "leave out --force"
         )
-    if "smoothing_speed" in given:
-        given["smoothing-speed"] = given.pop("smoothing_speed")
+    given = {word.replace("_", "-"): value for word, value in given.items()}
     lists = {"adapters": "with", "functions": "functions"}
     given |= {word: names(given.pop(key)) for key, word in lists.items() if key in given}
     with steps() as progress:

@@ -124,6 +124,12 @@ def derive(
     loops: Annotated[
         Path | None, typer.Option(metavar="LOOPS.toml", help="file with closed loops, tables [[loop]]")
     ] = None,
+    gravity_input: Annotated[
+        bool,
+        typer.Option(
+            "--gravity-input", help="base parameters for every gravity, for code with gravity as an input"
+        ),
+    ] = False,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
@@ -155,6 +161,7 @@ def derive(
             names(unknown),
             names(contacts),
             loops or (),
+            gravity_input,
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"

@@ -25,8 +25,9 @@ from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, ty
 from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derivation.rounding import merged
 from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
-from psdmc.errors import DerivationError
+from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.general_gravity import under_general_gravity
 from psdmc.progress import Progress, silent
 from psdmc.reproducible import times
 from psdmc.robot.derivable import require_derivable
@@ -56,6 +57,7 @@ def derive_model(
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
     memory: int | None = None,
+    gravity_input: bool = False,
 ) -> DynamicsModel:
     """Derive the robot's dynamics model: exponents E and coefficients P of the torques, and base parameters theta_b.
 
@@ -66,6 +68,7 @@ def derive_model(
     progress    function that is called with the name of each step as the step begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
     memory      bytes that the computation of E and P may take; default: most of the machine's free memory
+    gravity_input  True: base parameters that determine the torques under every gravity; E and P are left out
 
     Raises InputError if a joint has no coordinate of its own. Raises DerivationError if E and P would take too much
     memory or time, or if the robot has more joints than LARGEST_CHAIN. Raises DerivationError also if numbers of the
@@ -74,6 +77,15 @@ def derive_model(
     tell = progress or silent
     require_derivable(chain)
     _refuse_absurd(chain)
+    if gravity_input:
+        if expand:
+            raise InputError(
+                f"'{chain.name}': E and P contain one direction of gravity, and gravity is an input",
+                "leave --expand out",
+            )
+        origin = {**(provenance or {}), "gravity_input": True}
+        own = derive_model(under_general_gravity(chain), expand=False, progress=tell, provenance=origin)
+        return replace(own, mechanism=replace(own.mechanism, gravity=chain.gravity))
     chain = with_passive_joints(chain, require_closable(chain))
     if expand is None:
         expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)

@@ -44,6 +44,7 @@ RECIPE = Recipe(
         (Q,),
         (G,),
         theta=True,
+        weighs=True,
         summary="Compute the gravity torques g(q): the torques that keep the robot at rest.",
     ),
     "gravity",

@@ -49,6 +49,7 @@ RECIPE = Recipe(
             jacobian_of("g", "q"),
         ),
         theta=True,
+        weighs=True,
         summary="Compute the gravity torques g(q). Also compute the derivatives of g by q.",
     ),
     "derivatives of gravity",

@@ -46,6 +46,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=True,
+        weighs=True,
         summary="Compute the sum of the Coriolis, centrifugal and gravity torques: h(q, qd) = C(q, qd) qd + g(q). C "
         "is the Coriolis matrix, g the gravity torques.",
     ),

@@ -43,6 +43,7 @@ RECIPE = Recipe(
         (Q,),
         (Quantity("U", means="potential energy, J; zero at q = neutral()", unit="J"),),
         theta=True,
+        weighs=True,
         summary="Compute the potential energy U(q) of the links in the gravity field. Its derivatives by q are "
         "the gravity torques g(q).",
     ),

@@ -44,6 +44,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
+        weighs=True,
         summary="Compute the regressor Y(q, qd, qdd), with which the torques of inverse dynamics are tau = Y "
         "theta_b. The base parameters theta_b are combinations of masses and inertias.",
     ),

@@ -59,6 +59,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
+        weighs=True,
         summary="Compute the regressor Y of Slotine and Li's adaptive control (1987): Y theta_b = M(q) qdd_r + "
         "C(q, qd) qd_r + g(q). theta_b are the base parameters, M is the mass matrix, C the Coriolis matrix, and "
         "g the gravity torques.",

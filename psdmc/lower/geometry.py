@@ -17,10 +17,13 @@ LARGE = 10
 
 class Geometry:
     """The new joint frames of one model and the possible carriers (nonzero parameters). They depend neither on the
-    generated function, nor on whether theta_b is constant in the code."""
+    generated function, nor on whether theta_b is constant in the code.
 
-    def __init__(self, chain: Mechanism, representative: Array) -> None:
-        self.chain, self.representative = chain, representative
+    turns_base  whether the base may be turned about the first axis, to align it with gravity
+    """
+
+    def __init__(self, chain: Mechanism, representative: Array, turns_base: bool = True) -> None:
+        self.chain, self.representative, self.turns_base = chain, representative, turns_base
         self._reframed: dict[tuple[Foot, ...], Reframed] = {}
         self._spaces: dict[Reframed, CarrierSpace] = {}
 
@@ -41,7 +44,7 @@ class Geometry:
         feet  for each joint, whether this is the normal to the previous or to the next axis
         """
         if feet not in self._reframed:
-            self._reframed[feet] = reframe(self.chain, feet)
+            self._reframed[feet] = reframe(self.chain, feet, self.turns_base)
         return self._reframed[feet]
 
     @cached_property

@@ -27,6 +27,7 @@ from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.general_gravity import for_every_gravity
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out
@@ -36,7 +37,7 @@ from psdmc.program.theta_rows import kernel_by_rows
 from psdmc.progress import Step
 from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
-from psdmc.recipes.torques import with_friction
+from psdmc.recipes.torques import with_friction, with_gravity_input
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.costs import Costs
@@ -67,6 +68,7 @@ def lower(
     theta_variants: bool = True,
     costs: Costs = COSTS,
     friction: FrictionInDynamics | None = None,
+    gravity_input: bool = False,
 ) -> dict[str, Kernel]:
     """Return the kernel (operations) of each function by name, in the order of psdmc.functions.
 
@@ -75,11 +77,13 @@ def lower(
     theta_variants  whether to make also the variants NAME_theta, with theta_b as an argument
     costs           costs of operations on the target processor
     friction        joint friction that motor torques contain; None: they have none
+    gravity_input   whether gravity is an input of the functions that depend on it
 
-    Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q.
+    Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q. Raises
+    InputError also if gravity is an input and the base parameters do not determine the torques under every gravity.
     """
     require_derivable(model.mechanism)
-    lowered = _Lowered(model, lowering, costs, friction)
+    lowered = _Lowered(model, lowering, costs, friction, gravity_input)
     kernels: dict[str, Kernel] = {}
     names = wanted(functions, model.mechanism)
     for number, name in enumerate(names):
@@ -188,10 +192,17 @@ class _Lowered:
         lowering: Lowering,
         costs: Costs,
         friction: FrictionInDynamics | None = None,
+        gravity_input: bool = False,
     ) -> None:
-        self.model, self.lowering, self.costs, self.friction = model, lowering, costs, friction
+        self.model = for_every_gravity(model) if gravity_input else model
+        self.lowering, self.costs, self.friction, self.gravity_input = (
+            lowering,
+            costs,
+            friction,
+            gravity_input,
+        )
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
-        self.geometry = Geometry(model.mechanism, model.representative)
+        self.geometry = Geometry(self.model.mechanism, model.representative, not gravity_input)
         self._searches: dict[bool, Search] = {}
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
         self._limbs: dict[str, LimbArrangement | None] = {}
@@ -201,7 +212,7 @@ class _Lowered:
 
     def check(self, recipe: Recipe) -> None:
         """Raise InputError if the recipe's function adds unlike quantities, such as a mass and a length."""
-        traced = RECIPES[recipe.packs.function] if recipe.packs else recipe
+        traced = self._given_gravity(RECIPES[recipe.packs.function] if recipe.packs else recipe)
         if traced.regions is None or self.model.nv <= TRACED:
             check_dimensions(
                 traced,
@@ -210,8 +221,8 @@ class _Lowered:
             )
 
     def recipe(self, recipe: Recipe) -> Recipe:
-        """Return the recipe of a function with the joint friction of this lowering. Raises InputError for a function whose
-        list of entries has no place for friction."""
+        """Return the recipe of a function with the joint friction and the gravity of this lowering. Raises InputError for a
+        function whose list of entries has no place for friction."""
         whole = RECIPES[recipe.packs.function] if recipe.packs else recipe
         if self.friction is not None and recipe.packs and whole.signature.has_motor_torques:
             raise InputError(
@@ -220,8 +231,15 @@ class _Lowered:
             )
         calls = any(RECIPES[name].signature.has_motor_torques for name in recipe.signature.calls)
         if self.friction is not None and calls and not recipe.signature.has_motor_torques:
-            return replace(recipe, regions=None)  # its loops would call a function with friction
-        return with_friction(recipe, self.friction)
+            recipe = replace(recipe, regions=None)  # its loops would call a function with friction
+        return self._given_gravity(with_friction(recipe, self.friction))
+
+    def _given_gravity(self, recipe: Recipe) -> Recipe:
+        return with_gravity_input(recipe, RECIPES) if self.gravity_input else recipe
+
+    def _known(self, name: str) -> Recipe:
+        """The recipe whose search results others use."""
+        return self._given_gravity(RECIPES[name])
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
         """Return the kernel (operations) of one function. The kernel is stored at the first call, because the kernel of
@@ -238,7 +256,7 @@ class _Lowered:
 
     def _packed(self, recipe: Recipe, packing: Packing, theta: bool) -> Kernel:
         """Pack a matrix function's kernel from the function of the whole matrix."""
-        dense, sizes = RECIPES[packing.function], self._search(theta).robot.sizes
+        dense, sizes = self._known(packing.function), self._search(theta).robot.sizes
         _, columns = sizes.shape(dense.signature.outputs[0].axes)
         places = packing.places(self.model.mechanism, self.model.representative)
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
@@ -250,7 +268,7 @@ class _Lowered:
             regions = recipe.regions(unmoved.frames, unmoved.named, **of_loops)
             program = NOTHING
             if self.model.nv <= TRACED:
-                arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
+                arranged = self._arrangement(self._known(recipe.shares or recipe.name), theta)
                 traced = trace_dynamics(recipe, arranged, self._search(theta).robot)
                 program = written_out(traced, recipe.signature.products)
             kernel = Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
@@ -299,7 +317,7 @@ class _Lowered:
         """Put limbs of equal structure into lanes, if that is cheaper."""
         if self.model.mechanism.is_serial or self.lowering == "expanded":
             return kernel
-        shared = RECIPES[recipe.shares] if recipe.shares else recipe
+        shared = self._known(recipe.shares) if recipe.shares else recipe
         found = self._limb_arrangement(shared)
         if found is None or not have_contacts_alike(recipe, found.arrangement.reframed, found.groups):
             return kernel
@@ -358,7 +376,7 @@ class _Lowered:
     def _traces(self, recipe: Recipe, theta: bool) -> Iterator[Program]:
         search, geometry = self._search(theta), self.geometry
         if recipe.signature.theta:
-            arranged = RECIPES[recipe.shares] if recipe.shares else recipe
+            arranged = self._known(recipe.shares) if recipe.shares else recipe
             yield from search.rearrangements(recipe, self._arrangement(arranged, theta))
             return
         frames = [geometry.reframed(feet) for feet in geometry.feet]
@@ -380,7 +398,7 @@ class _Lowered:
     def _arrangement(self, recipe: Recipe, theta: bool) -> Arrangement:
         key = recipe.name, theta
         if key not in self._arrangements:
-            start = self._arrangement(RECIPES[recipe.starts], theta) if recipe.starts else None
+            start = self._arrangement(self._known(recipe.starts), theta) if recipe.starts else None
             self._arrangements[key] = self._search(theta).best(recipe, self.single, start)
         return self._arrangements[key]
 

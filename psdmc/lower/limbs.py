@@ -274,6 +274,8 @@ class _Trace:
                 for each in self.contacts
                 for row in range(each.frame.rows if axis.endswith("rows") else 1)
             ]
+        if axis.isdecimal():
+            return [(None, (k,)) for k in range(int(axis))]
         return [(place.group, own) for place in self.places for own in self._entries(place, axis)]
 
     def _along_several(self, parts: Sequence[str]) -> list[tuple[int | None, tuple[int, ...]]]:

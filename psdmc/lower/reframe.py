@@ -90,15 +90,17 @@ def _is_same(a: Placement, b: Placement) -> bool:
     return np.array_equal(a.rotation, b.rotation) and np.array_equal(a.translation, b.translation)
 
 
-def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
+def reframe(chain: Mechanism, feet: Sequence[Foot], turns_base: bool = True) -> Reframed:
     """Return the robot with new joint frames in modified DH convention.
 
-    feet  for each joint, whether the frame's origin is on the common normal to the previous axis or to the next axis
+    feet        for each joint, whether the frame's origin is on the common normal to the previous axis or to the next axis
+    turns_base  whether the base may be turned about the first axis, to align it with gravity
     """
     placed, reach = _placed_at_zero(chain), _reach(chain)
     axes = [clean_direction(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
-    before, after = _orientations(chain, placed, axes, origins)
+    first = _first_x(chain, placed[0], axes[0]) if turns_base else placed[0].rotation[:, 0]
+    before, after = _orientations(chain, placed, axes, origins, first)
     frames, link_frames = [], []
     for i, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):
         outer, foot = (before[0], origins[0]) if parent == BASE else (after[parent], origins[parent])
@@ -248,10 +250,15 @@ def _origins(
 
 
 def _orientations(
-    chain: Mechanism, placed: Sequence[Placement], axes: Sequence[Array], origins: Sequence[Array]
+    chain: Mechanism,
+    placed: Sequence[Placement],
+    axes: Sequence[Array],
+    origins: Sequence[Array],
+    first: Array,
 ) -> tuple[list[Array], list[Array]]:
-    """Each frame's axes before and after its joint's turn, at q = 0, as columns in the base frame."""
-    children, first = _first_children(chain), _first_x(chain, placed[0], axes[0])
+    """Each frame's axes before and after its joint's turn, at q = 0, as columns in the base frame. `first` is the x
+    direction of the first frame."""
+    children = _first_children(chain)
     before: list[Array] = []
     after: list[Array] = []
     for i, (parent, child) in enumerate(zip(chain.parents, children, strict=True)):

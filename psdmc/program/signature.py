@@ -201,6 +201,7 @@ class Signature:
     summary   one or two sentences on what it computes, for Python and the table of docs/functions.md
     calls     names of the functions that the C code calls, such as one for each stage of an integration step
     spoilt    name of its outputs in sentences about failure, such as "accelerations"
+    weighs    whether the function depends on gravity although it has no motor torques
     """
 
     name: str
@@ -217,6 +218,7 @@ class Signature:
     normalizes: bool = False
     summary: str = ""
     spoilt: str = "results"
+    weighs: bool = False
 
     def __post_init__(self) -> None:
         names = [q.name for q in (*self.inputs, *self.stored)] + [product.right for product in self.products]
@@ -231,6 +233,11 @@ class Signature:
         joint friction can be a part of the function."""
         names = {quantity.name for quantity in self.inputs}
         return self.theta and QD.name in names and bool({TAU.name, QDD.name} & names)
+
+    @property
+    def depends_on_gravity(self) -> bool:
+        """Return whether the results depend on gravity."""
+        return self.weighs or self.has_motor_torques
 
     @property
     def stored(self) -> tuple[Quantity, ...]:

@@ -34,12 +34,14 @@ class RobotOnArrays:
     x         (11 n,) standard parameters about the link frames, 11 for each of n links
     lift      (11 n, l) matrix that gives x from the l base parameters
     friction  joint friction, which all torques with `qd` contain; None: they have none
+    gravity   (k, 3) gravity of each of k states, m/s^2 in the base frame; None: that of `chain`
     """
 
     chain: Mechanism
     x: Array
     lift: Array
     friction: FrictionInDynamics | None = None
+    gravity: Array | None = None
 
     @classmethod
     def of(cls, model: DynamicsModel, theta_b: Array) -> Self:
@@ -60,7 +62,10 @@ class RobotOnArrays:
 
     @cached_property
     def base_acceleration(self) -> Vector:
-        return base_acceleration(self.chain)
+        if self.gravity is None:
+            return base_acceleration(self.chain)
+        x, y, z = -self.gravity.T
+        return (x, y, z)
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:

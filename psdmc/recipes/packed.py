@@ -39,6 +39,7 @@ def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packi
             factorises=function.factorises,
             calls=function.calls,
             summary=summary,
+            weighs=function.weighs,
         ),
         title=f"{dense.title}, packed",
         reference=reference,

@@ -10,10 +10,11 @@ from operator import add, sub
 from psdmc.dynamics.derivatives import Derivatives, Rows, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import part_of, with_carriers
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
-from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.dynamics.scalar import Scalar, Vector, dot
 from psdmc.dynamics.slices import flat, joints_of_rates, positions
 from psdmc.friction.in_dynamics import FrictionInDynamics
-from psdmc.recipes.recipe import Ingredients, Recipe
+from psdmc.program.gravity_input import GRAVITY, pass_gravity_on, takes_gravity
+from psdmc.recipes.recipe import Given, Ingredients, Recipe, RobotOnArrays
 
 
 def torques(
@@ -88,6 +89,42 @@ def with_friction(recipe: Recipe, friction: FrictionInDynamics | None) -> Recipe
         polynomials=None,
         in_limbs=False,
     )
+
+
+def with_gravity_input(recipe: Recipe, functions: Mapping[str, Recipe]) -> Recipe:
+    """Return the recipe of a function to which callers give gravity. A function that does not depend on gravity keeps its
+    inputs. If its loops call one that does, they give it no gravity: the effects of gravity cancel.
+
+    Code with this input has no expanded form, because gravity in P has one direction.
+
+    functions  all recipes by name, among them those of the functions that the function calls
+    """
+    loops, depends = recipe.regions, recipe.signature.depends_on_gravity
+    called = {name for name in recipe.signature.calls if functions[name].signature.depends_on_gravity}
+    if loops is not None:
+        recipe = replace(
+            recipe, regions=lambda *frames, **more: pass_gravity_on(loops(*frames, **more), called, depends)
+        )
+    if not depends:
+        return recipe
+    return replace(
+        recipe,
+        signature=takes_gravity(recipe.signature),
+        trace=lambda g: recipe.trace(replace(g, base_acceleration=_against_gravity(g))),
+        reference=lambda robot, given: recipe.reference(pulled(robot, given), given),
+        polynomials=None,
+    )
+
+
+def _against_gravity(g: Ingredients) -> Vector:
+    """Minus the input gravity, along g.base_axes."""
+    x, y, z = (-dot(axis, tuple(g.inputs[GRAVITY.name])) for axis in zip(*g.base_axes, strict=True))
+    return (x, y, z)
+
+
+def pulled(robot: RobotOnArrays, given: Given) -> RobotOnArrays:
+    """Return the robot under the gravity of each state, if gravity is an input."""
+    return replace(robot, gravity=given.get(GRAVITY.name))
 
 
 def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:

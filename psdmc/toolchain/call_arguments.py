@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from psdmc.errors import InputError
+from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.real_arrays import AxisNames, real_array
 from psdmc.robot.unit_lengths import refuse_other_lengths
@@ -106,6 +107,8 @@ def other_shape(
         hint = "give one value per base parameter"
     if "frames" in words:
         hint = f"the frames are {', '.join(frames)}"
+    if words == GRAVITY.axes:
+        hint = "give three numbers, such as (0, 0, -9.81)"
     if {"contacts", "contact_rows"} & {*words}:
         hint = f"the contacts are {', '.join(axes.names['contacts'])}; a point has 3 rows, a surface 6"
     return f"{what} has shape {shape}, expected ({expected})", hint

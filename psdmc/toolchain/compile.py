@@ -17,8 +17,11 @@ from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.package_files import library_files
 from psdmc.errors import InternalError, ToolchainError
 from psdmc.functions import BY_ROWS, SIGNATURES
+from psdmc.program.gravity_input import takes_gravity
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
+from psdmc.program.signature import Signature
+from psdmc.program.theta_rows import THETA_ROWS, by_rows
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 from psdmc.toolchain.cache import cache_key, cached, found
@@ -127,11 +130,14 @@ DECIDES = ("dynamics", "friction", "functions", "lower", "model", "program", "re
 """Folders of psdmc whose files the result of a lowering depends on, beside the modules at psdmc's top level."""
 
 
-def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
+def lowered_once(
+    parts: Sequence[str], lower: Callable[[], dict[str, Kernel]], gravity_input: bool = False
+) -> dict[str, Kernel]:
     """Return the generated programs (kernels) that the function `lower` computes. They come from the compile cache if
     an equal call was made before.
 
-    parts  everything that the result depends on except psdmc's own sources: the model's hash, the options
+    parts          everything that the result depends on except psdmc's own sources: the model's hash, the options
+    gravity_input  whether gravity is an input of the functions that depend on it
 
     If the cache cannot be used, `lower` is called and its result is not stored.
     """
@@ -144,9 +150,18 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
     key = cache_key({}, ("kernels", *sources_digests(), *parts))
     try:
         kept = cached(key, build, [KERNELS]) / KERNELS
-        return made or kernels_from_json(kept.read_text(encoding="utf-8"), SIGNATURES | BY_ROWS)
+        return made or kernels_from_json(kept.read_text(encoding="utf-8"), _known(gravity_input))
     except (ToolchainError, InternalError, OSError):
         return made or lower()
+
+
+@cache
+def _known(gravity_input: bool) -> dict[str, Signature]:
+    """The functions that kept kernels can be of."""
+    if not gravity_input:
+        return SIGNATURES | BY_ROWS
+    found = {name: takes_gravity(each) for name, each in SIGNATURES.items()}
+    return found | {f"{name}{THETA_ROWS}": by_rows(each) for name, each in found.items() if each.theta}
 
 
 @cache

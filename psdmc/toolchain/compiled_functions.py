@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
+from psdmc.program.gravity_input import GRAVITY, takes_gravity
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.robot.mechanism import ROW_NAMES
@@ -262,6 +263,7 @@ class CompiledFunctions(RobotFacts):
         inputs: Sequence[ArrayLike],
         theta_b: ArrayLike | None = None,
         out: Any = None,
+        gravity: ArrayLike | None = None,
     ) -> Any:
         """Call a generated function by its entry in `psdmc.functions.SIGNATURES`, and return the result.
 
@@ -271,7 +273,9 @@ class CompiledFunctions(RobotFacts):
         inputs    the inputs of the function, as a list of arrays
         theta_b   base parameters that replace those in the code, (l,), or (..., l), one set per state; optional
         out       array into which psdmc writes the result, or a tuple of arrays for several results; optional
+        gravity   (3,), or (..., 3), one gravity per state, for a robot compiled with `gravity_input=True`; optional
         """
+        function, inputs = self._with_gravity(function, inputs, gravity)
         variant = "" if theta_b is None else "_theta"
         if has_rows(function, theta_b):
             variant = THETA_ROWS
@@ -296,6 +300,20 @@ class CompiledFunctions(RobotFacts):
                 array[...] = values
         outs = kept or outs
         return outs[0] if len(outs) == 1 else results(function)(*outs)
+
+    def _with_gravity(
+        self, function: Signature, inputs: Sequence[ArrayLike], gravity: ArrayLike | None
+    ) -> tuple[Signature, Sequence[ArrayLike]]:
+        """The function with gravity among its inputs, if the package has it there."""
+        if function.depends_on_gravity and self._interface.gravity_input:
+            given = self.gravity_acceleration if gravity is None else gravity
+            return takes_gravity(function), (*inputs, given)
+        if gravity is not None:
+            raise InputError(
+                f"{self._robot}: {function.name} has no input gravity",
+                'compile with gravity_input=True; functions such as "mass_matrix" do not depend on gravity',
+            )
+        return function, inputs
 
     def pattern(self, name: str) -> tuple[Array, Array]:
         """Return the row indices and the column indices, (k,) each, of the k matrix entries that can differ from zero.
@@ -347,7 +365,8 @@ class CompiledFunctions(RobotFacts):
     ) -> Any:
         """The outputs as Dask's or xarray's arrays, as the inputs are."""
         refuse_out(function, out)
-        call = OnArrays(self, function.name, theta_b)
+        gravity = function.inputs.index(GRAVITY) if GRAVITY in function.inputs else None
+        call = OnArrays(self, function.name, theta_b, gravity)
         found = foreign(call, self._axes, function, inputs, kernel.tails, self._dtype)
         return found[0] if len(found) == 1 else results(function)(*found)
 
@@ -415,15 +434,22 @@ class CompiledFunctions(RobotFacts):
 @dataclass(frozen=True, slots=True)
 class OnArrays:
     """A function of a robot, with optional base parameters theta_b, that can be called with arrays. The object can be
-    pickled and sent to other processes."""
+    pickled and sent to other processes.
+
+    gravity  number of the array that is gravity; None: none is
+    """
 
     robot: CompiledFunctions
     function: str
     theta_b: ArrayLike | None
+    gravity: int | None
 
     def __call__(self, *arrays: Any) -> Any:
-        parameters = {} if self.theta_b is None else {"theta_b": self.theta_b}
-        return getattr(self.robot, self.function)(*arrays, **parameters)
+        named = {} if self.theta_b is None else {"theta_b": self.theta_b}
+        if self.gravity is not None:
+            named["gravity"] = arrays[self.gravity]
+            arrays = (*arrays[: self.gravity], *arrays[self.gravity + 1 :])
+        return getattr(self.robot, self.function)(*arrays, **named)
 
 
 def _opened(ffi: cffi.FFI, library: Path, robot: str) -> Any:

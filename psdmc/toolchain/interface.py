@@ -18,7 +18,7 @@ from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import contact_names
 
-FORMAT = 8
+FORMAT = 9
 """Version of the text's form."""
 
 
@@ -39,6 +39,7 @@ class Interface:
     units        (start, stop) slices (start, stop) of q that must have length one, such as quaternions
     limits       n rows: lower, upper, speed, acceleration, effort; infinite if unknown
     gravity      3 numbers, m/s^2 along the axes of the base frame
+    gravity_input  whether gravity is an input of the functions that depend on it
     base_frame   name of that frame in words: the base frame, or the world frame of a floating base
     theta_b      l base parameters; None if unknown
     kernels      name of each generated function in C -> shapes of the function's results for one state
@@ -62,6 +63,7 @@ class Interface:
     units: tuple[tuple[int, int], ...]
     limits: tuple[tuple[float, ...], ...]
     gravity: tuple[float, ...]
+    gravity_input: bool
     base_frame: str
     theta_b: tuple[float, ...] | None
     kernels: Mapping[str, tuple[tuple[int, ...], ...]]
@@ -108,6 +110,7 @@ def interface_of(package: PackageView) -> Interface:
         units=package.info.units,
         limits=tuple((j.lower, j.upper, j.speed, j.acceleration, j.effort) for j in package.info.joints),
         gravity=package.info.gravity,
+        gravity_input=package.info.gravity_input,
         base_frame=package.info.base_frame,
         theta_b=known if len(known) == len(values) else None,
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},

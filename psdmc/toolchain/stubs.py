@@ -161,7 +161,7 @@ def stub(functions: Iterable[Signature]) -> str:
     """Return the text of call.pyi."""
     shown = tuple(functions)
     several = [line for function in shown if len(function.outputs) > 1 for line in _results(function)]
-    methods = [line for function in shown for line in _method(function)]
+    methods = [line for function in shown for line in _method(function, function.depends_on_gravity)]
     return (
         "\n".join([_HEAD, *several, "class CompiledRobot(CompiledFunctions, Generic[RealT]):", *methods])
         + "\n"
@@ -178,13 +178,14 @@ def _results(function: Signature) -> list[str]:
     return [f"class {result_name(function)}(NamedTuple, Generic[RealT]):", *fields, ""]
 
 
-def _method(function: Signature) -> list[str]:
+def _method(function: Signature, with_gravity: bool = False) -> list[str]:
     given = [
         f"{q.name}: ArrayLike" + ("" if q.default is None else f" = {q.default}") for q in function.inputs
     ]
     given += ["theta_b: ArrayLike | None = None"] if function.theta else []
     one = "NDArray[RealT] | None" if len(function.outputs) == 1 else "tuple[NDArray[RealT], ...] | None"
-    given = ["self", *given, "*", f"out: {one} = None"]
+    gravity = ["gravity: ArrayLike | None = None"] if with_gravity else []
+    given = ["self", *given, "*", *gravity, f"out: {one} = None"]
     returns = "NDArray" if len(function.outputs) == 1 else result_name(function)
     return [f"    def {function.name}({', '.join(given)}) -> {returns}[RealT]: ..."]
 

@@ -32,7 +32,7 @@ def test_bash_gets_commands_options_and_values() -> None:
 
     assert answer("psdmc de") == ["derive"]
     assert {"emit-c", "show", "calibrate"} <= set(answer("psdmc "))
-    assert answer("psdmc derive --grav") == ["--gravity"]
+    assert answer("psdmc derive --grav") == ["--gravity", "--gravity-input"]
     assert answer("psdmc emit-c m.npz --target cortex") == ["cortex-m4f", "cortex-m7"]
     assert answer("psdmc emit-c m.npz --lowering f") == ["factored"]
 

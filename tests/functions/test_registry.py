@@ -93,6 +93,7 @@ def test_every_function_is_a_method_with_its_arguments_and_summary() -> None:
             "self",
             *(q.name for q in signature.inputs),
             *(["theta_b"] if signature.theta else []),
+            *(["gravity"] if signature.depends_on_gravity else []),
             "out",
         ]
         assert list(method.__signature__.parameters) == expected

@@ -246,7 +246,7 @@ def test_a_call_is_described_as_the_method_that_it_is(robot: CompiledRobot) -> N
     call = robot.inverse_dynamics
     assert call.__name__ == "inverse_dynamics"
     assert call.__self__ is robot
-    assert str(inspect.signature(call)) == "(q, qd, qdd, theta_b=None, *, out=None)"
+    assert str(inspect.signature(call)) == "(q, qd, qdd, theta_b=None, *, gravity=None, out=None)"
     assert "\nqdd      (..., nv) joint accelerations, rad/s^2" in call.__doc__
     assert "\ntau  (..., nv) joint torques" in call.__doc__.split("Returns an array:")[1]
     assert callable(call)

@@ -34,6 +34,7 @@ class CppArrayMethod:
 
     output  the output that is returned, of type result_type; '' if all outputs are parameters. Outputs are parameters
             if there are several, or if the C function returns a status
+    called  name of the member that it calls; with the name of the class if a parameter has the member's name
     """
 
     name: str
@@ -42,6 +43,7 @@ class CppArrayMethod:
     arguments: str
     result_type: str
     output: str
+    called: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +85,7 @@ def cpp_classes(functions: Iterable[FunctionView], n: int) -> tuple[CppClass, Cp
 
 def _class(name: str, kernels: list[KernelView], n: int, theta: bool = False) -> CppClass:
     methods = [_method(k, p) for k in kernels for p in k.prototypes.values()]
-    return CppClass(name, theta, tuple(methods), tuple(_array_method(k, n) for k in kernels))
+    return CppClass(name, theta, tuple(methods), tuple(_array_method(k, n, name) for k in kernels))
 
 
 def _method(kernel: KernelView, prototype: Prototype) -> CppMethod:
@@ -111,20 +113,23 @@ def _cpp_type(kind: str) -> str:
     )
 
 
-def _array_method(kernel: KernelView, n: int) -> CppArrayMethod:
+def _array_method(kernel: KernelView, n: int, owner: str) -> CppArrayMethod:
     """The member function for one state; several results, or one with a status, are written to the last parameters."""
     inputs = [f"const {_array(vector.size, n)} &{vector.name}" for vector in kernel.inputs]
     outputs = [f"{_array(output.size)} &{output.name}" for output in kernel.outputs]
     status = "int" if kernel.positive else "void"
     returned = kernel.outputs[0] if status == "void" and len(outputs) == 1 else None
     result = _array(returned.size) if returned else ""
+    name = kernel.name.removesuffix("_theta")
+    is_hidden = name in (vector.name for vector in kernel.inputs)
     return CppArrayMethod(
-        name=kernel.name.removesuffix("_theta"),
+        name=name,
         returns=result or status,
         parameters=", ".join(inputs if returned else [*inputs, *outputs]),
         arguments=", ".join(f"{vector.name}.data()" for vector in (*kernel.inputs, *kernel.outputs)),
         result_type=result,
         output=returned.name if returned else "",
+        called=f"{owner}::{name}" if is_hidden else name,
     )
 
 
