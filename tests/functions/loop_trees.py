@@ -7,12 +7,10 @@ from functools import cache, cached_property
 
 import numpy as np
 import pinocchio as pin
-from contact_trees import FOOT, TRUNK
+from contact_trees import FOOT, TRUNK, OneByOne
 from mimic_trees import as_urdf
 from random_trees import TREES, RandomTree
-from unoptimised import without_optimisation
 
-import psdmc
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
@@ -21,7 +19,6 @@ from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.reference import reference
-from psdmc.toolchain.call import CompiledRobot
 from psdmc.verification.source import with_passive_joints
 
 Array = np.ndarray
@@ -62,9 +59,8 @@ class LoopTree:
         return derive_model(self.loaded.mechanism, expand=False)
 
     @cached_property
-    def robot(self) -> CompiledRobot:
-        with without_optimisation():
-            return psdmc.compile(self.model, functions=FUNCTIONS)
+    def robot(self) -> OneByOne:
+        return OneByOne(self.model)
 
     @cached_property
     def given(self) -> dict[str, Array]:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from loop_trees import loop_tree
+from slow_cases import slow_but_for
 from test_loop_error import TREES
 
 import psdmc
@@ -93,8 +94,17 @@ VALUES = (
 )
 
 
-@pytest.mark.parametrize("name", [*VALUES, *DERIVATIVES])
-@pytest.mark.parametrize(("seed", "floating"), TREES)
+QUICK = (NAME, f"{NAME}_derivatives", f"{NAME}_vjp", "impulse", "passive_motion", "loop_inverse_dynamics")
+
+
+@pytest.mark.parametrize(
+    ("seed", "floating", "name"),
+    slow_but_for(
+        [(0, True, name) for name in QUICK],
+        [(*tree.values, name) for tree in TREES for name in (*VALUES, *DERIVATIVES)],
+        spread=True,
+    ),
+)
 def test_trees_with_loops_have_the_dense_systems_solution(seed: int, floating: bool, name: str) -> None:
     """From Pinocchio's numbers of both frames, with the contact on and off, and mu = 0 or more. A stage of a step can be
     where rows of a loop nearly depend on each other."""
@@ -108,7 +118,9 @@ def test_trees_with_loops_have_the_dense_systems_solution(seed: int, floating: b
                 assert np.abs(value - array)[far].max() <= bound * np.abs(array).max()
 
 
-@pytest.mark.parametrize(("name", "rate"), [(NAME, "qd"), ("impulse", "qd_before")])
+@pytest.mark.parametrize(
+    ("name", "rate"), slow_but_for([(NAME, "qd")], [(NAME, "qd"), ("impulse", "qd_before")], spread=True)
+)
 def test_derivatives_are_differences_of_the_dense_systems_solutions(name: str, rate: str) -> None:
     """Central differences of sixth order, with gains, of Pinocchio's numbers alone."""
     own, step = loop_tree(0, True), 2e-3
