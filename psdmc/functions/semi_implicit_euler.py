@@ -43,7 +43,8 @@ RECIPE = Recipe(
         (Q_NEXT, QD_NEXT),
         theta=True,
         summary="Compute the state after one step of semi-implicit Euler: qd_next = qd + dt qdd, q_next = q + dt "
-        "qd_next. qdd are the accelerations of forward dynamics.",
+        "qd_next. With a ball joint or a floating base, q_next = integrate(q, dt qd_next). qdd are the accelerations of "
+        "forward dynamics.",
         factorises=(MASS_MATRIX,),
         spoilt="states",
     ),

@@ -239,12 +239,11 @@ class DynamicsModel(Answers):
 
         Each of the n links has 11 standard parameters: mass, first moments (3), inertias (6) and drive inertia. Many
         vectors x give the same base parameters and therefore the same torques. R computes one of these vectors: one
-        entry of x for each base parameter (its pivot, see `pivots`) has the value of the base parameter. All other entries
-        are zero.
+        entry of x for each base parameter (its pivot, see `pivots`) has the value of the base parameter. Without the
+        option `assume_zero` of `derive`, all other entries are zero.
 
-        The option `assume_zero` of `derive` sets link parameters to zero, such as inertias about a centre of mass. Entries
-        of x can then depend on each other, so entries that are no pivots can also differ from zero. For example, let a
-        link be a point mass on its z axis. Its inertias Ixx and Iyy are equal, so if Ixx is a pivot, Iyy has the same value.
+        With `assume_zero`, entries that are no pivots can differ from zero. For example, `assume_zero` can make a link a
+        point mass on its z axis. Its inertias Ixx and Iyy are then equal. If Ixx is a pivot, Iyy has the same value.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
