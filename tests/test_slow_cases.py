@@ -25,14 +25,15 @@ def test_a_quick_case_that_is_none_is_said() -> None:
 
 
 def test_ci_runs_all_that_make_test_leaves_out() -> None:
-    """Each commit runs one half of the longer tests."""
+    """Each commit runs one third of the longer tests."""
     recipes = (ROOT / "Makefile").read_text(encoding="utf-8")
     called = re.findall(
-        r'^ *(?:"\$\{bare\[@\]\}" )?make (\S+)', (ROOT / ".ci/run").read_text(encoding="utf-8"), re.M
+        r'^ *(?:\d\) )?(?:"\$\{bare\[@\]\}" )?make (\S+)', (ROOT / ".ci/run").read_text(encoding="utf-8"), re.M
     )
 
     assert {"demo", "test", "test-machines", "test-slow"} <= set(called)
     assert called.index("test") < called.index("test-slow")
     assert "-m 'not slow' tests\n" in recipes
-    assert "-m slow tests\n" in recipes
+    assert "-m slow $(SLOW)\n" in recipes
+    assert "SLOW ?= tests\n" in recipes
     assert {"test-demo", "test-accuracy", "test-lowest"} <= set(called)

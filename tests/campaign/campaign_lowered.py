@@ -68,8 +68,8 @@ def _lowered_once() -> Iterator[None]:
     do it anew, three times a robot."""
     first: dict[int, kernels._Lowered] = {}
 
-    def lowered(model: DynamicsModel, lowering: Lowering, costs: Costs, _: None = None) -> kernels._Lowered:
-        one = _LOWERED(model, lowering, costs)
+    def lowered(model: DynamicsModel, lowering: Lowering, costs: Costs, *others: object) -> kernels._Lowered:
+        one = _LOWERED(model, lowering, costs, *others)
         known = first.setdefault(id(model), one)
         if known.costs == costs:
             for part in ("geometry", "_searches", "_arrangements", "_traced"):

@@ -183,7 +183,7 @@ def test_one_side_is_enough(arm):
 def test_what_friction_alone_explains_is_a_doubt_that_says_what_to_check():
     """A level whose unit is not known has none."""
     piled = Saturated("J2", 12.1, 0.08, False), Saturated("J3", 3.0, 0.05, False, "N")
-    found = SimpleNamespace(evidence=SimpleNamespace(saturated=piled))
+    found = SimpleNamespace(evidence=SimpleNamespace(saturated=piled), record=SimpleNamespace(facts={}))
     assert next(doubts(cast("Findings", found))).words == (
         "the effort may be cut off at a limit, or this may be friction alone: joint J2 at 12.1 in 8%, J3 at 3 N in 5% of "
         "its moving rows: if the drive or sensor has that limit, record again with slower motions"
