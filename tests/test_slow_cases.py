@@ -28,7 +28,9 @@ def test_ci_runs_all_that_make_test_leaves_out() -> None:
     """Each commit runs one third of the longer tests."""
     recipes = (ROOT / "Makefile").read_text(encoding="utf-8")
     called = re.findall(
-        r'^ *(?:\d\) )?(?:"\$\{bare\[@\]\}" )?make (\S+)', (ROOT / ".ci/run").read_text(encoding="utf-8"), re.M
+        r'^ *(?:\d\) )?(?:"\$\{bare\[@\]\}" )?make (\S+)',
+        (ROOT / ".ci/run").read_text(encoding="utf-8"),
+        re.M,
     )
 
     assert {"demo", "test", "test-machines", "test-slow"} <= set(called)

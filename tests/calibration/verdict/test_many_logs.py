@@ -32,7 +32,9 @@ def folder(arm, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for k in range(GOOD):
         recorded(path, f"good{k}", Worn(seed=k), table)
     heavier = path / "heavier.toml"
-    heavier.write_text(table.read_text(encoding="utf-8").replace("mass = 1.5", "mass = 1.6"), encoding="utf-8")
+    heavier.write_text(
+        table.read_text(encoding="utf-8").replace("mass = 1.5", "mass = 1.6"), encoding="utf-8"
+    )
     recorded(path, "loaded", Worn(seed=31, load=Payload(0.1, (0.0, 0.0, 0.05))), table)
     recorded(path, "warm", Worn(seed=32, viscous=(0.9 * VISCOUS[0], VISCOUS[1])), table)
     recorded(path, "other", Worn(seed=33), heavier)
