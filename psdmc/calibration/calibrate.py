@@ -37,6 +37,7 @@ from psdmc.links.link_terms import PhysicalOptions, require_cvxpy
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 from psdmc.robot.derivable import require_axes
+from psdmc.robot.limits import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +172,11 @@ def calibrate_campaign(
     If the result must be physically possible, it is the vector of base parameters that is nearest to the result of the
     four steps. The distance is measured in standard deviations of the fit and the prior.
     """
+    if model.mechanism.has_followers:
+        raise InputError(
+            f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
+            "calibrate from logs that do not belong to a campaign",
+        )
     progress("checking logs")
     logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(

@@ -105,22 +105,6 @@ def log_sources(
 
     Raises InputError if a file cannot be used, or if a log description is given together with other files.
     """
-    found = _log_sources(paths, validation, joint_names, linear, choice, naming, progress)
-    if choice.warm is None:
-        return found
-    return replace(found, logs=tuple(without_start(log, choice.warm) for log in found.logs))
-
-
-def _log_sources(
-    paths: Sequence[Path],
-    validation: Sequence[Path],
-    joint_names: tuple[str, ...],
-    linear: LinearOptions,
-    choice: FitChoice,
-    naming: LogNaming,
-    progress: Progress,
-) -> LogSources:
-    """The logs with all their rows."""
     described = [path for path in paths if is_description(path)]
     if described and len(paths) + len(validation) > 1:
         raise InputError(
@@ -130,7 +114,8 @@ def _log_sources(
     if not described:
         fit = [naming.opened(path, progress) for path in paths]
         held = [replace(naming.opened(path, progress), use="validate") for path in validation]
-        return LogSources((*fit, *held), _options(linear, FitChoice(), choice, bool(held)))
+        logs = _named_apart((*fit, *held), (*paths, *validation))
+        return LogSources(_warm(logs, choice), _options(linear, FitChoice(), choice, bool(held)))
     if naming.flags:
         raise InputError(
             f"{', '.join(naming.flags)}: for plain logs, {described[0]} is a log description",
@@ -142,7 +127,21 @@ def _log_sources(
     held_out = any(log.use == "validate" for log in logs)
     options = _options(description.options(linear), own, choice, held_out)
     constants = torque_constants(description, joint_names) if logs[0].quantity == "current" else {}
-    return LogSources(logs, options, constants)
+    return LogSources(_warm(logs, choice), options, constants)
+
+
+def _named_apart(logs: Sequence[AnyLog], paths: Sequence[Path]) -> tuple[AnyLog, ...]:
+    """The logs, of which those whose files have equal names in different folders are called by their paths."""
+    names = [log.name for log in logs]
+    return tuple(
+        replace(log, name=str(path)) if names.count(log.name) > 1 else log
+        for log, path in zip(logs, paths, strict=True)
+    )
+
+
+def _warm(logs: Sequence[AnyLog], choice: FitChoice) -> tuple[AnyLog, ...]:
+    """The logs without their first seconds, if the user leaves these out."""
+    return tuple(logs if choice.warm is None else (without_start(log, choice.warm) for log in logs))
 
 
 def _options(linear: LinearOptions, own: FitChoice, choice: FitChoice, held_out: bool) -> LinearOptions:

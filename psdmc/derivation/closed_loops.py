@@ -85,6 +85,12 @@ def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
     """
     if not robot.loops:
         return robot
+    following = {joint for loop in robot.loops for joint in loop.passive} - {*robot.own_joints}
+    if following:
+        raise InputError(
+            f"'{robot.name}': joint '{robot.joints[min(following)].name}' follows others and cannot be passive",
+            "leave it out of passive in [[loop]]",
+        )
     unit = length_unit(robot)
     scales = np.array([1.0 / unit if row < 3 else 1.0 for loop in robot.loops for row in loop.rows])
     units = [unit if order else 1.0 for kind in _types(robot) for order in kind.v_orders]
@@ -140,6 +146,8 @@ def _independent(rows: Array, candidates: NDArray[np.intp]) -> tuple[list[int], 
     for matrix in rows:
         rest, chosen, least = matrix[:, candidates].copy(), [], np.inf
         largest = float(np.sqrt(np.sum(rest * rest, axis=0)).max())
+        if not largest:
+            continue
         for _ in range(len(matrix)):
             sizes = np.sqrt(np.sum(rest * rest, axis=0))
             next_one = int(np.argmax(np.round(sizes / largest, 9)))

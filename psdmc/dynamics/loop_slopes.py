@@ -30,8 +30,6 @@ from psdmc.dynamics.scalar import (
 )
 from psdmc.robot.mechanism import Loop
 
-Columns = list[tuple[Scalar, ...]]
-
 
 class _Step(NamedTuple):
     """A joint of a loop's chain.

@@ -34,6 +34,7 @@ from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, DRIVE
+from psdmc.robot.xml_text import parse_xml
 
 MJCF_SUFFIX = ".xml"
 STANDARD = (0.0, 0.0, -9.81)
@@ -117,13 +118,31 @@ def _require_exportable(model: DynamicsModel) -> None:
         chain.has_free_root or chain.types[0].about_z
     ):
         require_axes(chain, "a written URDF")
-    if chain.has_sums:
-        sums = [name for name, own in zip(chain.joint_names, chain.coordinates, strict=True) if own.others]
+    own = zip(chain.joint_names, chain.coordinates, strict=True)
+    sums = [name for name, coordinate in own if coordinate.others]
+    linked = [name for name in _followers(model) if name not in sums]
+    if sums or linked:
+        what = (
+            "several joints, which a URDF cannot contain"
+            if sums
+            else "another by a closed loop of another file"
+        )
         raise InputError(
-            f"{shown(chain.name)}: joint {shown(sums[0])} follows several joints, which a URDF cannot contain",
+            f"{shown(chain.name)}: joint {shown((sums or linked)[0])} follows {what}",
             "use the robot's own file with its loops",
         )
     model.known_theta_b()
+
+
+def _followers(model: DynamicsModel) -> list[str]:
+    """Joints of a URDF that follow others without <mimic>: those of parallelograms."""
+    kept, chain = model.provenance, model.mechanism
+    if kept.get("source_format") != "urdf" or not kept.get("options", {}).get("loops"):
+        return []
+    root = parse_xml(kept["source_text"], str(kept.get("source_name", "robot")), "robot")
+    mimic = {joint.get("name") for joint in root.findall("joint") if joint.find("mimic") is not None}
+    own = {*chain.own_joints}
+    return [name for i, name in enumerate(chain.joint_names) if i not in own and name not in mimic]
 
 
 def _urdf(model: DynamicsModel, links: PhysicalLinks) -> tuple[Written, str, tuple[str, ...]]:

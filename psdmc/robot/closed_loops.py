@@ -32,7 +32,9 @@ from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.snap import snap_rotation
 
 FORMAT = "see the format of loops in docs/how-to/loops.md"
-LOOP_KEYS = ("name", "rows", "first", "second", "follows", "passive")
+ENDS = ("first", "second")
+REQUIRED = ("rows", *ENDS)
+LOOP_KEYS = ("name", *REQUIRED, "follows", "passive")
 FRAME_KEYS = ("link", "xyz", "rpy", "quaternion")
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
@@ -104,7 +106,7 @@ def _loop(
     name = given if isinstance(given, str) and given else f"loop{number}"
     table = CheckedTable(value, f"loop {shown(name)}", LOOP_KEYS, problems)
     table.read("name", plain_text, "")
-    problems += [f"{table.where}: {key} is missing" for key in LOOP_KEYS[1:4] if key not in table.table]
+    problems += [f"{table.where}: {key} is missing" for key in REQUIRED if key not in table.table]
     first, second = (
         _frame(
             table.read(key, as_it_is, None),
@@ -114,7 +116,7 @@ def _loop(
             snap,
             problems,
         )
-        for key in LOOP_KEYS[2:4]
+        for key in ENDS
     )
     table.read("follows", _names, [])
     passive = table.read("passive", lambda value: _joints(value, joints), ())

@@ -44,7 +44,7 @@ QUARTER = math.pi / 2
 class Relations(NamedTuple):
     """Equations rows @ q = offsets between the coordinates of joints.
 
-    rows     (k, columns) whole numbers; each row has a column in which it has a one and all others zeros
+    rows     (k, columns) ratios; each row has a column in which it has a one and all others zeros
     offsets  (k,) rad or m
     pivots   k, these columns
     """
@@ -99,7 +99,9 @@ def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None],
         for row, offset, pivot in zip(known.rows.tolist(), known.offsets.tolist(), known.pivots, strict=True)
         for row in (np.array(row),)
     }
-    if kept:  # a passive joint may belong to one of these
+    if kept:  # a passive joint that follows none may belong to one of these
+        passive = {i for loop in robot.loops for i in loop.passive} - {*found}
+        kept = [replace(loop, passive=() if k else tuple(sorted(passive))) for k, loop in enumerate(kept)]
         named = {name for names in follows for name in names or ()}
     _require_followers(robot, named, found, source)
     coordinates = tuple(_composed(coordinate, found) for coordinate in robot.coordinates)

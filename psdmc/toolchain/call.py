@@ -104,12 +104,12 @@ def with_gravity(function: Signature) -> inspect.Signature:
 
 
 def _method(function: Signature) -> Callable[..., Any]:
-    count = len(function.inputs)
+    count, depends = len(function.inputs), function.depends_on_gravity
 
     def method(self: CompiledRobot, *given: Any, **named: Any) -> Any:
         if not named and len(given) == count:
             return self.call(function, given)
-        gravity = named.pop("gravity", None) if function.depends_on_gravity else None
+        gravity = named.pop("gravity", None) if depends else None
         inputs, theta_b, out = bound_arguments(function, given, named)
         return self.call(function, inputs, theta_b, out, gravity)
 

@@ -305,7 +305,7 @@ class CompiledFunctions(RobotFacts):
         self, function: Signature, inputs: Sequence[ArrayLike], gravity: ArrayLike | None
     ) -> tuple[Signature, Sequence[ArrayLike]]:
         """The function with gravity among its inputs, if the package has it there."""
-        if function.depends_on_gravity and self._interface.gravity_input:
+        if self._interface.gravity_input and function.depends_on_gravity:
             given = self.gravity_acceleration if gravity is None else gravity
             return takes_gravity(function), (*inputs, given)
         if gravity is not None:

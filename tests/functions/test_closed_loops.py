@@ -385,3 +385,27 @@ def test_a_saved_model_has_its_loops(tmp_path: Path) -> None:
     assert again.content_hash == model.content_hash
     assert again.mechanism.passive_rates == model.mechanism.passive_rates == (1, 2)
     assert np.array_equal(again.loop_jacobian(q), model.loop_jacobian(q))
+
+
+def test_a_urdf_is_not_written_without_its_parallelogram(tmp_path: Path) -> None:
+    """Its joints follow one joint each, as mimic joints do, but the URDF has no <mimic>."""
+    path = tmp_path / "parallelogram.urdf"
+    path.write_text(FOUR_BAR.replace(str(GROUND), str(LENGTHS["coupler"])), encoding="utf-8")
+    loop = PIN | {"first": {"link": "rocker", "xyz": [LENGTHS["crank"], 0.0, 0.0]}}
+    model = psdmc.derive(path, loops=[loop], expand=False)
+    assert model.mechanism.has_followers
+    assert not model.mechanism.has_sums
+    with pytest.raises(InputError, match="joint 'coupler_pin' follows another by a closed loop"):
+        psdmc.export_urdf(model, tmp_path / "written.urdf")
+
+
+def test_a_mimic_joint_cannot_be_passive(tmp_path: Path) -> None:
+    fan = (
+        '<link name="fan"/><joint name="fan_pin" type="continuous"><parent link="ground"/><child link="fan"/>'
+        '<axis xyz="0 0 1"/><mimic joint="crank_pin"/></joint></robot>'
+    )
+    path = tmp_path / "fan.urdf"
+    path.write_text(FOUR_BAR.replace("</robot>", fan), encoding="utf-8")
+    for names in (["fan_pin"], ["fan_pin", "coupler_pin", "rocker_pin"]):
+        with pytest.raises(InputError, match="joint 'fan_pin' follows others and cannot be passive"):
+            psdmc.derive(path, loops=[PIN | {"passive": names}], expand=False)

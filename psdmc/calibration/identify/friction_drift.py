@@ -112,7 +112,7 @@ def _changes(
 
     `turn` (N,) is the time from -1/2 to 1/2, `covariance` (l, l) the inverse of the whole fit's information."""
     n, terms = places.shape
-    columns, count = places.reshape(-1), len(log.time)
+    columns = places.reshape(-1)
     used = log.weights > 0
     sizes, m, l = np.zeros((n, terms)), 2 * n * terms, len(covariance)
     cross, own, score = np.zeros((l, m)), np.zeros((m, m)), np.zeros(m)
@@ -122,21 +122,22 @@ def _changes(
         own += np.einsum("tnl,tnm->lm", turned, turned)
         score += np.einsum("tnm,tn->m", turned, log.residual[rows] * log.weights[rows])
         for k in range(n):
-            sizes[k] += np.abs(block.columns[used[rows][:, k], :, :][:, k, places[k]]).sum(axis=0)
+            sizes[k] += np.abs(block.columns[:, k, places[k]][used[rows][:, k]]).sum(axis=0)
     sizes /= np.maximum(used.sum(axis=0), 1)[:, None]
     carried = covariance @ cross
     scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
     inverse = np.linalg.pinv((own - cross.T @ carried) * np.outer(scale, scale), rcond=UNSEEN)
     inverse *= np.outer(scale, scale)
     values = inverse @ score
+    place = np.cumsum(used.any(axis=1)) - 1  # of a row among those that are fitted
+    stretches = np.maximum(place, 0) * STRETCHES // max(int(place[-1]) + 1, 1)
     left, squares, sums = np.zeros_like(log.residual), np.zeros((n, m, m)), np.zeros((STRETCHES, m))
     for block, rows in with_rows(log.rows):
         plain, turned = _weighted(block, log, rows, columns, turn)
         moved = turned - plain @ carried
         left[rows] = log.residual[rows] * log.weights[rows] - moved @ values
         squares += np.einsum("tnl,tnm->nlm", moved, moved)
-        stretch = np.arange(rows.start, rows.stop) * STRETCHES // count
-        np.add.at(sums, stretch, np.einsum("tnm,tn->tm", moved, left[rows]))
+        np.add.at(sums, stretches[rows], np.einsum("tnm,tn->tm", moved, left[rows]))
     level = np.sum(left**2, axis=0) / np.maximum(used.sum(axis=0), 1)
     by_noise = inverse @ np.tensordot(level * widening(left, used) ** 2, squares, axes=1) @ inverse
     by_time = inverse @ (sums.T @ sums) @ inverse * STRETCHES / (STRETCHES - 1)

@@ -26,7 +26,7 @@ from scipy import stats
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_problem import LinearProblem
 from psdmc.calibration.identify.linear_rows import Rows, collected, residual_of
-from psdmc.calibration.identify.residuals import widening
+from psdmc.calibration.identify.residuals import spread, widening
 from psdmc.calibration.logs.log import Array
 
 UNSEEN = 1e-6
@@ -93,11 +93,11 @@ def log_information(problem: LinearProblem, solved: Estimate, names: Sequence[st
 
     names  of the logs, in the order of their rows
     """
-    white = white_coordinates(solved)
-    residual = residual_of(problem.rows, problem.torque, solved.values)
     fitted = fitted_logs(problem, solved, names)
     if len(fitted) < 2 or not solved.rank:
         return None
+    white = white_coordinates(solved)
+    residual = residual_of(problem.rows, problem.torque, solved.values)
     parts = []
     for name, own in fitted:
         rows = problem.rows.between(own.start, own.stop)
@@ -149,16 +149,10 @@ def _part(name: str, rows: Rows, residual: Array, weights: Array, white: Array) 
     weighted = own * weights
     freedom = max(int(used.sum()) - rank, 1) / int(used.sum())
     level = np.sum(weighted**2, axis=0) / np.maximum(used.sum(axis=0), 1) / freedom
-    spread = np.tensordot(level * widening(weighted, used) ** 2, sums.squares, axes=1)
-    rmse = _rmse(own, used) / np.sqrt(freedom)
+    noise = np.tensordot(level * widening(weighted, used) ** 2, sums.squares, axes=1)
+    rmse = spread(own, used) / np.sqrt(freedom)
     size = float(np.sqrt(level.mean()))
-    return _Part(name, information, white.T @ spread @ white, score, rmse, size, rows, residual, used)
-
-
-def _rmse(residual: Array, used: NDArray[np.bool_]) -> Array:
-    return np.asarray(
-        np.sqrt(np.sum(np.where(used, residual, 0.0) ** 2, axis=0) / np.maximum(used.sum(axis=0), 1))
-    )
+    return _Part(name, information, white.T @ noise @ white, score, rmse, size, rows, residual, used)
 
 
 def _inverse(matrix: Array, of: Array) -> tuple[Array, int]:
@@ -230,7 +224,7 @@ def _figures(
     """The joint whose torque the other logs' fit predicts worst in this log, compared with the log's own fit."""
     rest, score = (np.sum([getattr(o, name) for o in others], axis=0) for name in ("information", "score"))
     moved = white @ _inverse(rest, rest + part.information)[0] @ score
-    rmse = _rmse(residual_of(part.rows, part.residual, moved), part.used)
+    rmse = spread(residual_of(part.rows, part.residual, moved), part.used)
     ratio = rmse / np.maximum(part.rmse, 1e-12 + 1e-9 * part.rmse.max())
     k = int(np.argmax(ratio))
     joint = problem.chain.leading_joints[k]

@@ -127,12 +127,13 @@ AnyLog = Log | StoredLog
 
 def without_start(log: AnyLog, seconds: float) -> AnyLog:
     """Return a log without its first `seconds`. Raises InputError if nothing is left."""
-    first = int(np.searchsorted(log.time, log.time[0] + seconds)) if len(log) else 0
-    if first >= len(log):
+    later = log.time >= log.time[0] + seconds if len(log) else np.zeros(0, dtype=bool)
+    if not later.any():
         lasts = f"it lasts {log.duration:.4g} s"
         raise InputError(
             f"{log.name}: no rows after the first {seconds:g} s: {lasts}", "leave out less: --warm"
         )
+    first, notes = int(np.argmax(later)), (*log.notes, f"{log.name}: the first {seconds:g} s are left out")
     if isinstance(log, StoredLog):
-        return replace(log, time=log.time[first:], first=log.first + first)
-    return log.rows(first, len(log))
+        return replace(log, time=log.time[first:], first=log.first + first, notes=notes)
+    return replace(log.rows(first, len(log)), notes=notes)

@@ -17,8 +17,10 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.log_information import LogInformation, log_information
 from psdmc.calibration.logs.log_files import read_log, write_log
 from psdmc.calibration.plant.virtual_robot import Payload
+from psdmc.calibration.sources import plain_sources
 from psdmc.cli.boundary import run
 from psdmc.model.store import save
+from psdmc.progress import silent
 
 GOOD = 20
 
@@ -232,3 +234,13 @@ def test_what_needs_two_logs_together_depends_on_none_alone(arm, folder: Path):
     assert max(rows["coulomb of shoulder"]["shares"]) < 0.8
     assert max(rows["coulomb of shoulder"]["std_without"]) > 10.0
     assert not any("coulomb of shoulder" in note for note in record.notes if "one log alone" in note)
+
+
+def test_files_of_one_name_are_called_by_their_paths(arm, folder: Path, tmp_path: Path):
+    paths = [tmp_path / name / "log.csv" for name in ("a", "b")]
+    for k, path in enumerate(paths):
+        path.parent.mkdir()
+        path.write_bytes((folder / f"good{k}.csv").read_bytes())
+    paths.append(folder / "good2.csv")
+    read = plain_sources(paths, arm.model.v_names, LinearOptions(), silent)
+    assert [log.name for log in read.logs] == [str(paths[0]), str(paths[1]), "good2.csv"]
