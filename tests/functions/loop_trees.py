@@ -92,12 +92,17 @@ class LoopTree:
         }
 
     @cached_property
-    def far(self) -> Array:
-        """Which states are far from those where rows of loops depend on each other: derivatives keep their digits there."""
-        q, counts = self.given["q"], []
+    def conditions(self) -> Array:
+        """Condition numbers of J M^-1 J^T, with J of the loops. They are large where rows nearly depend on each other."""
+        q, found = self.given["q"], []
         for mass, rows in zip(self.model.mass_matrix(q), self.model.loop_jacobian(q), strict=True):
-            counts.append(np.linalg.cond(rows @ np.linalg.solve(mass, rows.T)))
-        return np.array(counts) < 1e5
+            found.append(np.linalg.cond(rows @ np.linalg.solve(mass, rows.T)))
+        return np.array(found)
+
+    @property
+    def far(self) -> Array:
+        """Which states have a condition number below 1e5: derivatives keep their digits there."""
+        return self.conditions < 1e5
 
     def expected(self, function: str, **other: Array) -> dict[str, Array]:
         """The values from Pinocchio's own reading of the file and of the loops' frames."""
