@@ -40,7 +40,7 @@ test: $(READY) ## run the tests that every change must pass; JOBS=2 sets the num
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' tests
 
 SLOW ?= tests
-test-slow: $(READY) ## run the longer cases of the same tests: more robots, builds, tools and seeds; SLOW=tests/functions runs a part
+test-slow: $(READY) ## run the longer cases of the same tests: more robots, builds, tools and seeds; SLOW='tests --part 0/8' runs the first of eight parts
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m slow $(SLOW)
 
 COVERED ?= tests

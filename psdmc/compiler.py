@@ -203,7 +203,7 @@ def emit_c(
                calibration, usually 0.03
     gravity_input  True: functions whose results depend on gravity get it as an input. This is for a robot whose base tilts.
                Gravity has 3 numbers for each state, m/s^2 along the axes of the base frame, or of the world frame if the
-               base is floating. The model must be derived with `gravity_input=True`, unless its base parameters are the same
+               base is floating. Derive the model with `gravity_input=True`, too: this can add base parameters
 
     Raises InputError if an option is wrong, or if `friction` is given and the model has no friction. Raises InputError also
     if the model assumes that parameters are zero (`assume_zero` of `derive`) and `payload` or `bodies` would change them.
@@ -257,7 +257,8 @@ def compare_emitted(
 
     The options are those in the manifest of the folder.
 
-    given  options that the user gives, by their names on the command line; they must agree with the manifest
+    given  a dictionary from names of command-line options to values. psdmc raises an error if one of these values differs
+           from that in the manifest; None: all options are those in the manifest
 
     This function writes no file. Raises InputError if the folder holds no package, or if `given` contradicts the
     manifest.

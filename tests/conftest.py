@@ -3,13 +3,15 @@ however busy the machine is, or, with HYPOTHESIS_PROFILE=explore, new ones; one 
 thrown away with it; Ctrl-C is heard by the commands under test also where a shell runs the tests in the background and
 has it ignored; Python keeps the bytecode of tests and psdmc, which hundreds of processes load, also where the environment
 says otherwise; commands under test tell no progress, which depends on the machine's load; tests that need a program which
-is not installed are skipped, and the run ends with how many tests were skipped for which reason."""
+is not installed are skipped, and the run ends with how many tests were skipped for which reason; --part K/N runs the tests whose
+name's checksum leaves K if divided by N."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +32,17 @@ os.environ["PSDMC_PROGRESS"] = "off"
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--part", default="0/1", metavar="K/N", help="run part K of N of the tests")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    part, parts = map(int, config.getoption("--part").split("/"))
+    chosen = [zlib.crc32(item.nodeid.partition("[")[0].encode()) % parts == part for item in items]
+    config.hook.pytest_deselected(items=[item for item, own in zip(items, chosen, strict=True) if not own])
+    items[:] = [item for item, own in zip(items, chosen, strict=True) if own]
 
 
 @pytest.fixture(scope="session", autouse=True)

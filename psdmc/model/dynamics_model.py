@@ -190,7 +190,7 @@ class DynamicsModel(Answers):
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...] | None:
-        """Return one sparse matrix P[i] per joint torque, (p, l): tau[i] = y(state) @ P[i] @ theta_b.
+        """Return sparse matrices P[i] of shape (p, l), one for each joint torque: tau[i] = y(state) @ P[i] @ theta_b.
 
         The vector y(state) holds the values of p monomials. Monomials are products of powers of q, sin q, cos q, qd and
         qdd. theta_b are the l base parameters. P is None if the model was derived with `expand=False`.
@@ -219,11 +219,10 @@ class DynamicsModel(Answers):
 
     @property
     def is_reduced(self) -> bool:
-        """Return whether each base parameter has a pivot, a standard parameter that belongs to it alone.
+        """Return whether each base parameter has a pivot, a standard parameter that appears in no other base parameter.
 
         This is true for every model that psdmc derives. Standard parameters are the masses, first moments and inertias of
-        the links. A base parameter is a linear combination of standard parameters. Its pivot appears in no other base
-        parameter, and has the coefficient 1.
+        the links. A base parameter is a linear combination of standard parameters. Its pivot has the coefficient 1.
         """
         return bool(self._leads.any(axis=1).all())
 
@@ -488,7 +487,7 @@ class DynamicsModel(Answers):
             frame     the frame: a name from `frame_names`, or a psdmc.robot.placement.Placement, which is a rotation
                       matrix and a translation (m) relative to the tip frame; None: the tip frame
 
-        Raises InputError if no rigid body has such a mass and inertia, or if a number is too large for a robot file. Raises
+        Raises InputError if no rigid body has such a mass and inertia, or if a number is unusually large. Raises
         InputError also if the load needs a parameter that the model assumes to be zero (option `assume_zero` of `derive`).
         """
         load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)
