@@ -3,8 +3,8 @@ however busy the machine is, or, with HYPOTHESIS_PROFILE=explore, new ones; one 
 thrown away with it; Ctrl-C is heard by the commands under test also where a shell runs the tests in the background and
 has it ignored; Python keeps the bytecode of tests and psdmc, which hundreds of processes load, also where the environment
 says otherwise; commands under test tell no progress, which depends on the machine's load; tests that need a program which
-is not installed are skipped, and the run ends with how many tests were skipped for which reason; --part K/N runs the tests whose
-name's checksum leaves K if divided by N."""
+is not installed are skipped, and the run ends with how many tests were skipped for which reason; --part K/N runs the
+tests whose name's checksum leaves K if divided by N."""
 
 from __future__ import annotations
 

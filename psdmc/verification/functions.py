@@ -24,9 +24,19 @@ from psdmc.robot.reference import OnCoordinates
 STATES = 100
 SEED = 14_631
 
-FEW, SLOW = 8, ("second_derivatives", "with_wrenches_", "constrained_forward_dynamics_", "impulse_")
+FEW, SLOW = (
+    8,
+    (
+        "second_derivatives",
+        "rk4_step_derivatives",
+        "with_wrenches_",
+        "constrained_forward_dynamics_",
+        "impulse_",
+    ),
+)
 """States of functions with such words in their names: second derivatives, whose expected values are differences of
-Pinocchio's derivatives, and derivatives under wrenches and with contacts, which share the recursion of those without."""
+Pinocchio's derivatives; derivatives of Runge-Kutta steps, which call those of forward dynamics four times; and derivatives
+under wrenches and with contacts, which share the recursion of those without."""
 
 MOST_RATES = 24
 """Joint rates up to which second derivatives are compared: each rate takes 2 to 8 calls of Pinocchio's derivatives."""
