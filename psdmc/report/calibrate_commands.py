@@ -7,7 +7,7 @@ from pathlib import Path
 
 from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
 from psdmc.backends.c.names import identifier
-from psdmc.backends.own_files import content_of
+from psdmc.backends.manifest import content_of
 from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import (

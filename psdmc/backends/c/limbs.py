@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.c_expr import literal
 from psdmc.backends.c.lanes import TransposeStage, transpose_stage
-from psdmc.backends.c.limb_rows import FOUR
-from psdmc.backends.c.limb_stores import StoreView, store_views
+from psdmc.backends.c.limb_rows import FOUR, StoreView, store_views
 from psdmc.backends.c.lines import Body
 from psdmc.backends.options import EmitOptions
 from psdmc.program.cost import Cost

@@ -17,13 +17,10 @@ from psdmc.backends.c.function_view import FunctionView, function_views
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.operations import CallView, call_views
-from psdmc.backends.c.patterns import Pattern, patterns
 from psdmc.backends.c.products import Shape
 from psdmc.backends.c.reals import CReal, c_real, check_range
-from psdmc.backends.c.references import ReferenceView, reference_view
-from psdmc.backends.c.self_test import given_vectors, labels
-from psdmc.backends.c.self_test_view import SelfTestView
-from psdmc.backends.c.tables import Table, tables
+from psdmc.backends.c.self_test import ReferenceView, SelfTestView, given_vectors, labels, reference_view
+from psdmc.backends.c.tables import Pattern, Table, patterns, tables
 from psdmc.backends.c.vectors_view import VectorsView
 from psdmc.backends.describe import uses_contacts, uses_frames
 from psdmc.backends.info import PackageInfo

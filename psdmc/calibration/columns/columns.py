@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.columns.effect import Content, Effect, Motion, Unknown
-from psdmc.calibration.columns.flags import joints_of
+from psdmc.calibration.columns.effect import Content, Effect, Motion, Spring, Unknown, joints_of
 from psdmc.calibration.columns.kinds import KINDS
-from psdmc.calibration.columns.spring import Spring
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
 from psdmc.calibration.logs.wording import quoted

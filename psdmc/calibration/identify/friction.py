@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.identify.friction_fit import JointFriction, fit_joint, unknowns_of
-from psdmc.calibration.identify.friction_run import JointRun, prepared
+from psdmc.calibration.identify.friction_fit import JointFriction, JointRun, fit_joint, prepared, unknowns_of
 from psdmc.calibration.identify.residuals import CORRELATED, quality
 from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, Robot, StepOptions
 from psdmc.calibration.logs.log import Array

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.calibration.columns.effect import Effect, Kind, Unknown
-from psdmc.calibration.columns.flags import flag
-from psdmc.calibration.columns.spring import Spring, push, rub, stretch
+from psdmc.calibration.columns.effect import Effect, Kind, Spring, Unknown, flag, push, rub, stretch
 from psdmc.calibration.columns.ways import anchored_way
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism
