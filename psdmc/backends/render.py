@@ -73,8 +73,7 @@ class CodeBesideTemplates(BytecodeCache):
                 bucket.code = marshal.loads(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Write the compiled code of a template to a file in the cache. Nothing is written if the folder is not
-        writable."""
+        """Write the compiled code of a template to the cache, unless the folder is not writable."""
         if sys.dont_write_bytecode:
             return
         code = marshal.dumps(bucket.code)

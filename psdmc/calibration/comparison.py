@@ -241,8 +241,7 @@ def _places(chain: Mechanism) -> list[tuple[Placement, Placement]]:
 
 
 def require_same_base_parameters(a: DynamicsModel, b: DynamicsModel) -> None:
-    """Raise InputError unless two models number the same base parameters. The matrix B in echelon form is the same for
-    the same assumptions."""
+    """Raise InputError unless two models have equal base parameters: equal matrices B."""
     if a.B.shape != b.B.shape or not np.allclose(a.B, b.B, rtol=SAME_PLACE, atol=SAME_PLACE):
         raise InputError(
             f"the models have other base parameters: {a.l} and {b.l}",

@@ -295,8 +295,7 @@ SCHEMA = 1
 
 
 def print_json(kind: str, content: dict[str, Any]) -> None:
-    """Print one JSON document to standard output, in ASCII: its `kind`, which says what it describes, and the
-    content."""
+    """Print one JSON document in ASCII: its `kind`, which says what it describes, and the content."""
     document = {"schema": SCHEMA, "kind": kind, **content}
     print(json.dumps(document, indent=2, ensure_ascii=True, allow_nan=False))
 
@@ -351,8 +350,7 @@ def mechanism_json(robot: Mechanism) -> dict[str, Any]:
 
 
 def terms_json(model: DynamicsModel) -> dict[str, Any]:
-    """Return the products of joint variables (monomials y) in a model's torques, as texts, in the order of matrix E's
-    columns."""
+    """Return the monomials y of a model's torques as texts, in the order of matrix E's columns."""
     return {"terms": list(term_texts(model))}
 
 
@@ -409,8 +407,7 @@ def _plain(value: Any) -> Any:
 
 
 def print_mechanism(found: Mechanism) -> None:
-    """Print the joints of a robot file with links and parents, which joints they follow, and whether psdmc can derive
-    the robot."""
+    """Print a robot file's joints with links, parents and followed joints, and whether psdmc can derive it."""
     count, own = len(found), len(leaders(found.coordinates))
     shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
     print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")

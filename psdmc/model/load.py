@@ -86,8 +86,7 @@ def load(path: str | Path) -> DynamicsModel:
 
 
 def load_bytes(data: bytes, source: Path) -> DynamicsModel:
-    """Return the model from the bytes of a model file. Raises InputError with the file's name, in the cases in which
-    `load` does."""
+    """Return the model from the bytes of a model file. Raises InputError, with the file's name, as `load` does."""
     try:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):
@@ -244,8 +243,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
 
 
 def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
-    """Shape, whether it is stored column by column, type, and the position of the data; NumPy's parser evaluates
-    literals only."""
+    """Shape, whether stored by columns, type, and place of the data; NumPy's parser evaluates literals only."""
     stream = io.BytesIO(content)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -31,8 +31,7 @@ def states_of(robot: Mechanism, rng: np.random.Generator, count: int) -> tuple[A
 
 
 def on_joints(robot: Mechanism, q: Array) -> Array:
-    """Return, for each of k vectors q, the nearest positions that the joints can have, (k, nq). For example,
-    quaternions get length one."""
+    """Return for each of k vectors q the nearest possible positions, (k, nq), such as quaternions of length one."""
     return normalized(frames_of(robot), q.T).T
 
 

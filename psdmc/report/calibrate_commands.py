@@ -132,8 +132,7 @@ def calibrate_command(
 
 
 def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
-    """Write C code for the friction and motors of a calibrated model into a folder. Raise InputError if the model is
-    not calibrated."""
+    """Write C code for the friction and motors into a folder. Raise InputError without a calibration."""
     found = model.calibrated
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")

@@ -88,8 +88,7 @@ def load_robot(
 def load_robot_text(
     text: str, source_format: SourceFormat, *, source_name: str = "robot", **options: Any
 ) -> LoadedRobot:
-    """Return the robot in a text, such as the source that a saved model contains. Options and errors are those of
-    load_robot."""
+    """Return the robot in a text, such as a saved model's source. Options and errors: see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     return _loaded(text, source_format, source_name, checked_options(**options))
 
@@ -114,8 +113,7 @@ def _refuse_size(size: int, source: str) -> None:
 
 
 def robot_text(file: Path) -> str:
-    """Return the text of a robot file. Raises InputError if the file cannot be read, is no text, or is too large for a
-    robot file."""
+    """Return the text of a robot file. Raises InputError if it is unreadable, no text, or too large."""
     try:
         data = read_file(file, limits.MAX_BYTES, "give a URDF or a DH .toml file")
         if data.startswith(PACKED):

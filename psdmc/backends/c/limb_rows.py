@@ -76,8 +76,7 @@ class Packed:
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """One output, or four neighbouring outputs, whose values come from any lanes (limbs) of any vectors. None in
-    `lanes` is the value zero."""
+    """One output, or four neighbouring ones, from any lanes (limbs) of any vectors. None in `lanes` is zero."""
 
     vector: str
     first: int
@@ -116,8 +115,7 @@ class _Run:
 
     @property
     def is_packed(self) -> bool:
-        """Return whether the outputs can be stored as full vectors of four numbers, by interleaving two or three
-        vectors."""
+        """Return whether full vectors of four outputs can be stored by interleaving two or three vectors."""
         count, wide = len(self.at), len(self.slots)
         side_by_side = tuple(range(self.at[0], self.at[0] + wide * count, wide))
         return wide < FOUR and count % FOUR == 0 and self.at == side_by_side

@@ -84,8 +84,7 @@ def self_checks(
 
 
 def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
-    """Return the inputs of all kernels (variants of generated functions), without duplicates, by their names in the
-    reference states."""
+    """Return the inputs of all kernels, without duplicates, by their names in the reference states."""
     return tuple(
         dict.fromkeys(
             GivenVector(given_name(v.name, kernel.variant), v.size, v.size == n)
@@ -144,8 +143,7 @@ def _call(prototype: Prototype, arguments: list[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTable:
-    """One constant C array of the self-test: its name, the number of columns, and the C text of each row. A row belongs
-    to one state."""
+    """One constant C array of the self-test: its name, number of columns, and C text of each row (one state)."""
 
     name: str
     columns: int
@@ -255,8 +253,7 @@ class SelfTestView:
 
     @property
     def checks(self) -> tuple[SelfCheck, ...]:
-        """Return the comparison of each output of each kernel (one variant of a generated function). Outputs without
-        expected values are marked."""
+        """Return the comparison of each output of each kernel. Outputs without expected values are marked."""
         return self_checks(self.kernels, self.dof, self.options, self.known)
 
     @property

@@ -116,8 +116,7 @@ class Pattern:
 
     @property
     def macro(self) -> str:
-        """Return the name of the C macro for the number of entries that may differ from zero, without the robot's
-        prefix."""
+        """Return the name of the C macro for the number of entries that may differ from zero, without the prefix."""
         return f"{self.function.upper()}_NONZEROS"
 
     def table(self, robot: str) -> Table:

@@ -66,13 +66,11 @@ class Effect(Protocol):
 
     @property
     def by_load(self) -> bool:
-        """Return whether the effect depends on the torque of the rigid bodies, as for friction that grows with the
-        load."""
+        """Return whether the effect depends on the torque of the bodies, as for friction that grows with the load."""
         ...
 
     def columns(self, motion: Motion) -> Array:
-        """Return the motor torques per unit of each unknown value, before any filter: an array (N samples, n joints,
-        unknown values)."""
+        """Return the motor torques per unit of each unknown, before any filter: (N samples, n joints, unknowns)."""
         ...
 
 

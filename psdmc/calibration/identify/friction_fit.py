@@ -78,8 +78,7 @@ class JointFriction:
 
 
 def unknowns_of(found: JointFriction) -> Array:
-    """Return the ten unknowns of the friction fit at its result: seven of LuGre friction, then inertia, offset and
-    delay."""
+    """Return the ten unknowns of the fit at its result: seven of LuGre friction, then inertia, offset and delay."""
     own = [found.inertia, found.offset, found.delay]
     return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 
@@ -87,8 +86,7 @@ def unknowns_of(found: JointFriction) -> Array:
 def fit_joint(
     name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
 ) -> JointFriction:
-    """Return the friction of one joint. The fit starts with the two steps of the paper, or from an earlier result, and
-    ends with the refinement."""
+    """Return the friction of one joint, from the paper's two steps or an earlier result, then the refinement."""
     if options.law == "coulomb_viscous":
         sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
         return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
@@ -101,8 +99,7 @@ def fit_joint(
 
 
 def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionOptions) -> Array:
-    """The start that leads to the smallest residual. A missed Stribeck peak, or a false one, is a local minimum as
-    well."""
+    """The start with the smallest residual. A missed or a false Stribeck peak is a local minimum as well."""
     top = float(np.abs(data.qd).max())
     starts = [first]
     for speed in PEAK_SPEEDS:
@@ -241,8 +238,7 @@ def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
 
 
 def step_sizes(p: Array) -> Array:
-    """Return, for each of the ten unknowns p, the size of a change that has a clear effect on the torque. The fit uses
-    these sizes as units."""
+    """Return for each of the ten unknowns p a change that clearly affects the torque, used as its unit."""
     viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
     return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
 
@@ -321,8 +317,7 @@ class JointRun:
         return self.kept[key]
 
     def delayed(self, torque: Array, delay: float) -> Array:
-        """Return a torque that is shifted in time: the result at time t is the given torque at time t + delay, by
-        interpolation."""
+        """Return a torque shifted in time: at time t the given torque at t + delay, by interpolation."""
         return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
 
     def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
@@ -330,8 +325,7 @@ class JointRun:
 
 
 def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, options: StepOptions) -> JointRun:
-    """Return the friction run of joint k with the torques of gravity and of the known load. Raises InputError if other
-    joints move, too."""
+    """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move."""
     states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
     _require_alone(run, robot.chain, k, states)
     gravity = (gravity_regressor(robot.regressor, states.q) @ theta_gravity)[:, k]

@@ -1,5 +1,4 @@
-"""A gas spring between two points of two links. Its nearly constant force pushes the points apart, and grows as the
-spring becomes shorter."""
+"""A gas spring between points of two links: its nearly constant force pushes, and grows as it shortens."""
 
 from __future__ import annotations
 

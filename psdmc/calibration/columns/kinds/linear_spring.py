@@ -1,5 +1,4 @@
-"""A spring whose tension grows with its length. The length is the distance between two points of two links, or a sum of
-joint positions."""
+"""A spring whose tension grows with a length: the distance of two points, or a sum of joint positions."""
 
 from __future__ import annotations
 
