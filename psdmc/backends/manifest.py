@@ -1,4 +1,5 @@
-"""The file manifest.json, which describes a package and lists the SHA-256 of each file as psdmc wrote it."""
+"""The file manifest.json, which describes a package and lists the SHA-256 of each file as psdmc wrote it. It shows
+which files of a folder psdmc wrote."""
 
 from __future__ import annotations
 
@@ -110,6 +111,12 @@ def _joint(joint: JointInfo) -> dict[str, Any]:
 
 
 # Which files of a folder psdmc wrote
+#
+# The manifest of the package says it. If `emit-c` was interrupted, so does the journal, a list of the files
+# that were to be written.
+#
+# Both lists are ordinary files and may be forged. Names that psdmc would not give, and everything behind a
+# symbolic link, count as foreign.
 
 
 MANIFEST = "manifest.json"

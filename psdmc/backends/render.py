@@ -46,6 +46,11 @@ def environment_with(**filters: Callable[..., str]) -> Environment:
 
 
 # A cache of compiled templates
+#
+# The cache is the folder `__pycache__` next to the templates. Jinja translates a template to Python, and
+# Python compiles this to bytecode. Both steps take longer than filling the template. So the bytecode is
+# stored once per installation if the folder is writable. A stored file is valid for one template text, one
+# version of Python and one version of Jinja.
 
 
 SEAL = hashlib.sha256().digest_size

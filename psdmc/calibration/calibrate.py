@@ -268,6 +268,9 @@ def calibrate_logs(
 
 
 # The logs of a fit
+#
+# The result of a linear fit is unconstrained or physically possible, and has all parameters or only those
+# that the data need.
 
 
 MOST_NAMED = 12

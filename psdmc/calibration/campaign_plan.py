@@ -337,6 +337,8 @@ SPOKEN_EVERY = 5.0
 
 
 # What planned motions are checked for
+#
+# Sentences describe the limits and collisions, which checks were not possible, and why.
 
 
 LISTED = 4

@@ -157,6 +157,28 @@ def loaded_quality(model: DynamicsModel, loaded: LoadedLogs, options: LinearOpti
 
 
 # Torque constants from logs of currents
+#
+# Determines torque constants from ordinary exciting logs, recorded without and with a known load.
+#
+# The current i_k of joint k fulfils
+#
+#     K_k i_k = Y_k theta_b + F_k phi + s w_k        s = 1 with the load, 0 without
+#
+# K_k is the torque constant, and F_k phi is the friction. Y_k theta_b is the torque of the rigid bodies
+# (regressor times base parameters). w_k is the torque of the known load, which sets the scale. Without it,
+# K, theta_b and phi would have an arbitrary common factor.
+#
+# All joints form one problem, because they share theta_b. So a joint on which the load's weight hardly acts
+# is determined through shared inertias. The noise is in the current, so the residual, in torque, is
+#
+#     r_k = K_k i_k - (Y_k theta_b + F_k phi + s w_k) (1 - kappa_k)
+#
+# kappa_k is the relative error of K_k. The residual is linearised in kappa about the torque of the last
+# iteration. So the fit takes Gauss-Newton steps of a fit of currents, which noise does not bias. Gautier
+# and Briot (Global identification of joint drive gains and dynamic parameters of robots, 2014) use total
+# least squares instead.
+#
+# Friction and offset have separate columns with the load, because bearings are pressed harder then.
 
 
 ROUNDS = 40

@@ -1,4 +1,4 @@
-"""psdmc calibrate: a model from logs."""
+"""The commands `psdmc calibrate`, a model from logs, and `psdmc payload`, the load that a robot carries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands emit and emit-c. They import their modules when they run."""
+"""The commands emit, emit-c and export-urdf. They import their modules when they run."""
 
 from __future__ import annotations
 

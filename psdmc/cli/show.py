@@ -1,11 +1,11 @@
-"""The command `psdmc show` for a model."""
+"""What `psdmc show` prints of a model or robot file, as text and as JSON."""
 
 from __future__ import annotations
 
 import json
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from psdmc.cli.output import one_line
@@ -16,6 +16,7 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.calibrated import WHOLE, Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.glance import limit_text, numbers_text, range_text
 from psdmc.model.joined_units import joined_units
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
@@ -32,7 +33,7 @@ def print_model(model: DynamicsModel) -> None:
     if calibrated is not None:
         print_calibration(calibrated)
     print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
-    print_line(f"gravity {_numbers(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
+    print_line(f"gravity {numbers_text(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
     if model.contacts != dict.fromkeys(model.frame_names, POINT):
         kinds = (
             f"{name} ({'point' if rows == POINT else 'surface'})" for name, rows in model.contacts.items()
@@ -102,10 +103,10 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
                 *(() if robot.is_serial else (robot.parent_link(i),)),
                 *((followed(robot, i),) if robot.has_followers else ()),
                 joint.type.word,
-                position_range(limits.lower, limits.upper, unit),
-                _limit(limits.speed, f"{unit}/s"),
-                _limit(limits.acceleration, f"{unit}/s^2"),
-                _limit(limits.effort, joint.type.effort_unit),
+                range_text(limits.lower, limits.upper, unit),
+                limit_text(limits.speed, f"{unit}/s"),
+                limit_text(limits.acceleration, f"{unit}/s^2"),
+                limit_text(limits.effort, joint.type.effort_unit),
                 "" if error is None else f"{error:.1e}",
             )
         )
@@ -143,17 +144,6 @@ def _snapping(model: DynamicsModel) -> list[str]:
     return [f"snapping changed torques by at most {max(effect):.2g} N m"]
 
 
-def _limit(value: float, unit: str) -> str:
-    return "none" if math.isinf(value) else f"{value:.4g} {unit}"
-
-
-def position_range(lower: float, upper: float, unit: str) -> str:
-    """A joint's range in words."""
-    if math.isinf(lower) and math.isinf(upper):
-        return "none"
-    return f"{lower:.4g} .. {upper:.4g} {unit}"
-
-
 def followed(found: Mechanism, i: int) -> str:
     """Describe on what the position of joint i depends: on its own coordinate, on another joint, or on a fixed number."""
     coordinate = found.coordinates[i]
@@ -162,10 +152,6 @@ def followed(found: Mechanism, i: int) -> str:
     if coordinate.leader == i:
         return "its own"
     return coordinate.in_words(found.joint_names, "q of ")
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{value:g}" for value in values)
 
 
 def print_terms(model: DynamicsModel) -> None:
@@ -288,6 +274,8 @@ def standard_deviations(found: Calibrated | None, count: int) -> Sequence[str]:
 
 
 # The same as JSON
+#
+# One document, all numbers with all digits, null for unknown values.
 
 
 SCHEMA = 1
@@ -422,7 +410,7 @@ def print_mechanism(found: Mechanism) -> None:
                 found.parent_link(i),
                 joint.type.word,
                 followed(found, i),
-                position_range(limits.lower, limits.upper, joint.type.position_unit),
+                range_text(limits.lower, limits.upper, joint.type.position_unit),
                 "unknown" if math.isnan(found.parameters[i, 0]) else f"{found.parameters[i, 0]:.6g} kg",
             )
         )

@@ -1,4 +1,4 @@
-"""The command show."""
+"""The commands that show: `psdmc show` in text, `view` in space, and `figures` the results of a calibration."""
 
 from __future__ import annotations
 

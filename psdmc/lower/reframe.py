@@ -297,6 +297,9 @@ def _angle_about_z(rotation: Array) -> float:
 
 
 # Common normals of two joint axes
+#
+# Directions, and feet (the points where a normal meets the axes). Nearly parallel axes have no unique
+# normal, and another direction perpendicular to them is used.
 
 
 NEARLY_PARALLEL = 2e-2
@@ -362,6 +365,8 @@ def perpendicular(vector: Array, axis: Array) -> Array:
 
 
 # Removal of rounding errors
+#
+# Numbers that are nearly zero, one or a short decimal become exactly so.
 
 
 EXACT = 4e-15

@@ -254,6 +254,11 @@ def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
 
 
 # A model from the arrays of its file
+#
+# All values are checked, because the file may be forged.
+#
+# The checks cover everything that other parts of psdmc assume: types, shapes, ranges and finite numbers.
+# Base parameters must also have pivots within the standard parameters that the robot's assumptions allow.
 
 
 Arrays = Mapping[str, NDArray[Any]]

@@ -1,4 +1,4 @@
-"""Random states of a robot, for comparisons of torques."""
+"""Random states of a robot for comparisons of torques, and random masses and inertias, which could exist physically."""
 
 from __future__ import annotations
 

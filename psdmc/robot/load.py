@@ -276,6 +276,13 @@ def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Ar
 
 
 # Robots from DH tables
+#
+# Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the
+# distal frame is the link frame. The joint frame lies after Rz(theta + q), and the link frame has a
+# constant placement in the joint frame.
+#
+# Modified convention (Craig): a row is Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and the joint frame is the link
+# frame. For a prismatic joint q adds to d and not to theta.
 
 
 def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames: Sequence[str] = ()) -> Draft:

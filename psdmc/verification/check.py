@@ -327,6 +327,9 @@ def _scales(expected: Array, least: float = 0.0) -> Array:
 
 
 # The robot with which a model is compared
+#
+# It is read from the file of which the model was derived. Its parameters are those that both it and the
+# model can have.
 
 
 def source_of(model: DynamicsModel) -> LoadedRobot:

@@ -252,6 +252,13 @@ def _load_name(slot: Slot) -> str:
 
 
 # Outputs that are zero at every state
+#
+# Finds outputs that are zero at every state of the robot. Code for one state sets consecutive zeros with
+# vector instructions.
+#
+# Most entries of a tree robot's matrices are zero: 1,164 of 1,692 in the regressor of solo12. If they were
+# stored one by one, they would take a third of the function's code. Code for batches stores these zeros
+# together with neighbouring outputs.
 
 
 SHORTEST = 4

@@ -178,6 +178,8 @@ def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptio
 
 
 # Long functions in several C functions
+#
+# The compile time then grows nearly linearly with the length.
 
 
 LONG = 4950

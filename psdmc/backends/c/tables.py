@@ -1,4 +1,4 @@
-"""Constant tables of the C package: joint names and limits, gravity, base parameters."""
+"""Constant tables of the C package: joint names and limits, gravity, base parameters; sparsity patterns."""
 
 from __future__ import annotations
 
@@ -97,6 +97,9 @@ def number(value: float | None, real: str) -> str:
 
 
 # Sparsity patterns of matrices
+#
+# They say which entries can differ from zero. In a tree robot, the entries of two joints on different
+# branches are zero.
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,6 +94,9 @@ Content = Mapping[str, Any]
 
 
 # Springs
+#
+# The unknown values are the tension at a reference length, the stiffness, and the friction of the spring's
+# rod.
 
 
 SLIDING = 0.01
@@ -150,6 +153,8 @@ class Spring:
 
 
 # Keys that several tables have
+#
+# A value is true or false, the name of one joint, or the names of several joints.
 
 
 def flag(table: TomlTable, key: str) -> bool:

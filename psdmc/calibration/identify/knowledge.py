@@ -202,6 +202,9 @@ def _pair_shown(value: Any) -> str:
 
 
 # Stated knowledge
+#
+# Masses and inertias of the robot file, whose uncertainty the user states: a normal distribution of
+# theta_b.
 
 
 VAGUE = 10.0

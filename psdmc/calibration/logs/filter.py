@@ -335,6 +335,8 @@ NOISE_ROWS = 200_000
 
 
 # Equal time steps
+#
+# Rows of a log whose times already have equal steps stay unchanged.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
