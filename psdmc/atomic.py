@@ -88,8 +88,7 @@ def make_folder(path: str | os.PathLike[str]) -> None:
 
 
 def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
-    """Raise InputError if `path` is not a folder, or a folder with files other than dot files. A missing folder is
-    accepted."""
+    """Raise InputError if `path` is no folder, or a folder with files other than dot files. It may be missing."""
     with system_errors_at(path):
         try:
             found = sorted(name for name in os.listdir(path) if not name.startswith("."))
@@ -216,8 +215,7 @@ def can_lock(handle: int) -> bool:
 
 
 def unlock(handle: int) -> None:
-    """Release the lock of the open file `handle`. Child processes that were forked after the lock was taken also lose
-    the lock."""
+    """Release the lock of the open file `handle`. Child processes that were forked since also lose the lock."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_UN)

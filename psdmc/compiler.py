@@ -24,7 +24,7 @@ from weakref import WeakValueDictionary
 
 from psdmc.backends.c.adapters import chosen
 from psdmc.backends.c.package import PackageView
-from psdmc.backends.own_files import MANIFEST
+from psdmc.backends.manifest import MANIFEST
 from psdmc.backends.protocol import back_end
 from psdmc.backends.recorded import Differences, differences, recorded_options
 from psdmc.backends.write import Changes, require_own_folder, write_package

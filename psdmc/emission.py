@@ -124,8 +124,7 @@ def functions_of(
 def emit_options(
     lowering: str, real: Real | None = None, trig: Trig | None = None, target: str | Target = NATIVE
 ) -> EmitOptions:
-    """Return the options, with the target's precision and sines if none are chosen. Raises InputError for an unknown
-    choice."""
+    """Return the options; precision and sines are the target's by default. Raises InputError for an unknown choice."""
     machine = preset(target) if isinstance(target, str) else target
     real, trig = real or machine.real, trig or machine.trig
     _choose("lowering", lowering, ("auto", "expanded", "factored"))

@@ -96,8 +96,7 @@ def exit_status_of(action: Callable[[], int | None]) -> int:
 
 
 def discard_output_if_closed() -> None:
-    """If the caller has closed standard output, as in `psdmc derive robot.urdf >&-`, let print write to the null
-    device."""
+    """If the caller closed standard output (`psdmc derive robot.urdf >&-`), let print write to the null device."""
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 

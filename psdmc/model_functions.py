@@ -54,8 +54,7 @@ def provider() -> Provider:
 
 
 def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
-    """Return the function of the model with this name. It has the arguments of the compiled robot's method with this
-    name."""
+    """Return the function of the model with this name and the arguments of the compiled robot's method."""
     recipe = RECIPES[name]
 
     def function(*given: Any, **named: Any) -> Any:

@@ -30,8 +30,7 @@ def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: in
 
 
 def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
-    """Return the result of `work` for one job, computed in a new process. Ctrl-C in this process ends the new one,
-    too."""
+    """Return the result of `work` for one job in a new process, which Ctrl-C in this process also ends."""
     (result,) = _elsewhere(work, [job], 1)
     return result
 

@@ -29,8 +29,7 @@ class Step(str):
 
 
 def within(stage: str, progress: Progress) -> Progress:
-    """Return a progress function (called with the text of each step) that puts the name of a stage before the text, as
-    `stage: step`."""
+    """Return a progress function that puts the name of a stage before each text, as `stage: step`."""
 
     def tell(step: str) -> None:
         progress(step.within(stage) if isinstance(step, Step) else f"{stage}: {step}")

@@ -418,20 +418,17 @@ class _Plan:
         return plain
 
     def described(self, part: int) -> bytes:
-        """Return the metadata of a part (one output file) as bytes: the settings, the part's number and the states in
-        the part."""
+        """Return a part's (output file's) metadata as bytes: settings, number and states."""
         own = {"part": part, "first_state": part * self.rows, "states_of_part": self.count(part)}
         return json.dumps({**self.manifest, **own}).encode()
 
     def files(self, progress: Progress) -> Callable[[int], bytes]:
-        """Compile the sampled functions. Return a function that computes the bytes of an output file from the number of
-        the part."""
+        """Compile the functions; return a function from a part's number to its file's bytes."""
         columns = self.evaluated(progress)
         return lambda part: _file(columns(part), self.described(part))
 
     def evaluated(self, progress: Progress) -> Callable[[int], dict[str, Array]]:
-        """Compile the sampled functions. Return a function that computes the columns of an output file from the number
-        of the part."""
+        """Compile the functions; return a function from a part's number to its file's columns."""
         by_rows = {function.name for function in self.functions if function.theta and self.what.spread}
         names = [
             f"{function.name}{THETA_ROWS}" if function.name in by_rows else function.name

@@ -266,10 +266,9 @@ def test_the_compiler_never_imports_calibration():
 
 PICKING = {
     "load.py",
-    "from_parts.py",
     "store.py",
     "calibrated_json.py",
-    "show_json.py",
+    "show.py",
     "urdf_words.py",
     "from_source.py",
 }

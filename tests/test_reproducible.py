@@ -60,7 +60,6 @@ DECISIONS = {
     "lower/carriers.py": "thresholds with margins of decades",
     "lower/carrier_columns.py": "scales with margins of decades, and an inverse of zeros and ones",
     "lower/reframe.py": "thresholds with margins of decades",
-    "lower/common_normals.py": "thresholds with margins of decades",
     "lower/accuracy.py": "errors that are compared with limits",
     "backends/reference_states.py": "condition numbers, which order states after rounding",
 }

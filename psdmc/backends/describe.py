@@ -102,8 +102,7 @@ def uses_contacts(signatures: Iterable[Signature]) -> bool:
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
-    """Return the options of the package that the user chose, by name. The target machine is left out if it is the
-    default."""
+    """Return the package's options that the user chose, by name; the target only if it is not the default."""
     target = {} if options.target == NATIVE else {"target": options.target.name}
     return {"real": options.real, "trig": options.trig, **info.options, **target}
 

@@ -123,8 +123,7 @@ class PackageInfo:
 
     @property
     def is_wide(self) -> bool:
-        """Return whether some joint has several coordinates. Then q, the rates and the tables of joints have different
-        lengths."""
+        """Return whether some joint has several coordinates: q, rates and tables of joints then differ in length."""
         return any(joint.nq > 1 for joint in self.joints)
 
     @property
@@ -134,8 +133,7 @@ class PackageInfo:
 
     @property
     def sizes(self) -> Sizes:
-        """Return the lengths of array axes for this robot: numbers of joints, entries of q, rates, base parameters,
-        frames and contacts."""
+        """Return the lengths of array axes: numbers of joints, entries of q, rates, base parameters, frames and contacts."""
         rows = tuple(rows for _, rows in self.contacts)
         closed = tuple(rows for _, rows in self.loops)
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames), 0, rows, closed)

@@ -25,8 +25,7 @@ class EmitOptions:
 
     @property
     def lanes(self) -> int:
-        """Return how many states one block holds in the batch layout [block][entry][lane]. The number is equal for all
-        target machines."""
+        """Return how many states a block of the batch layout [block][entry][lane] holds, equal for all machines."""
         return LANE_BLOCK_BYTES // self.real_bytes
 
     @property

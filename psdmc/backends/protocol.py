@@ -53,8 +53,7 @@ class Emission:
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """Return the generated functions of which the package has kernels (variants), in the order of the function
-        list."""
+        """Return the generated functions of which the package has kernels, in the order of the function list."""
         return functions_of(self.kernels, self.info.base_frame)
 
 

@@ -12,8 +12,7 @@ from typing import Any
 
 from psdmc.atomic import system_errors_at
 from psdmc.backends.c.adapters import ADAPTERS
-from psdmc.backends.manifest import digest
-from psdmc.backends.own_files import MANIFEST, content_of, digest_of, listed
+from psdmc.backends.manifest import MANIFEST, content_of, digest, digest_of, listed
 from psdmc.backends.protocol import BACK_ENDS
 from psdmc.errors import InputError
 from psdmc.target.native import NATIVE

@@ -31,8 +31,7 @@ class ReferenceLoad:
 
 
 def reference_load(model: DynamicsModel) -> ReferenceLoad:
-    """Return the changes of theta_b (the base parameters) that the self-test's load causes at the tip and at each named
-    frame of a model."""
+    """Return the changes of theta_b that the self-test's load causes at the tip and at each named frame."""
     chain = model.mechanism
     places = [(None, chain.tip_body), *((frame.name, frame.joint) for frame in chain.frames)]
     rows = [

@@ -18,8 +18,7 @@ from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import for_every_gravity
-from psdmc.model.random_parameters import random_parameters
-from psdmc.model.random_states import on_joints
+from psdmc.model.random_states import on_joints, random_parameters
 from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows

@@ -21,16 +21,18 @@ from psdmc.atomic import (
     write_together,
     write_whole,
 )
-from psdmc.backends.manifest import GENERATOR, digest, renamed
-from psdmc.backends.own_files import (
+from psdmc.backends.manifest import (
+    GENERATOR,
     JOURNAL,
     MANIFEST,
     NOT_REGULAR,
     Digests,
     content_of,
+    digest,
     digest_of,
     link_in,
     listed,
+    renamed,
 )
 from psdmc.errors import InputError
 

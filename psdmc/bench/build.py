@@ -61,8 +61,7 @@ def produced(build: Callable[[Path], None], sources: Mapping[str, str], parts: S
 
 
 def cxx() -> str:
-    """Return the command of the C++ compiler, from $CXX or found on the machine. Raise ToolchainError if there is
-    none."""
+    """Return the command of the C++ compiler, from $CXX or found. Raise ToolchainError if there is none."""
     chosen = os.environ.get("CXX")
     for name in [chosen] if chosen else CXX_CANDIDATES:
         if shutil.which(name):

@@ -1,5 +1,4 @@
-"""Count the instructions per state with callgrind. Other work on the machine does not change the counts, so tests can
-compare them."""
+"""Count the instructions per state with callgrind. Other work on the machine does not change the counts."""
 
 from __future__ import annotations
 

@@ -110,8 +110,8 @@ def legged_cases(
 
 
 def oblique_chain(n: int, seed: int) -> Mechanism:
-    """Return a robot with n revolute joints whose axes are neither parallel nor perpendicular and do not meet, so that
-    no term vanishes."""
+    """Return a robot with n revolute joints whose axes are neither parallel nor perpendicular and do not meet, so that no
+    term vanishes."""
     rng = np.random.default_rng(seed)
     joints = tuple(
         Joint(f"joint{i + 1}", f"link{i + 1}", REVOLUTE, _anywhere(rng), Placement.identity())
@@ -131,8 +131,7 @@ def oblique_chain(n: int, seed: int) -> Mechanism:
 
 
 def first_joints(chain: Mechanism, n: int) -> Mechanism:
-    """Return the robot without the joints after joint n. The benchmark uses it to measure how times grow with the
-    number of joints."""
+    """Return the robot without the joints after joint n, to measure how times grow with the number of joints."""
     rows = PARAMETERS_PER_LINK * n
     span = chain.parameter_span[:rows]
     kept = np.any(span != 0.0, axis=0)
@@ -196,8 +195,7 @@ STATUS = Path("/proc/self/status")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivation:
-    """A model with the time and memory of its derivation. peak_bytes is for the whole process; None if the system does
-    not report it."""
+    """A model with the time of its derivation, and the peak memory of the process; None if the system lacks it."""
 
     model: DynamicsModel
     seconds: float
@@ -211,8 +209,7 @@ def derive_fresh(chain: Mechanism) -> Derivation:
 
 
 def measured_derivation(chain: Mechanism) -> Derivation:
-    """Derive a model twice in this process, and return it with the time of the second derivation and the peak memory of
-    the process."""
+    """Derive a model twice; return it with the time of the second derivation and the process's peak memory."""
     derive_model(chain, expand=False)  # imports and first calls are not measured
     start = time.perf_counter()
     try:

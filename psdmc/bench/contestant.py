@@ -1,5 +1,4 @@
-"""One compared function of the benchmark: a library's code of one function for one robot, called by the loops of
-rivals/loops.hpp."""
+"""One compared function of the benchmark: a library's code for one robot, called by rivals/loops.hpp."""
 
 from __future__ import annotations
 
@@ -136,8 +135,7 @@ class Runner:
         return self._timed("throughput", self._output, self._block)
 
     def latency(self) -> Array:
-        """Measure the time per state in ns if each state depends on the result of the state before. Returns one time
-        for each block of states."""
+        """Measure the time per state in ns, for each block, if each state depends on the result before it."""
         return self._timed("latency", self._output, self._block, self._count // LATENCY_SHARE)
 
     def tail(self) -> Array:
@@ -159,8 +157,7 @@ class Runner:
         return seconds * 1e9 - self._clock_cost()
 
     def outputs(self) -> Array:
-        """Compute the function at every state and return the outputs, an array (number of states, output values per
-        state)."""
+        """Compute the function at every state and return the outputs, (number of states, values per state)."""
         count, size = self._states.count, self.contestant.outputs
         output = np.full(count * size, np.nan)
         self._copy_matrices(True)

@@ -1,5 +1,4 @@
-"""Default values of the benchmark's options, in a module without imports, so that the help of the command line loads
-quickly."""
+"""Default values of the benchmark's options, in a module without imports: the help loads quickly."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from psdmc.model.random_states import states_of
 from psdmc.progress import Progress
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.verification.source import source_of
+from psdmc.verification.check import source_of
 
 OURS, THEIRS = "psdmc factored", "Pinocchio"
 SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS))

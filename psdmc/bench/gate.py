@@ -118,8 +118,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _save(path: Path, names: list[str]) -> int:
-    """Save the baseline. Named robots replace theirs, others stay; a baseline with instruction counts is not replaced
-    by one without."""
+    """Save the baseline. Named robots replace theirs; one without instruction counts never replaces one with."""
     after = _counted(names)
     kept = Baseline.read(path).counts if names and path.is_file() else {}
     if after.without is not None:
@@ -200,8 +199,7 @@ def count(
 
 
 def operations(case: Case) -> dict[str, dict[str, float]]:
-    """Return the numbers of multiplications and additions of each function (subtractions and divisions count as
-    additions)."""
+    """Return each function's numbers of multiplications and additions (with subtractions and divisions)."""
     table: dict[str, dict[str, float]] = {}
     for name, kernel in psdmc_c.kernels_of(case.model, "factored", case.functions).items():
         single, batch = cost(kernel.single), cost(kernel.batch)

@@ -77,8 +77,7 @@ class _Trials:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Times of all compared functions, in the order in which the functions were given. It also states whether the
-    machine was otherwise idle."""
+    """Times of all compared functions, in the given order, and whether the machine was otherwise idle."""
 
     times: tuple[Times, ...]
     rounds: int

@@ -52,8 +52,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """The results for one robot, from `rounds` timed rounds over all functions. `idle` states whether no other program
-    ran during these rounds."""
+    """The results for one robot from `rounds` timed rounds, and whether no other program ran (`idle`)."""
 
     name: str
     note: str
@@ -147,8 +146,7 @@ def rebuilt(kind: Any, value: Any) -> Any:
 
 
 def as_text(result: BenchResult) -> str:
-    """Return the results as text, per robot and function: operations, ns, quartiles, latency, error, and time divided by
-    the fastest."""
+    """Return the results as text: operations, ns, quartiles, latency, error, and time over the fastest."""
     machine = result.machine
     head = [f"{machine.processor}, {machine.cores} cores, {machine.compiler}, {machine.flags}"]
     return "\n".join(head + [line for case in result.cases for line in _case_lines(case)])

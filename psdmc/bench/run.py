@@ -1,5 +1,4 @@
-"""A benchmark run from start to end: compile all libraries, compare their results with psdmc's Newton-Euler recursion in
-NumPy, then time them."""
+"""A benchmark run: compile all libraries, compare results with the Newton-Euler recursion in NumPy, time them."""
 
 from __future__ import annotations
 
@@ -264,8 +263,7 @@ def disagreement(runner: Runner, states: States) -> float:
 
 
 def relative_error(found: Array, expected: Array) -> float:
-    """Return the largest relative error of outputs: infinite if a value is NaN, absolute if all expected values are
-    zero."""
+    """Return the largest relative error: infinite for NaN, absolute if all expected values are zero."""
     largest = np.max(np.abs(expected), axis=0)
     error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest) or 1.0)
     return float(np.max(error)) if np.isfinite(error).all() else float("inf")

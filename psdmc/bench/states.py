@@ -40,8 +40,7 @@ def _further(function: str) -> tuple[Quantity, ...]:
 
 
 def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
-    """Return the lengths of array axes for a robot with l base parameters. Examples are n (joints), nq (entries of q)
-    and nv (entries of qd)."""
+    """Return the lengths of axes, such as n (joints), nq (entries of q) and nv (of qd), with l base parameters."""
     return Sizes(
         len(robot), robot.nq, robot.nv, l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
     )

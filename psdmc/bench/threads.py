@@ -31,8 +31,7 @@ class ThreadTime:
 
 
 def measure_threads(contestants: Sequence[Contestant], states: States) -> tuple[ThreadTime, ...]:
-    """Time psdmc's batch functions on one and two threads. The threads share the inputs, but each has its own
-    outputs."""
+    """Time psdmc's batch functions on one and two threads, which share the inputs and have own outputs."""
     return tuple(
         ThreadTime(c.function, c.layout, threads, _ns_per_state(c, states, threads))
         for c in contestants

@@ -1,5 +1,4 @@
-"""Generates C code for the friction and the motors of a calibrated robot, in addition to the code for its rigid
-bodies."""
+"""Generates C code for the friction and the motors of a calibrated robot, beside that for its bodies."""
 
 from __future__ import annotations
 
@@ -66,8 +65,7 @@ class ActuatorView(StateLawView):
 
 
 def actuator_files(view: ActuatorView) -> dict[str, str]:
-    """Return the C files include/R_actuators.h and src/R_actuators.c by path, where R is the robot's identifier. They
-    are C99 and need only libm."""
+    """Return the C99 files include/R_actuators.h and src/R_actuators.c by path, for the identifier R."""
     if len(view.friction) != view.n or (view.torque_constants and len(view.torque_constants) != view.n):
         raise ValueError(
             f"{view.n} joints, {len(view.friction)} frictions, {len(view.torque_constants)} constants"

@@ -128,8 +128,7 @@ def _write_formats(motion: Trajectory, path: Path, chosen: Sequence[str]) -> Non
 
 
 def _file_names(runs: Sequence[PlannedRun]) -> list[str]:
-    """File names of the runs: the run's name where every system accepts it; else its step and number, as joints may
-    have any name."""
+    """File names of the runs: the run's name where every system accepts it; else its step and number."""
     names = [run.name for run in runs]
     plain = [name.replace("_", "").replace("-", "").isalnum() and name.isascii() for name in names]
     return [

@@ -1,5 +1,4 @@
-"""Reads campaign.toml, which lists the runs of a campaign, and the logs of these runs. A run is one motion of the robot
-that is recorded."""
+"""Reads campaign.toml, which lists the runs (recorded motions) of a campaign, and the logs of these runs."""
 
 from __future__ import annotations
 
@@ -37,8 +36,7 @@ _LOAD_KEYS = ("mass", "com")
 
 @dataclass(frozen=True, slots=True)
 class ListedRun:
-    """One entry [[run]] of a campaign.toml: a recorded motion. The paths of the trajectory and the log are relative to
-    the working directory."""
+    """One entry [[run]] of a campaign.toml: a recorded motion. Paths are relative to the working directory."""
 
     step: Step
     name: str

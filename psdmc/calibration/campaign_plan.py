@@ -3,7 +3,7 @@ collisions, and come with notes for the user."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -20,17 +20,18 @@ from psdmc.calibration.motions.allowed import (
     TRIES,
     Allowed,
     GivenLimits,
+    TorqueLimits,
     Try,
     bounded,
     first_allowed,
     smaller_boxes,
 )
+from psdmc.calibration.motions.clearance import APART, Clearance, FloorPoints, clearance_of, floor_points
 from psdmc.calibration.motions.criterion import all_columns, inertial_columns
 from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
 from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.limited_sines import from_rest_to_rest
-from psdmc.calibration.motions.looked_at import allowed_of, looked_at
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.sweeps import (
     SineOptions,
@@ -43,6 +44,7 @@ from psdmc.calibration.motions.sweeps import (
 from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.linear_friction import linear_friction
 from psdmc.progress import Progress
 from psdmc.progress import Step as Share
 from psdmc.robot.limits import shown
@@ -332,3 +334,115 @@ def _spoken(progress: Progress) -> Callable[[float, float, float], None]:
 
 SPOKEN_EVERY = 5.0
 """Seconds of CPU between two reports on the search."""
+
+
+# What planned motions are checked for
+#
+# Sentences describe the limits and collisions, which checks were not possible, and why.
+
+
+LISTED = 4
+"""Names in a sentence; the others are counted."""
+
+
+def allowed_of(
+    model: DynamicsModel,
+    chain: Mechanism,
+    regressor: Regressor,
+    torque_margin: float,
+    shapes: Sequence[Path] | None,
+    floor: float | None,
+) -> Allowed:
+    """Return the limits and collision checks for planned motions of a model's robot.
+
+    Torques are limited if the base parameters theta_b are known and a joint has a torque limit. Collisions are checked
+    if the model contains collision shapes.
+
+    chain          the model's robot, with the limits that the motions must keep
+    regressor      object that computes the regressor of the robot
+    torque_margin  share of the torque limits that a motion may use
+    shapes         folders of meshes; None: shapes are not checked
+    floor          m, height of a floor above the base's origin; None: no floor
+
+    Raises InputError if a floor that cannot be checked is given, or if meshes are missing.
+    """
+    clearance: Clearance | FloorPoints | None = None
+    if shapes is not None:
+        try:
+            clearance = clearance_of(model, shapes, floor)
+        except InputError:
+            if shapes:
+                raise
+    if clearance is None and floor is not None:
+        clearance = floor_points(chain, floor)
+    return Allowed(chain, _torques(model, chain, regressor), torque_margin, clearance)
+
+
+def _torques(model: DynamicsModel, chain: Mechanism, regressor: Regressor) -> TorqueLimits | None:
+    largest = np.array([joint.limits.effort for joint in chain.joints])
+    largest = np.where(largest > 0, largest, np.inf)
+    if model.theta_b is None or not np.isfinite(largest).any():
+        return None
+    try:
+        friction = linear_friction(model).by_speed if model.calibrated else None
+    except InputError:
+        friction = None  # of a campaign: it has a state
+    return TorqueLimits(chain, regressor, largest, model.theta_b, friction)
+
+
+def looked_at(
+    allowed: Allowed, model: DynamicsModel, shapes: Sequence[Path] | None, floor: float | None
+) -> tuple[str, ...]:
+    """Return one sentence each on the checks of torques, shapes and floor."""
+    return (_of_torques(allowed, model), _of_shapes(allowed, model, shapes), _of_floor(allowed, floor))
+
+
+def _of_torques(allowed: Allowed, model: DynamicsModel) -> str:
+    if allowed.torques is None:
+        why = (
+            "theta_b is unknown"
+            if model.theta_b is None
+            else "no joint has an effort limit (--effort JOINT=NM)"
+        )
+        return f"not checked: torques, {why}"
+    bare = [
+        name
+        for name, value in zip(allowed.chain.joint_names, allowed.torques.largest, strict=True)
+        if np.isinf(value)
+    ]
+    beside = f"; joint(s) {_listed(bare)} have no limit" if bare else ""
+    with_friction = "with" if allowed.torques.friction is not None else "without"
+    return f"torques: by theta_b {with_friction} friction, at most {allowed.torque_margin:.0%} of the limits{beside}"
+
+
+def _of_shapes(allowed: Allowed, model: DynamicsModel, shapes: Sequence[Path] | None) -> str:
+    found = allowed.clearance
+    if isinstance(found, Clearance):
+        beside = f"; not {_listed(found.always)}, which touch in every pose" if found.always else ""
+        return (
+            f"self-collision: {len(found.pairs)} pairs of shapes stay {1000 * APART:g} mm apart, neighbours aside{beside};"
+            " a load or cables have no shape"
+        )
+    if shapes is None:
+        return "not checked: self-collision, as asked for (--no-collisions)"
+    try:
+        clearance_of(model, shapes)
+    except InputError as error:
+        return f"not checked: self-collision, {error.message}{f' ({error.hint})' if error.hint else ''}"
+    return "not checked: self-collision"
+
+
+def _of_floor(allowed: Allowed, floor: float | None) -> str:
+    if floor is None:
+        return "not checked: floor and surroundings (give the floor's height above the base's origin, m: --floor HEIGHT)"
+    by = (
+        "shapes"
+        if isinstance(allowed.clearance, Clearance)
+        else "origins of joints and the tip, not their bodies,"
+    )
+    return f"floor at {floor:g} m: {by} stay {1000 * APART:g} mm above; other surroundings are not checked"
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(shown(name) if " and " not in name else name for name in names[:LISTED]) + more

@@ -19,8 +19,7 @@ SURE = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One value, such as a base parameter, in two models a and b. `std` is the standard deviation of b - a, infinite if
-    unknown."""
+    """One value, such as a base parameter, of models a and b; `std` is that of b - a, infinite if unknown."""
 
     name: str
     equation: str
@@ -129,8 +128,7 @@ class Comparison:
 
     @property
     def noticed(self) -> tuple[JointDifference, ...]:
-        """Return the joints whose torques differ by more than the share NOTICEABLE, which is large enough to matter for
-        a controller."""
+        """Return the joints whose torques differ by more than NOTICEABLE, which matters for a controller."""
         return tuple(joint for joint in self.joints if joint.share > NOTICEABLE)
 
     def as_json(self) -> dict[str, Any]:

@@ -1,5 +1,4 @@
-"""An identified load: its values with standard deviations, its verdict, and its file. A known load is also read
-from four numbers."""
+"""An identified load: values with standard deviations, verdict, and file. A known one is read from four numbers."""
 
 from __future__ import annotations
 
@@ -54,8 +53,7 @@ class PayloadFound(KnownLoad):
         ]
 
     def as_toml(self) -> str:
-        """Return the text of the load file (TOML). If the logs do not determine a number, its standard deviation is
-        inf."""
+        """Return the text of the load file (TOML). A number that the logs do not determine has the deviation inf."""
         return "\n".join(
             [
                 "# A load that psdmc payload identified. Lengths in m in the frame, inertia about the centre of mass:",

@@ -200,8 +200,7 @@ LARGEST_ARM = 100.0
 
 
 def joint_numbers(given: Sequence[str] | None, option: str) -> dict[str, float]:
-    """Return the numbers by joint of an option JOINT=NUMBER,... Raise InputError if a word has another form, or a joint
-    two numbers."""
+    """Return the numbers by joint of an option JOINT=NUMBER,... Raise InputError for other words, or a joint twice."""
     hint = "write JOINT=NUMBER,JOINT=NUMBER"
     return {name: _number(value, option, hint) for name, value in _named(given, option, hint).items()}
 

@@ -20,8 +20,7 @@ class Interrupted(BaseException):
 
 
 def at_once() -> contextlib.AbstractContextManager[None]:
-    """While this context is open, Ctrl-C ends the process at once. psdmc uses it while modules load, which may swallow
-    exceptions."""
+    """While this context is open, Ctrl-C ends the process at once: loading modules may swallow exceptions."""
     return _handled(_leave)
 
 
@@ -52,8 +51,7 @@ def _loads_a_module(frame: FrameType | None) -> bool:
 
 @contextlib.contextmanager
 def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Replace Python's own handler or the one of `at_once`, and no other: a caller's handler, or a shell's choice to ignore
-    Ctrl-C, stays."""
+    """Replace Python's own handler or that of `at_once`; a caller's handler, or a shell's choice to ignore, stays."""
     before = signal.getsignal(signal.SIGINT)
     is_ours = (
         before in (signal.default_int_handler, _leave)

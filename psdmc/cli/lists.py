@@ -16,8 +16,7 @@ def names(given: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def numbers(given: Sequence[str] | None, option: str, hint: str) -> tuple[float, ...] | None:
-    """Return the numbers in all values of an option, in order; None if the option is not given. Raise InputError if a
-    word is no number."""
+    """Return the numbers in all values of an option; None if it is not given. Raise InputError for other words."""
     if not given:
         return None
     text = ",".join(given)

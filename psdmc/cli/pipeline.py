@@ -273,7 +273,7 @@ def build(
 
 def _after_building(package: Path) -> str:
     """The command that puts a built package to use: installed for its user; compiled for the board that it is made for."""
-    from psdmc.backends.own_files import target_of
+    from psdmc.backends.manifest import target_of
 
     target = PRESETS.get(target_of(package) or "")
     if target is not None and target.tools:

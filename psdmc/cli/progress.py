@@ -1,5 +1,4 @@
-"""Show the current step of a command and the time it will take: on a terminal as a changing line, else as one line per
-stage."""
+"""Show a command's step and the time it will take: a changing line on a terminal, else one line per stage."""
 
 from __future__ import annotations
 
@@ -75,8 +74,7 @@ def in_words(seconds: float) -> str:
 
 
 class Lines:
-    """Shows the progress of a command without a terminal: one line for each long stage, none in the first PATIENCE
-    seconds."""
+    """Shows progress without a terminal: one line for each long stage, none in the first PATIENCE seconds."""
 
     def __init__(self, say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self._say, self._clock = say, clock
@@ -104,8 +102,7 @@ class Lines:
 
 @contextmanager
 def steps() -> Iterator[Progress]:
-    """Return a function that shows progress on standard error; it shows nothing if the variable PSDMC_PROGRESS is
-    'off'."""
+    """Return a function that shows progress on standard error, unless the variable PSDMC_PROGRESS is 'off'."""
     if sys.stderr is None or os.environ.get("PSDMC_PROGRESS", "").lower() == "off":
         yield lambda step: None
     elif sys.stderr.isatty():

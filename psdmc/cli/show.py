@@ -1,22 +1,29 @@
-"""The command `psdmc show` for a model."""
+"""What `psdmc show` prints of a model or robot file, as text and as JSON."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Sequence
+import shlex
+from collections.abc import Sequence
 from typing import Any
 
 from psdmc.cli.output import one_line
 from psdmc.cli.tables import TERMS, Table, print_line, print_note, print_table
+from psdmc.errors import InputError
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.calibrated import WHOLE, Calibrated, NumberRow, Quality, Verdict
+from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.glance import limit_text, numbers_text, range_text
 from psdmc.model.joined_units import joined_units
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
+from psdmc.robot.coordinates import leaders
+from psdmc.robot.derivable import require_derivable
 from psdmc.robot.limits import listed
-from psdmc.robot.mechanism import POINT, Mechanism
+from psdmc.robot.mechanism import POINT, Joint, Mechanism
 
 
 def print_model(model: DynamicsModel) -> None:
@@ -26,7 +33,7 @@ def print_model(model: DynamicsModel) -> None:
     if calibrated is not None:
         print_calibration(calibrated)
     print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
-    print_line(f"gravity {_numbers(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
+    print_line(f"gravity {numbers_text(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
     if model.contacts != dict.fromkeys(model.frame_names, POINT):
         kinds = (
             f"{name} ({'point' if rows == POINT else 'surface'})" for name, rows in model.contacts.items()
@@ -96,10 +103,10 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
                 *(() if robot.is_serial else (robot.parent_link(i),)),
                 *((followed(robot, i),) if robot.has_followers else ()),
                 joint.type.word,
-                position_range(limits.lower, limits.upper, unit),
-                _limit(limits.speed, f"{unit}/s"),
-                _limit(limits.acceleration, f"{unit}/s^2"),
-                _limit(limits.effort, joint.type.effort_unit),
+                range_text(limits.lower, limits.upper, unit),
+                limit_text(limits.speed, f"{unit}/s"),
+                limit_text(limits.acceleration, f"{unit}/s^2"),
+                limit_text(limits.effort, joint.type.effort_unit),
                 "" if error is None else f"{error:.1e}",
             )
         )
@@ -137,17 +144,6 @@ def _snapping(model: DynamicsModel) -> list[str]:
     return [f"snapping changed torques by at most {max(effect):.2g} N m"]
 
 
-def _limit(value: float, unit: str) -> str:
-    return "none" if math.isinf(value) else f"{value:.4g} {unit}"
-
-
-def position_range(lower: float, upper: float, unit: str) -> str:
-    """A joint's range in words."""
-    if math.isinf(lower) and math.isinf(upper):
-        return "none"
-    return f"{lower:.4g} .. {upper:.4g} {unit}"
-
-
 def followed(found: Mechanism, i: int) -> str:
     """Describe on what the position of joint i depends: on its own coordinate, on another joint, or on a fixed number."""
     coordinate = found.coordinates[i]
@@ -156,10 +152,6 @@ def followed(found: Mechanism, i: int) -> str:
     if coordinate.leader == i:
         return "its own"
     return coordinate.in_words(found.joint_names, "q of ")
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{value:g}" for value in values)
 
 
 def print_terms(model: DynamicsModel) -> None:
@@ -279,3 +271,166 @@ def standard_deviations(found: Calibrated | None, count: int) -> Sequence[str]:
     if found is None or len(found.parameters) != count:
         return [""] * count
     return [f"{std:.2g}" if math.isfinite(std) else "" for std in found.std]
+
+
+# The same as JSON
+#
+# One document, all numbers with all digits, null for unknown values.
+
+
+SCHEMA = 1
+"""Of the documents: it grows where a key goes or means something else; further keys may come."""
+
+
+def print_json(kind: str, content: dict[str, Any]) -> None:
+    """Print one JSON document in ASCII: its `kind`, which says what it describes, and the content."""
+    document = {"schema": SCHEMA, "kind": kind, **content}
+    print(json.dumps(document, indent=2, ensure_ascii=True, allow_nan=False))
+
+
+def model_json(model: DynamicsModel) -> dict[str, Any]:
+    """Return what `psdmc show --json` prints for a model."""
+    found, robot = summary(model), model.mechanism
+    errors = joint_errors(robot, found.certificate)
+    joints = [{**joint, "error": error} for joint, error in zip(_joint_rows(robot), errors, strict=True)]
+    values = model.provenance.get("snap_torque_change")
+    return {
+        "name": found.name,
+        "base": found.base,
+        "tip": found.tip,
+        "convention": found.convention,
+        "gravity_m_s2": list(found.gravity),
+        "joints": joints,
+        "frames": [frame.name for frame in robot.frames],
+        "contacts": model.contacts,
+        "p": found.p,
+        "l": found.l,
+        "monomials": None if found.sizes is None else found.sizes._asdict(),
+        "entries_of_P": found.entries,
+        "base_parameters": model.base_parameters.plain(),
+        "largest_torque_error": max(found.certificate),
+        "snap_torque_change": None if values is None else [_finite(float(value)) for value in values],
+        "notes": list(found.notes),
+        "calibration": None if model.calibrated is None else document(model.calibrated),
+        "source": {"name": found.source_name, "sha256": found.source_sha256},
+        "options": _plain(model.provenance.get("options")),
+        "model_hash": found.content_hash,
+    }
+
+
+def mechanism_json(robot: Mechanism) -> dict[str, Any]:
+    """Return what `psdmc show --json` prints for a robot file."""
+    refused = why_not_derived(robot)
+    joints = [
+        {**joint, "mass_kg": _finite(float(row[0]))}
+        for joint, row in zip(_joint_rows(robot), robot.parameters, strict=True)
+    ]
+    return {
+        "name": robot.name,
+        "base": robot.base_name,
+        "tip": robot.tip_name,
+        "ends": [robot.joints[leaf].link_name for leaf in robot.leaves],
+        "gravity_m_s2": robot.gravity.tolist(),
+        "joints": joints,
+        "notes": list(robot.notes),
+        "not_derived_because": None if refused is None else refused.message,
+    }
+
+
+def terms_json(model: DynamicsModel) -> dict[str, Any]:
+    """Return the monomials y of a model's torques as texts, in the order of matrix E's columns."""
+    return {"terms": list(term_texts(model))}
+
+
+def cost_json(model: DynamicsModel, lowerings: Sequence[Lowering]) -> dict[str, Any]:
+    """Operations of each function per lowering."""
+    rows, notes = cost_rows(model, lowerings)
+    return {"functions": rows, "notes": list(notes)}
+
+
+def _joint_rows(robot: Mechanism) -> list[dict[str, Any]]:
+    return [_joint(robot, i, joint) for i, joint in enumerate(robot.joints)]
+
+
+def _joint(robot: Mechanism, i: int, joint: Joint) -> dict[str, Any]:
+    coordinate, limits = robot.coordinates[i], joint.limits
+    leader = None if coordinate.leader in (None, i) else robot.joints[coordinate.leader].name
+    follows = (
+        None
+        if coordinate.leader == i
+        else {"joint": leader, "ratio": coordinate.ratio, "offset": coordinate.offset}
+        | (
+            {"others": [{"joint": robot.joints[k].name, "ratio": ratio} for k, ratio in coordinate.others]}
+            if coordinate.others
+            else {}
+        )
+    )
+    return {
+        "name": joint.name,
+        "link": joint.link_name,
+        "parent_link": robot.parent_link(i),
+        "type": joint.type.word,
+        "position_unit": joint.type.position_unit,
+        "effort_unit": joint.type.effort_unit,
+        "follows": follows,
+        "limits": {
+            name: _finite(getattr(limits, name))
+            for name in ("lower", "upper", "speed", "acceleration", "effort")
+        },
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    """The number, or None where it is unknown (NaN) or no limit (infinite)."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _plain(value: Any) -> Any:
+    """JSON's own types, numbers that JSON lacks as null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return _finite(value) if isinstance(value, float) else value
+
+
+def print_mechanism(found: Mechanism) -> None:
+    """Print a robot file's joints with links, parents and followed joints, and whether psdmc can derive it."""
+    count, own = len(found), len(leaders(found.coordinates))
+    shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
+    print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")
+    print()
+    rows = []
+    for i, joint in enumerate(found.joints):
+        limits = joint.limits
+        rows.append(
+            (
+                joint.name,
+                joint.link_name,
+                found.parent_link(i),
+                joint.type.word,
+                followed(found, i),
+                range_text(limits.lower, limits.upper, joint.type.position_unit),
+                "unknown" if math.isnan(found.parameters[i, 0]) else f"{found.parameters[i, 0]:.6g} kg",
+            )
+        )
+    print_table(Table(("joint", "link", "hangs on", "type", "q", "position", "mass"), rows))
+    print()
+    for note in found.notes:
+        print_note(note)
+    refused = why_not_derived(found)
+    if refused is not None:
+        print_line(f"not derived as a whole: {refused}")
+        print_line(f"hint: {refused.hint}")
+    for leaf in found.leaves if len(found.leaves) > 1 else ():
+        moving = len(found.path_to(leaf))
+        print_line(f"--tip {shlex.quote(found.joints[leaf].link_name)}: {moving} joints")
+
+
+def why_not_derived(found: Mechanism) -> InputError | None:
+    """Return the error that deriving the whole robot would raise, None if there is none."""
+    try:
+        require_derivable(found)
+    except InputError as refused:
+        return refused
+    return None

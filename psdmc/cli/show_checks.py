@@ -1,5 +1,4 @@
-"""Output of the commands `check` and `calibrate`: comparisons, the test of the mass matrix, the verdict and the
-accuracy."""
+"""Output of `check` and `calibrate`: comparisons, the test of the mass matrix, the verdict, the accuracy."""
 
 from __future__ import annotations
 

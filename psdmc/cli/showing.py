@@ -1,4 +1,4 @@
-"""The command show."""
+"""The commands that show: `psdmc show` in text, `view` in space, and `figures` the results of a calibration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.output import say_next
+from psdmc.cli.output import check_output, one_line, say_next
 from psdmc.cli.pipeline import (
     Packages,
     RootBody,
@@ -88,11 +88,11 @@ def _again(root: str | None, arguments: Sequence[str], packages: Sequence[str]) 
 
 def _show_robot(found: Mechanism, json: bool) -> None:
     if json:
-        from psdmc.cli.show_json import mechanism_json, print_json
+        from psdmc.cli.show import mechanism_json, print_json
 
         print_json("robot", mechanism_json(found))
         return
-    from psdmc.cli.show_json import print_mechanism
+    from psdmc.cli.show import print_mechanism
 
     print_mechanism(found)
 
@@ -103,8 +103,7 @@ def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
 
     found = load(path)
     if cost:
-        from psdmc.cli.show import print_cost
-        from psdmc.cli.show_json import cost_json, print_json
+        from psdmc.cli.show import cost_json, print_cost, print_json
 
         small = found.p is not None and found.p <= LARGEST_EXPANDED
         both: tuple[Lowering, ...] = ("factored", "expanded") if small else ("factored",)
@@ -115,7 +114,7 @@ def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
             else:
                 print_cost(found, both)
     elif json:
-        from psdmc.cli.show_json import model_json, print_json, terms_json
+        from psdmc.cli.show import model_json, print_json, terms_json
 
         print_json(*(("terms", terms_json(found)) if terms else ("model", model_json(found))))
     elif terms:
@@ -125,3 +124,84 @@ def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
     if not json:
         say_next("view", path)
         say_what_a_model_is_for(path, found)
+
+
+def view(
+    model: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MODEL",
+            help="model or calibrated file (.npz), or a robot file (.urdf, .xacro, .xml, .toml)",
+        ),
+    ],
+    log: Annotated[
+        Path | None,
+        typer.Argument(metavar="[LOG]", help="log whose motion is shown: one that psdmc calibrate takes"),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE.html", help="page to write; default: MODEL.html"),
+    ] = None,
+    root: RootBody = None,
+    xacro_arg: XacroOption = None,
+    package: Packages = None,
+) -> None:
+    """Draw a robot on one HTML page: links, axes, frames, masses and inertias of its file and of a calibration."""
+    from psdmc.model.load import load
+    from psdmc.report.view import require_own_page, viewed, write_view
+    from psdmc.robot.load import load_robot
+
+    target = output or Path(Path(model.name.removesuffix(".xacro")).stem + ".html")
+    check_output(target, model, *([] if log is None else [log]))
+    require_own_page(target)
+    is_robot = model.suffix.lower() in ROBOT_SUFFIXES
+    if not is_robot and (root or xacro_arg or package):
+        raise InputError(f"{model}: a model, which has no further options", "they are of robot files")
+    with steps() as progress:
+        found = viewed(
+            load_robot(
+                model,
+                root=root,
+                xacro_args=xacro_arguments(None, xacro_arg),
+                packages=package_folders(package),
+            )
+            if is_robot
+            else load(model),
+            log,
+            progress,
+        )
+        progress("writing the page")
+        write_view(found, target)
+    for fault in found.faults:
+        print(one_line(f"not physical: {fault}"))
+    for note in found.notes:
+        print(f"note: {one_line(note)}")
+    print(f"{target}: open it in a browser")
+
+
+def figures(
+    model: Annotated[
+        Path, typer.Argument(metavar="CALIBRATED", help="model file that psdmc calibrate wrote (.npz)")
+    ],
+    log: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[LOG]", help="log, log description or campaign: measured and predicted torque are drawn"
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="folder to write; default: CALIBRATED_figures"),
+    ] = None,
+) -> None:
+    """Write figures (PDF, SVG) and tables (LaTeX) of a calibration, for a report or a paper."""
+    from psdmc.model.load import load
+    from psdmc.report.figures import require_own_folder, write_figures
+
+    folder = output or Path(f"{model.stem}_figures")
+    require_own_folder(folder)
+    found = load(model)
+    with steps() as progress:
+        written = write_figures(found, folder, log, progress)
+    for path in written:
+        print(f"{path}: written")

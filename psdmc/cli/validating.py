@@ -113,7 +113,7 @@ def _check(report: Path | None, *inputs: Path) -> None:
 
 def _deliver(found: Validation | Comparison, report: Path | None, as_json: bool) -> None:
     """Print a result, and write its page."""
-    from psdmc.cli.show_json import print_json
+    from psdmc.cli.show import print_json
     from psdmc.cli.tables import Table, print_line, print_table
     from psdmc.report.validate_report import page_of, write_page
 

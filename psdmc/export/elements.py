@@ -99,8 +99,7 @@ def free_joint_name(robot: Element, name: str) -> str:
 
 
 def put_on_world(robot: Element, what: Written) -> None:
-    """Attach the base to a new link whose z axis points against gravity. Add no link if the z axis of the base already
-    points against gravity."""
+    """Attach the base to a new link whose z axis points against gravity, unless the base's own does."""
     if what.world is None:
         return
     name, used = WORLD, {link.get("name") for link in robot.findall("link")}

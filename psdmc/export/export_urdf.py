@@ -1,5 +1,4 @@
-"""`psdmc.export_urdf` writes a model as a URDF with the model's theta_b, and as an MJCF if a URDF cannot hold
-everything."""
+"""`psdmc.export_urdf` writes a URDF with the model's theta_b, and an MJCF if a URDF cannot hold everything."""
 
 from __future__ import annotations
 

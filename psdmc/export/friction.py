@@ -1,5 +1,4 @@
-"""Friction of a calibrated model in the form that robot files can hold: a constant torque against the motion, and
-viscous damping."""
+"""Friction that robot files can hold: a constant torque against the motion, and viscous damping."""
 
 from __future__ import annotations
 
@@ -86,8 +85,7 @@ def _of(rows: Sequence[Row], joint: Joint) -> JointFriction:
 
 
 def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """Return one sentence for each kind of friction that URDF and MJCF files cannot hold, with the names of the
-    joints."""
+    """Return a sentence with joint names for each kind of friction that URDF and MJCF files cannot hold."""
     by_kind: dict[str, list[str]] = {}
     for name, friction in found.items():
         for what in friction.lost:
@@ -96,8 +94,7 @@ def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def calibrated_friction_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """Return sentences that say which part of the calibrated friction is in the written files, and which part is
-    not."""
+    """Return sentences that say which part of the calibrated friction the written files have."""
     if not found:
         return ()
     return (

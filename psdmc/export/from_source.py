@@ -1,5 +1,4 @@
-"""Writes a URDF from the URDF of which the model was derived, with new inertias. Names, limits, shapes and all other
-content stay unchanged."""
+"""Writes a URDF from the one of which the model was derived, with new inertias; all else stays unchanged."""
 
 from __future__ import annotations
 

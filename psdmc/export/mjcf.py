@@ -1,5 +1,4 @@
-"""Writes an MJCF of the robot. It contains what a URDF cannot hold: drive inertia, as `armature`, and gravity. It has
-no shapes."""
+"""Writes an MJCF without shapes, with what a URDF cannot hold: gravity, and drive inertia as `armature`."""
 
 from __future__ import annotations
 
@@ -28,8 +27,7 @@ FULL = (0, 2, 5, 1, 3, 4)
 
 
 def mjcf_of(what: Written) -> Element:
-    """Return the element <mujoco>. A mimic joint becomes an equality constraint, which MuJoCo fulfils only
-    approximately."""
+    """Return the element <mujoco>. A mimic joint becomes an equality constraint, fulfilled approximately."""
     root = Element("mujoco", model=what.name)
     SubElement(root, "compiler", COMPILER)
     SubElement(root, "option", gravity=exact(what.gravity))

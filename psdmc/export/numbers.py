@@ -16,8 +16,7 @@ def exact(values: Iterable[float]) -> str:
 
 
 def roll_pitch_yaw_of(rotation: Array) -> tuple[float, float, float]:
-    """Return roll, pitch, yaw (rad) of a rotation Rz(yaw) Ry(pitch) Rx(roll). If the pitch is a right angle, roll is
-    0."""
+    """Return roll, pitch, yaw (rad) of Rz(yaw) Ry(pitch) Rx(roll). If the pitch is a right angle, roll is 0."""
     across = math.hypot(rotation[0, 0], rotation[1, 0])
     pitch = math.atan2(-rotation[2, 0], across)
     if across < QUARTER:

@@ -73,8 +73,7 @@ def _mujoco(loaded: LoadedRobot, states: tuple[Array, Array, Array]) -> Array:
 
 
 def read_mjcf_back(model: DynamicsModel, text: str) -> Reading:
-    """Compare the torques that MuJoCo computes from an MJCF, without friction, with those of the model with its drive
-    inertias."""
+    """Compare MuJoCo's torques of an MJCF, without friction, with those of the model with drive inertias."""
     try:
         import mujoco
     except ImportError:

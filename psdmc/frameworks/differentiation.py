@@ -29,8 +29,7 @@ class ArgumentError(InputError, ValueError):
 
 
 class Framework(Protocol):
-    """The array library of JAX or PyTorch, and a method that calls generated functions. Differentiation rules use
-    both."""
+    """The array library of JAX or PyTorch, and a method that calls generated functions, for rules."""
 
     @property
     def arrays(self) -> Any:
@@ -63,8 +62,7 @@ class Rule:
 
 
 def rule_of(function: str) -> Rule | None:
-    """Return the rule by which JAX and PyTorch differentiate a generated function; None if psdmc has no rule for this
-    function."""
+    """Return the rule by which JAX and PyTorch differentiate a generated function; None if there is none."""
     if f"{function}_vjp" in SIGNATURES and f"{function}_jvp" in SIGNATURES:
         is_held = "active" in (each.name for each in SIGNATURES[function].inputs)
         return _contacts(function) if is_held else _gradient(function)
@@ -77,8 +75,7 @@ def rule_of(function: str) -> Rule | None:
 
 
 def require_rule(function: str) -> Rule:
-    """Return the rule by which JAX and PyTorch differentiate a generated function. Raises ArgumentError if psdmc has no
-    rule for this function."""
+    """Return the rule that differentiates a generated function. Raises ArgumentError if psdmc has none."""
     rule = rule_of(function)
     if rule is None:
         known = ", ".join(name for name in SIGNATURES if rule_of(name))
@@ -193,8 +190,7 @@ def _blocks(name: str) -> Rule:
 
 
 def _step(name: str) -> Rule:
-    """Of a step in time, from the matrices A by (q, qd) and B by tau; with contacts, from B_error and the derivatives of the
-    forces, too."""
+    """Of a time step, from the matrices A by (q, qd) and B by tau; with contacts, from B_error and force derivatives."""
     jacobians, names = f"{name}_derivatives", [each.name for each in SIGNATURES[name].inputs]
     _, _, *others = (output.name for output in _outputs(name))
     known = [output.name for output in _outputs(jacobians)]
@@ -380,29 +376,24 @@ class Coordinates:
 
     @classmethod
     def of(cls, mechanism: Mechanism, arrays: Any) -> Coordinates:
-        """Return the Coordinates of a robot (conversions between q's entries and joint rates), for the joints without
-        mimic joints."""
+        """Return a robot's Coordinates (conversions between q's entries and rates), for joints that do not mimic."""
         return cls(arrays, tuple(mechanism.joints[i].type for i in mechanism.own_joints))
 
     @property
     def are_plain(self) -> bool:
-        """Whether every joint has one coordinate, so that the nq entries of q are the nv joint coordinates and no
-        conversion is needed."""
+        """Whether every joint has one coordinate, so that q's entries are the nv joint coordinates themselves."""
         return all(joint.about_z for joint in self.joints)
 
     def normalized(self, q: Array) -> Array:
-        """Return q with normalized quaternions, and with normalized pairs of cosine and sine. The result is NaN if a
-        quaternion or pair is zero."""
+        """Return q with quaternions and pairs of cosine and sine normalized; NaN if one is zero."""
         return self._made([joint.restored(here) for joint, here in self._parts(q)], q)
 
     def tangent(self, q: Array, moved: Array) -> Array:
-        """Return the joint displacements (..., nv), one per joint rate, for a small change `moved` (..., nq) of the
-        entries of q."""
+        """Return the displacements (..., nv), one per rate, for a small change `moved` (..., nq) of q's entries."""
         return self._made([joint.tangent(here, own) for joint, here, own in self._pairs(q, moved)], q)
 
     def gradient(self, q: Array, by_tangent: Array) -> Array:
-        """Return the gradient (..., nq) by the entries of q, from the gradient `by_tangent` (..., nv) by joint
-        displacements, one per joint rate."""
+        """Return the gradient (..., nq) by q's entries, from that by displacements, `by_tangent` (..., nv)."""
         found = []
         for joint, here, own in self._pairs(q, by_tangent, rates=True):
             for k in range(joint.nq):
@@ -411,15 +402,13 @@ class Coordinates:
         return self._made(found, q)
 
     def rates(self, q: Array, v: Array) -> Array:
-        """Return the rates of change (..., nq) of the entries of q at the joint rates v (..., nv). Quaternions in q
-        must have length one."""
+        """Return the rates of change (..., nq) of q's entries at rates v (..., nv). Quaternions must have length one."""
         return self._made(
             [j.coordinate_rates(here, own) for j, here, own in self._pairs(q, v, rates=True)], q
         )
 
     def pulled_back(self, q: Array, gradient: Array) -> Array:
-        """Return the gradient (..., nv) by joint displacements, one per joint rate, from the gradient (..., nq) by the
-        entries of q."""
+        """Return the gradient (..., nv) by displacements, one per rate, from that (..., nq) by q's entries."""
         found = []
         for joint, here, own in self._pairs(q, gradient):
             for k in range(joint.nv):

@@ -107,8 +107,7 @@ class JaxRobot:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"
 
     def call(self, function: Signature, inputs: Sequence[Any], theta_b: Any = None) -> Any:
-        """Call a generated function of the robot, and return the result. `function` is an entry of
-        `psdmc.functions.SIGNATURES`."""
+        """Call a generated function of the robot; `function` is an entry of `psdmc.functions.SIGNATURES`."""
         if not function.inputs:
             return jnp.asarray(getattr(self.compiled, function.name)())
         pairs = zip(function.inputs, inputs, strict=True)
@@ -191,8 +190,7 @@ class Kernel:
         return lead + self._sizes.shape(quantity.axes)
 
     def given(self, inputs: Sequence[Array], theta_b: Array | None) -> list[Array]:
-        """Return all arguments of one call of the function, broadcast to common leading axes. A theta_b of shape (l,)
-        is not broadcast."""
+        """Return all arguments of one call, broadcast to common leading axes, except a theta_b of shape (l,)."""
         named = [*zip(self.function.inputs, inputs, strict=True)]
         named += [] if theta_b is None else [(THETA, theta_b)]
         leads = [x.shape[: x.ndim - len(quantity.axes)] for quantity, x in named]
@@ -290,8 +288,7 @@ mlir.register_lowering(_call, mlir.lower_fun(_called, multiple_results=True), pl
 
 
 def _batched(primitive: Any) -> Callable[..., Any]:
-    """The rule of `vmap`: one more leading axis. An array that has none yet is broadcast, but for a theta_b that all
-    states share."""
+    """The rule of `vmap`: one more leading axis. An array without it is broadcast, except a shared theta_b."""
 
     def rule(given: Sequence[Array], axes: Sequence[int | None], *, kernel: Kernel, **more: Any) -> Any:
         size = next(x.shape[axis] for x, axis in zip(given, axes, strict=True) if axis is not None)
@@ -408,8 +405,7 @@ def _transposed(cotangents: Sequence[Any], *given: Any, kernel: Kernel, by_theta
 
 
 def _second(primals: Sequence[Array], tangents: Sequence[Any], *, kernel: Kernel, by_theta: bool) -> Any:
-    """The derivative of the linear primitive. By what is not linear it exists if the rule calls functions that have
-    one."""
+    """The derivative of the linear primitive; by other arguments if the rule's functions have one."""
     first = len(kernel.function.inputs) + kernel.theta
     linear = [ad.instantiate_zeros(tangent) for tangent in tangents[first:]]
     found: list[Any] = _linear.bind(*primals[:first], *linear, kernel=kernel, by_theta=by_theta)

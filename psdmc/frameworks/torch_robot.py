@@ -109,8 +109,7 @@ class TorchRobot:
         return f"TorchRobot {self.model.mechanism.name!r}: {self.model.n} joints"
 
     def compiled(self, dtype: Any = torch.float64) -> CompiledRobot[Any]:
-        """Return the CompiledRobot (functions in C for NumPy arrays) that the methods call for tensors of the given
-        floating-point type."""
+        """Return the CompiledRobot that the methods call for tensors of the given floating-point type."""
         if dtype not in self._compiled:
             lowering, trig, target = self._options
             self._compiled[dtype] = compiled(
@@ -120,8 +119,7 @@ class TorchRobot:
 
     @property
     def theta_b(self) -> Tensor:
-        """Return the base parameters of the model as a new float64 tensor (l,), in SI units, or None if they are
-        unknown."""
+        """Return the model's base parameters as a new float64 tensor (l,), SI units; None if they are unknown."""
         known = self.compiled().theta_b
         return None if known is None else torch.tensor(known)
 
@@ -133,8 +131,7 @@ class TorchRobot:
         return sizes.shape(quantity.axes)
 
     def operator(self, function: str) -> Any:
-        """Return PyTorch's operator that calls a generated function. The operator's arguments are tensors, and theta_b
-        or None."""
+        """Return PyTorch's operator that calls a generated function on tensors, and theta_b or None."""
         return self._operators[function]
 
     def _on_coordinates(self, function: Signature, tensors: Sequence[Tensor]) -> Tensor:
@@ -256,8 +253,7 @@ class _Operator:
         return made[0] if len(made) == 1 else tuple(made)
 
     def without_values(self, *given: Tensor) -> Any:
-        """Return tensors with the shapes of the results but without values. torch.compile needs these shapes when it
-        traces a program."""
+        """Return tensors with the results' shapes but no values, which torch.compile needs for its trace."""
         inputs, theta_b, lead = self.checked(given)
         made = self._results(inputs[0], lead, theta_b is not None)
         return made[0] if len(made) == 1 else tuple(made)
@@ -286,8 +282,7 @@ class _Operator:
         return kernel
 
     def over_batches(self, operator: Any) -> Callable[..., Any]:
-        """Return the function by which torch.func.vmap calls the operator: the batch axis becomes the first leading
-        axis. Leading axes broadcast."""
+        """Return the function by which torch.func.vmap calls the operator: the batch axis becomes the first leading one."""
         quantities = (*self.function.inputs, THETA_B)
 
         def rule(info: Any, dims: Sequence[int | None], *given: Tensor) -> Any:

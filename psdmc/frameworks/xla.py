@@ -25,8 +25,7 @@ BITS = 63
 
 
 def number_of(key: str) -> int:
-    """Return the number under which XLA programs find the function with the name `key`. The number is equal in every
-    process."""
+    """Return the number by which XLA programs find the function named `key`, equal in every process."""
     return int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big") >> (64 - BITS)
 
 

@@ -75,8 +75,7 @@ class FrictionInDynamics:
         return self._rows(self.first, q, qd)
 
     def bends(self, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[list[Scalar]]:
-        """Return the second derivatives of each rate's friction torque by q and q, by q and qd, and by qd and qd, nv
-        each."""
+        """Return the second derivatives of each rate's friction torque by q q, q qd and qd qd, nv each."""
         return self._rows(self.second, q, qd)
 
     def _rows(self, program: Program, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[list[Scalar]]:

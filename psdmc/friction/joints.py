@@ -50,8 +50,7 @@ class Friction:
         return " + ".join((*((f"s ({against})",) if against else ()), *others))
 
     def by_speed(self, qd: Array) -> Array:
-        """Return the friction torque (..., n) at speeds qd (..., n), N m (N for a sliding joint), from the terms that
-        do not depend on positions."""
+        """Return the friction torque (..., n) at speeds qd (..., n), N m or N, of terms that do not depend on positions."""
         here = [(term, own) for term, own in self._rows(list(self.values.T)) if "q" not in term.reads]
         return self._torque(here, np.asarray(qd), 0.0)
 
@@ -84,8 +83,7 @@ class Friction:
 
 
 def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return friction terms in the order that psdmc uses: terms that act against the motion first, constant torques
-    last."""
+    """Return friction terms in psdmc's order: those against the motion first, constant torques last."""
     return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
 
 

@@ -149,8 +149,7 @@ class Law:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Return the names of the fitted values of a friction law that takes no number, such as an exponent, from the
-        user."""
+        """Return the names of the fitted values of a friction law that takes no number from the user."""
         return tuple(str(value.name) for value in self.values)
 
     def require(self, p: Array) -> Array:
@@ -190,8 +189,7 @@ class Law:
         return p
 
     def slopes(self, p: Array) -> Array:
-        """Return the derivatives (m, m) of the law's m values by the m numbers that a search varies (see
-        `unknowns`)."""
+        """Return the derivatives (m, m) of the law's m values by the m numbers of a search (see `unknowns`)."""
         found = np.eye(len(self.values))
         for k, value in enumerate(self.values):
             if value.logarithmic:
@@ -214,8 +212,7 @@ class Law:
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """One term of a joint's friction: a friction law, and its exponent or velocity if the law has one. A joint has
-    several terms."""
+    """One term of a joint's friction: a friction law, and its exponent or velocity if it has one."""
 
     law: Law
     number: float | None = None
@@ -237,21 +234,18 @@ class Term:
         return self._text(self.law.formula)
 
     def units(self, effort: str = "N m") -> tuple[str, ...]:
-        """Return the units of the fitted values of this friction term, for a joint whose torque or force has the unit
-        `effort`."""
+        """Return the units of this friction term's fitted values, for a joint with the unit `effort`."""
         return tuple(unit_of(effort, self._text(value.unit)) for value in self.law.values)
 
     @property
     def reads(self) -> frozenset[str]:
-        """Return the names of the joint's quantities on which the torque depends, such as 'q' and 'v': attributes of
-        At."""
+        """Return the joint's quantities on which the torque depends, such as 'q' and 'v': attributes of At."""
         seen = _Watched()
         self.torque([0.5] * len(self.law.values), seen)
         return frozenset(seen.read)
 
     def size(self, p: Sequence[Scalar], at: At | _Watched) -> Scalar:
-        """Return the value of the law's function `torque`. For a law that acts against the motion, this is the
-        magnitude of the torque."""
+        """Return the law's `torque`; for a law that acts against the motion, the magnitude of the torque."""
         return self.law.torque(p, at) if self.number is None else self.law.torque(p, at, self.number)
 
     def torque(self, p: Sequence[Scalar], at: At | _Watched) -> Scalar:
@@ -260,8 +254,7 @@ class Term:
         return at.sign * size if self.law.against else size
 
     def columns(self, at: At) -> list[Scalar]:
-        """Return the torque that each value of the law causes if it is one and all other values are zero. The law must
-        be linear in its values."""
+        """Return the torque of each value of the law at one, with all others zero. The law must be linear in its values."""
         return [self.torque(row, at) for row in np.eye(len(self.law.values)).tolist()]
 
     def _text(self, text: Text) -> str:

@@ -29,22 +29,6 @@ from psdmc.dynamics.frames import (
     what_follows,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Vector
-from psdmc.lower.common_normals import (
-    across,
-    common_normal,
-    foot_towards,
-    nearly_parallel,
-    normal_on_side_of,
-    perpendicular,
-)
-from psdmc.lower.without_rounding import (
-    EXACT,
-    clean_direction,
-    clean_lengths,
-    constant_rotation,
-    exact_rotation,
-    without_rounding,
-)
 from psdmc.reproducible import angle_of, cross, length, times
 from psdmc.robot.mechanism import BASE, Array, Loop, Mechanism, NamedFrame, Placement
 
@@ -310,3 +294,134 @@ def _constant(chain: Mechanism, i: int, rotation: Array) -> Array:
 
 def _angle_about_z(rotation: Array) -> float:
     return float(angle_of(rotation[1, 0], rotation[0, 0]))
+
+
+# Common normals of two joint axes
+#
+# Directions, and feet (the points where a normal meets the axes). Nearly parallel axes have no unique
+# normal, and another direction perpendicular to them is used.
+
+
+NEARLY_PARALLEL = 2e-2
+"""Sine of the angle below which two axes are treated as parallel but for the rotation between them: their common
+normal may lie kilometres away, and torques would be differences of huge numbers."""
+
+LITTLE = 1e-2
+"""Part of a vector across an axis below which rounding has changed its direction: it is made perpendicular once more."""
+
+
+def nearly_parallel(a: Array, b: Array) -> bool:
+    """Return whether two unit vectors are nearly parallel or opposite: the sine of their angle is less than
+    NEARLY_PARALLEL."""
+    return float(np.linalg.norm(cross(a, b))) < NEARLY_PARALLEL
+
+
+def foot_towards(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
+    """Return the point of a line that is nearest to another line; None if the lines are nearly parallel. A line is
+    given by a point and a unit vector."""
+    if nearly_parallel(axis, other_axis):
+        return None
+    normal = cross(axis, other_axis)
+    square = times(normal, normal)
+    along = times(cross(other_point - point, other_axis), normal) / square
+    return np.asarray(point + along * axis)
+
+
+def common_normal(axis: Array, following: Array, step: Array) -> Array | None:
+    """Return the unit vector of the common normal of two axes, given by their directions. For nearly parallel axes, it
+    is the part of `step` (from one origin to the next) that is perpendicular to them. Return None if this part is
+    zero."""
+    normal = cross(axis, following)
+    if nearly_parallel(axis, following):
+        normal = perpendicular(step, axis)
+        if np.linalg.norm(normal) < EXACT:
+            return None
+    return clean_direction(normal / length(normal))
+
+
+def normal_on_side_of(axis: Array, following: Array, step: Array, x: Array) -> Array:
+    """Return the unit vector of the common normal of a body's axis and a child's axis. Of its two directions, the one
+    nearer to x is chosen. Return x itself if the axes coincide. x is the body's x axis, along the normal to its first
+    child."""
+    own = common_normal(axis, following, step)
+    if own is None:
+        return x
+    return -own if times(own, x) < -EXACT else own
+
+
+def across(direction: Array, axis: Array) -> Array:
+    """Return the part of a unit direction that is perpendicular to an axis, scaled to length one. If the part along the
+    axis is only rounding, return the direction unchanged."""
+    along = times(axis, direction)
+    return direction if abs(along) < EXACT else clean_direction(direction - along * axis)
+
+
+def perpendicular(vector: Array, axis: Array) -> Array:
+    """Return the part of a vector that is perpendicular to a unit axis, even if this part is small."""
+    part = vector - axis * times(axis, vector)
+    if length(part) < LITTLE * length(vector):
+        part = part - axis * times(axis, part)
+    return np.asarray(part)
+
+
+# Removal of rounding errors
+#
+# Numbers that are nearly zero, one or a short decimal become exactly so.
+
+
+EXACT = 4e-15
+"""Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero: some units in the
+last place. A small joint's torque may be a hundredth of what passes it by: 1e-12 here has been 1e-10 there."""
+
+DECIMALS = 12
+"""A length that differs by rounding from one of so many decimals is replaced by that one, so that equal lengths stay
+equal. See ROUNDING."""
+
+ROUNDING = 1e-15
+"""What composing placements can move a length by, relative to the chain's reach. Rounded to decimals beyond this, lengths of
+centimetres would lose digits."""
+
+
+def without_rounding(place: Placement, reach: float) -> Placement:
+    """Return a placement in which numbers that differ from zero or one only by rounding are exactly zero or one."""
+    return Placement(exact_rotation(place.rotation), clean_lengths(place.translation, reach) + 0.0)
+
+
+def clean_direction(direction: Array) -> Array:
+    """Return the unit vector along a direction. Entries that are only rounding become zero."""
+    cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
+    return np.asarray(cleaned / length(cleaned))
+
+
+def clean_lengths(lengths: Array, scale: float) -> Array:
+    """Return lengths without rounding errors. Lengths that are nearly zero become zero. Lengths that are nearly a short
+    decimal become this decimal, so that equal lengths stay equal."""
+    return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
+
+
+def _decimal(lengths: Array, scale: float) -> Array:
+    nearest = np.round(lengths, DECIMALS)
+    return np.asarray(np.where(np.abs(nearest - lengths) <= ROUNDING * scale, nearest, lengths), np.float64)
+
+
+def exact_rotation(rotation: Array) -> Array:
+    """Return a rotation matrix in which entries that differ from zero or one only by rounding are exactly zero or
+    one."""
+    near = np.round(rotation)
+    return np.asarray(np.where(np.abs(rotation - near) < EXACT, near, rotation) + 0.0)
+
+
+def constant_rotation(rotation: Array) -> Array:
+    """Return the constant rotation between two frames. It is a rotation about x and is made exactly so, unless the
+    joint axes are nearly parallel."""
+    turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
+    return rotation if turns_x else _about_x(rotation)
+
+
+def _about_x(rotation: Array) -> Array:
+    """The rotation about x nearest to this one, with exact zeros and ones."""
+    c, s = float(rotation[1, 1]), float(rotation[2, 1])
+    c, s = (0.0 if abs(v) < EXACT else v for v in (c, s))
+    length = np.hypot(c, s)
+    c, s = c / length, s / length
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

@@ -13,8 +13,7 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.random_parameters import random_parameters
-from psdmc.model.random_states import states_of
+from psdmc.model.random_states import random_parameters, states_of
 from psdmc.reproducible import times
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism

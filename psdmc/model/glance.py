@@ -105,8 +105,8 @@ def _cells(joint: Joint) -> list[str]:
         joint.link_name,
         joint.type.word,
         range_text(limits.lower, limits.upper, unit),
-        _limit(limits.speed, f"{unit}/s"),
-        _limit(limits.effort, joint.type.effort_unit),
+        limit_text(limits.speed, f"{unit}/s"),
+        limit_text(limits.effort, joint.type.effort_unit),
     ]
 
 
@@ -117,5 +117,6 @@ def range_text(lower: float, upper: float, unit: str) -> str:
     return f"{lower:.4g} .. {upper:.4g} {unit}"
 
 
-def _limit(value: float, unit: str) -> str:
+def limit_text(value: float, unit: str) -> str:
+    """A limit with its unit, or 'none'."""
     return "none" if math.isinf(value) else f"{value:.4g} {unit}"

@@ -1,5 +1,4 @@
-"""The reasons of a calibration's verdict: codes with their figures, and the table that translates each code to a
-sentence."""
+"""The reasons of a calibration's verdict: codes with figures, and the table of each code's sentence."""
 
 from __future__ import annotations
 
@@ -29,8 +28,7 @@ class Ground:
 
     @property
     def words(self) -> str:
-        """Return the reason as a sentence. Raises KeyError, TypeError or ValueError if the figures are not those of the
-        code."""
+        """Return the reason as a sentence. Raises KeyError, TypeError or ValueError for figures of another code."""
         return WORDS[self.code](self.values)
 
 
@@ -107,8 +105,7 @@ def _at_levels(values: Values) -> str:
 
 
 def cycles(order: Sequence[int]) -> list[list[int]]:
-    """Return the cycles of a permutation that contain more than one element. Element k is replaced by element
-    order[k]."""
+    """Return the cycles of a permutation with more than one element, where order[k] replaces element k."""
     seen: set[int] = set()
     found = []
     for start in range(len(order)):

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 
 def record(value: object, what: str) -> dict[str, Any]:
-    """Return a value that must be a JSON object; its keys are not checked. Raises ValueError if the value is no
-    object."""
+    """Return a value that must be a JSON object, with unchecked keys. Raises ValueError if it is no object."""
     if not isinstance(value, dict):
         raise _wrong(value, what, "named values")
     return value

@@ -1,5 +1,4 @@
-"""The equations of a model as LaTeX. They contain only symbols that psdmc chooses and numbers, and no name from a robot
-file."""
+"""The equations of a model as LaTeX, of symbols that psdmc chooses and numbers, without a file's names."""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ import tokenize
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,16 @@ from numpy.typing import NDArray
 
 from psdmc.errors import InputError
 from psdmc.model import json_values
+from psdmc.model.calibrated import Calibrated
+from psdmc.model.calibrated_json import from_json
+from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.from_parts import model_from
+from psdmc.model.expansion import BLOCKS, Entries, Expansion
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 from psdmc.reading import read_file
+from psdmc.robot.load_options import LoadOptions
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
+from psdmc.robot.zeros import leading_rows
 
 
 def _with_calibration(manifest: dict[str, Any]) -> dict[str, Any]:
@@ -79,8 +86,7 @@ def load(path: str | Path) -> DynamicsModel:
 
 
 def load_bytes(data: bytes, source: Path) -> DynamicsModel:
-    """Return the model from the bytes of a model file. Raises InputError with the file's name, in the cases in which
-    `load` does."""
+    """Return the model from the bytes of a model file. Raises InputError, with the file's name, as `load` does."""
     try:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):
@@ -237,8 +243,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
 
 
 def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
-    """Shape, whether it is stored column by column, type, and the position of the data; NumPy's parser evaluates
-    literals only."""
+    """Shape, whether stored by columns, type, and place of the data; NumPy's parser evaluates literals only."""
     stream = io.BytesIO(content)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -246,3 +251,168 @@ def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
             raise ValueError("another version than psdmc's")
         shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(stream)
     return shape, is_fortran, dtype, stream.tell()
+
+
+# A model from the arrays of its file
+#
+# All values are checked, because the file may be forged.
+#
+# The checks cover everything that other parts of psdmc assume: types, shapes, ranges and finite numbers.
+# Base parameters must also have pivots within the standard parameters that the robot's assumptions allow.
+
+
+Arrays = Mapping[str, NDArray[Any]]
+
+KINDS = {
+    "E": (np.uint8, 2),
+    "theta_b": (np.float64, 1),
+    "P_joint": (np.int32, 1),
+    "P_row": (np.int32, 1),
+    "P_col": (np.int32, 1),
+    "P_value": (np.float64, 1),
+    "B": (np.float64, 2),
+}
+"""Type and axes of each array."""
+
+MOST_ROWS = 1_000_000
+"""Largest number of rows of a table in the provenance."""
+
+
+HIGHEST_POWER = 2
+"""Of a factor of a monomial: torques are quadratic in rates, and in each joint's sine and cosine."""
+
+
+def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
+    """Return the model from the arrays and the manifest (a JSON text) of a file. Raises ValueError that says which part
+    is wrong, what was found and what was expected."""
+    _check_kinds(arrays)
+    chain = chain_from_json(json_values.part(manifest, "chain", "the manifest"))
+    l = arrays["B"].shape[0]
+    is_expanded = json_values.flag(json_values.part(manifest, "expanded", "the manifest"), "'expanded'")
+    is_known = json_values.flag(
+        json_values.part(manifest, "theta_b_known", "the manifest"), "'theta_b_known'"
+    )
+    certificate = json_values.part(manifest, "certificate", "the manifest")
+    _check_base_parameters(arrays, chain, l, is_known)
+    if is_expanded and not all(kind.about_z for kind in chain.types):
+        raise ValueError("E and P are of joints of one coordinate, and a joint has several")
+    return DynamicsModel(
+        expansion=_expansion(arrays, chain.nv, l) if is_expanded else None,
+        theta_b=arrays["theta_b"] if is_known else None,
+        B=arrays["B"],
+        mechanism=chain,
+        certificate=json_values.numbers(certificate, "the certificate", chain.nv),
+        provenance=_provenance(json_values.part(manifest, "provenance", "the manifest"), chain),
+        calibrated=_calibrated(manifest, chain),
+    )
+
+
+def _calibrated(manifest: Mapping[str, Any], chain: Mechanism) -> Calibrated | None:
+    """What a calibration found; ValueError unless its joints are the chain's."""
+    if "calibration" not in manifest:
+        return None
+    found = from_json(manifest["calibration"])
+    joints = {joint.name for joint in chain.joints}
+    foreign = [row.joint for row in (*found.motors, *found.friction) if row.joint not in joints]
+    if foreign:
+        raise ValueError(f"the calibration has joint {foreign[0]!r}, which the chain has not")
+    return found
+
+
+def _check_kinds(arrays: Arrays) -> None:
+    for name, (dtype, axes) in KINDS.items():
+        found = arrays[name]
+        if found.dtype != dtype or found.ndim != axes:
+            raise ValueError(
+                f"{name} has type {found.dtype} and {found.ndim} axes, expected {np.dtype(dtype)} and {axes}"
+            )
+
+
+def _check_base_parameters(arrays: Arrays, chain: Mechanism, l: int, is_known: bool) -> None:
+    B, span = arrays["B"], chain.parameter_span
+    if B.shape[1] != PARAMETERS_PER_LINK * len(chain) or l > B.shape[1]:
+        raise ValueError(f"B has shape {B.shape} for {len(chain)} joints")
+    if not np.isfinite(B).all() or (is_known and not np.isfinite(arrays["theta_b"]).all()):
+        raise ValueError("B or theta_b is not finite")
+    alone = (B != 0.0).sum(axis=0) == 1
+    first = np.argmax(alone & (B == 1.0), axis=1) if B.shape[1] else np.zeros(0, int)
+    if not (alone[first] & (B[np.arange(l), first] == 1.0)).all():
+        raise ValueError("a base parameter has no standard parameter of its own")
+    leads = leading_rows(span) if span.size else np.zeros(0, int)
+    if not np.isin(first, leads).all():
+        raise ValueError("a base parameter lies outside the parameters' span")
+
+
+def _exponents(E: NDArray[Any], n: int) -> NDArray[np.uint8]:
+    if E.shape[0] != BLOCKS * n:
+        raise ValueError(f"E has {E.shape[0]} rows for {n} joints")
+    if E.size and E.max() > HIGHEST_POWER:
+        raise ValueError(f"E has exponents up to {E.max()}, expected {HIGHEST_POWER} at most")
+    return E
+
+
+def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
+    shape = (arrays["E"].shape[1], l)
+    ranges = {"P_joint": n, "P_row": shape[0], "P_col": shape[1]}
+    values = arrays["P_value"]
+    for name, count in ranges.items():
+        if arrays[name].shape != values.shape:
+            raise ValueError(f"{name} has {len(arrays[name])} entries, P_value {len(values)}")
+        if values.size and not 0 <= arrays[name].min() <= arrays[name].max() < count:
+            raise ValueError(f"{name} has entries outside 0 to {count - 1}")
+    if not np.isfinite(values).all():
+        raise ValueError("P is not finite")
+    if (np.diff(arrays["P_joint"]) < 0).any():
+        raise ValueError("P_joint is not in order")
+    entries = Entries(arrays["P_joint"], arrays["P_row"], arrays["P_col"], values)
+    return Expansion(_exponents(arrays["E"], n), entries, l)
+
+
+def _provenance(value: object, chain: Mechanism) -> dict[str, Any]:
+    """The model's origin, checked as far as psdmc reads it again."""
+    found = json_values.record(value, "the provenance")
+    for name in ("source_text", "source_sha256", "source_name"):
+        if found.get(name) is not None:
+            json_values.text(found[name], f"the provenance's {name}")
+    if found.get("source_format", "urdf") not in ("urdf", "dh"):
+        raise ValueError("the provenance's source_format is neither urdf nor dh")
+    if "options" in found:
+        _check_options(json_values.record(found["options"], "the provenance's options"), chain)
+    for snap in json_values.entries(found.get("snapped", []), "the provenance's snapped", MOST_ROWS):
+        json_values.text(json_values.part(snap, "where", "a snapped rotation"), "a snapped rotation's place")
+        json_values.number(
+            json_values.part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle"
+        )
+    if found.get("snap_torque_change") is not None:
+        json_values.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", chain.nv)
+    return found
+
+
+def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
+    """ValueError unless these are keyword arguments of load_robot, of kinds that it takes or refuses with a message."""
+    foreign = [name for name in options if name not in {field.name for field in fields(LoadOptions)}]
+    if foreign:
+        raise ValueError(f"the provenance has an option '{foreign[0]}'")
+    for name in ("base", "tip", "root"):
+        if options.get(name) is not None:
+            json_values.text(options[name], f"the option {name}")
+    if options.get("gravity") is not None:
+        json_values.numbers(options["gravity"], "the option gravity", 3)
+    if not isinstance(options.get("drive_inertia", False), bool):
+        driven = sum(kind.about_z for kind in chain.types)
+        json_values.numbers(options["drive_inertia"], "the option drive_inertia", driven)
+    for statement in json_values.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
+        json_values.text(statement, "an entry of the option assume_zero")
+    json_values.number(options.get("snap", 0.0), "the option snap")
+    for table in json_values.entries(options.get("loops", []), "the option loops", MOST_ROWS):
+        json_values.record(table, "an entry of the option loops")
+    for option in ("frames", "contacts"):
+        for name in json_values.entries(options.get(option, []), f"the option {option}", MOST_ROWS):
+            json_values.text(name, f"the option {option}")
+    for value in json_values.record(options.get("lock", {}), "the option lock").values():
+        json_values.number(value, "an entry of the option lock")
+    for text in json_values.record(options.get("xacro_args", {}), "the option xacro_args").values():
+        json_values.text(text, "an entry of the option xacro_args")
+    json_values.flag(options.get("floating", False), "the option floating")
+    if options.get("tool") is not None:
+        json_values.numbers(options["tool"], "the option tool", 6)

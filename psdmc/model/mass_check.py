@@ -53,8 +53,7 @@ class MassCheck:
 
     @property
     def reason(self) -> str:
-        """Return a sentence that says in how many poses the mass matrix is positive definite, with its smallest
-        eigenvalue."""
+        """Return a sentence on in how many poses the mass matrix is positive definite, and its least eigenvalue."""
         pose = ", ".join(f"{value:.3g}" for value in self.pose)
         found = f"smallest eigenvalue {self.smallest:.3g} at q = [{pose}], mostly joint {self.joint!r}"
         if self.passed:

@@ -1,5 +1,4 @@
-"""The attributes that every model has, as an interface for files that cannot import DynamicsModel because DynamicsModel
-imports them."""
+"""The attributes of every model, as an interface for files that DynamicsModel itself imports."""
 
 from __future__ import annotations
 

@@ -34,8 +34,7 @@ class BaseParameters(tuple[BaseParameter, ...]):
         return tuple(f"theta_b[{k}] {_first_terms(parameter.equation)}" for k, parameter in enumerate(self))
 
     def plain(self) -> list[dict[str, Any]]:
-        """Return a list with one JSON object per base parameter: number from 0, label, whole equation, unit and value
-        (None if unknown)."""
+        """Return a JSON object per base parameter: number from 0, label, whole equation, unit, value or None."""
         named = enumerate(zip(self.labels, self, strict=True))
         return [
             {"index": k, "name": name, "equation": each.equation, "unit": each.unit, "value": each.value}

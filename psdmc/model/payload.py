@@ -45,8 +45,7 @@ def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
 
 
 def body_parameters(body: int) -> NDArray[np.int64]:
-    """Return the (10,) indices, in the standard parameters x, of the mass, first moments and inertias of the link that
-    joint `body` moves."""
+    """Return the (10,) indices in x of the mass, first moments and inertias of the link that joint `body` moves."""
     return PARAMETERS_PER_LINK * body + np.arange(BODY_PARAMETERS)
 
 

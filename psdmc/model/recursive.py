@@ -17,8 +17,7 @@ from psdmc.robot.mechanism import Array, Mechanism
 
 
 def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:
-    """Compute joint torques tau (states, n), N m or N, from the links' standard parameters (11n,) and q, qd, qdd
-    (states, n)."""
+    """Compute joint torques tau (states, n), N m or N, from the links' parameters (11n,) and q, qd, qdd."""
     q, qd, qdd = (list(array.T) for array in arrays)
     bodies, drives = bodies_of(chain, x), drive_inertia_of(x)
     found = newton_euler(frames_of(chain), bodies, drives, q, qd, qdd, base_acceleration(chain))

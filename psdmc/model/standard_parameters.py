@@ -13,8 +13,7 @@ BELONGS = 1e-9
 
 
 def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
-    """Return a sentence that says why the model does not have mass, centre of mass and inertia of every link. Return
-    None if the model has them."""
+    """Return a sentence on why the model lacks mass, centre and inertia of some link; None if it has them."""
     parameters = model.mechanism.parameters
     if np.isnan(parameters).any():
         return "it needs mass and inertia of every link, and some are unknown"

@@ -130,8 +130,7 @@ def _manifest(model: Model) -> dict[str, Any]:
 
 
 def hash_of(arrays: Arrays, manifest: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a model file's arrays and manifest (a JSON text), without the entry content_hash of the
-    manifest."""
+    """Return the SHA-256 of a model file's arrays and manifest, without the manifest's content_hash."""
     digest = hashlib.sha256()
     plain = {key: value for key, value in manifest.items() if key != "content_hash"}
     digest.update(json.dumps(plain, sort_keys=True, allow_nan=False).encode())

@@ -58,8 +58,7 @@ _WORDS = {
 
 @cache
 def dimension_of(unit: str) -> Dimension:
-    """Return the dimension of a unit such as 'kg m^2/s' or '1/(J s^2)'. All units after the slash are in the
-    denominator."""
+    """Return the dimension of a unit such as 'kg m^2/s' or '1/(J s^2)'. All after the slash divides."""
     total = NUMBER
     for sign, part in zip((1, -1), unit.split("/"), strict=False):
         for factor in part.strip("() ").split():
@@ -84,16 +83,14 @@ def in_words(dimension: Known) -> str:
 
 
 class Unlike(Exception):
-    """This error says that an operation does not admit arguments of these dimensions together. The message contains
-    their units."""
+    """This error says that an operation does not admit arguments of these dimensions together."""
 
     def __init__(self, *given: Known) -> None:
         super().__init__(" and ".join(map(in_words, given)))
 
 
 def alike(*given: Known) -> Known:
-    """Return the common dimension of values that are added, subtracted or compared. Raises Unlike if their dimensions
-    differ."""
+    """Return the common dimension of values that are added or compared. Raises Unlike if theirs differ."""
     found = given[0]
     for each in given[1:]:
         if found is None:

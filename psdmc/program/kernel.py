@@ -52,8 +52,7 @@ class Kernel:
 
     @property
     def is_loop_of_calls(self) -> bool:
-        """Return whether this function's C code only calls other functions in loops, because straight-line code would
-        be too long."""
+        """Return whether the C code only calls functions in loops, as straight-line code would be too long."""
         return not self.single.outputs
 
     def _check(self, program: Program, inputs: set[str], outputs: set[str]) -> None:

@@ -1,5 +1,4 @@
-"""Conversion of kernels (the operations of generated functions) to JSON text and back. A cache on disk stores kernels
-in this form."""
+"""Conversion of kernels (the operations of generated functions) to JSON and back, for a cache on disk."""
 
 from __future__ import annotations
 
@@ -23,8 +22,7 @@ FORMAT = 6
 
 
 def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
-    """Return the JSON text of kernels (the operations of generated functions) in their order. Constants can be read
-    back bit for bit."""
+    """Return the JSON text of kernels in their order. Constants can be read back bit for bit."""
     # One kernel at a time: lists of all of a large robot's instructions together take more memory than its kernels.
     entries = ",".join(_text(_kernel_to_plain(kernel)) for kernel in kernels.values())
     return f'{{"format":{FORMAT},"kernels":[{entries}]}}'

@@ -60,8 +60,7 @@ class Lanes:
         return lanes(self.group, list(map(sin, self.values))), lanes(self.group, list(map(cos, self.values)))
 
     def operated(self, operation: Callable[..., float], arguments: Sequence[Scalar]) -> Scalar:
-        """Return the value of an operation on constants of the group, limb by limb. Return NotImplemented if an
-        argument is a symbol."""
+        """Return an operation's value on the group's constants, limb by limb; NotImplemented for a symbol."""
         if not all(isinstance(each, Lanes | float | int) for each in arguments):
             return NotImplemented
         columns = [

@@ -39,8 +39,7 @@ class LimbSums:
         tracer.limb_sums = self
 
     def add_input(self, vector: str, group: int) -> None:
-        """Declare that the entries of an input vector of the trace (recorded operations) differ between the limbs of a
-        group."""
+        """Declare that the entries of an input vector of the trace differ between the limbs of a group."""
         self._owners[vector] = group
 
     def group_of(self, index: int) -> int:

@@ -146,8 +146,7 @@ class _Cut:
         return outputs
 
     def _read_in(self) -> dict[int, set[int]]:
-        """The parts that read a value which is not a constant, but for the part that computes it; inputs are computed
-        nowhere."""
+        """The parts that read a value which is not a constant, except that which computes it."""
         read: dict[int, set[int]] = {}
         body, part = self.program.body, self.part
         computed = [CONSTANT if instr.op is Op.LOAD else part[i] for i, instr in enumerate(body)]

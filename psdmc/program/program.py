@@ -105,8 +105,7 @@ class Program:
         return self._arguments[0]
 
     def inputs(self) -> tuple[Slot, ...]:
-        """Return the inputs that the PROGRAM (list of operations to generate) reads, once each, sorted by vector name
-        and index."""
+        """Return the inputs that the PROGRAM reads, once each, sorted by vector name and index."""
         return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
 
     def uses(self) -> Sequence[int]:

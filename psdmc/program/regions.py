@@ -51,8 +51,7 @@ class Slice:
 
 @dataclass(frozen=True, slots=True)
 class For:
-    """A loop: regions that are repeated a fixed number of times. They can use the loop's slices and all arrays outside
-    the loop."""
+    """A loop: regions repeated a fixed number of times, with the loop's slices and all outer arrays."""
 
     count: int
     slices: tuple[Slice, ...]

@@ -241,8 +241,7 @@ class Signature:
 
     @property
     def stored(self) -> tuple[Quantity, ...]:
-        """Return all quantities that the function's PROGRAMs (lists of operations to generate) store: outputs, then
-        pivots."""
+        """Return all quantities that the function's PROGRAMs store: outputs, then pivots."""
         return (*self.outputs, *((self.pivots,) if self.pivots else ()))
 
     @property
@@ -263,8 +262,7 @@ class Signature:
 
     @property
     def raises(self) -> bool:
-        """Return whether a Python call raises an error if a matrix that the function factorises is not positive
-        definite."""
+        """Return whether a Python call raises an error if a factorised matrix is not positive definite."""
         return any(matrix.error for matrix in self.factorises)
 
     @property
@@ -310,8 +308,7 @@ class Signature:
 
 
 def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
-    """Return the signatures of functions in the order of their numbers `order`. Raises InternalError if two functions
-    have the same number."""
+    """Return signatures in the order of their numbers `order`. Raises InternalError if two are equal."""
     found = tuple(sorted(signatures, key=lambda signature: signature.order))
     for one, other in pairwise(found):
         if one.order == other.order:

@@ -150,8 +150,7 @@ class _Sources:
         return value if sums is None else sums.total(group, value)
 
     def slope(self, index: int, moved: Mapping[int, Value]) -> Value:
-        """Return the derivative of the value with this index along the direction. `moved` are the derivatives of
-        earlier values."""
+        """Return the derivative of the value with this index; `moved` are those of earlier values."""
         total: Value = 0.0
         for argument, partial in self.partials(index):
             tangent = moved.get(argument, 0.0)

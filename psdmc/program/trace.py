@@ -46,14 +46,12 @@ Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
 
 
 def group_name(group: int) -> str:
-    """Return the prefix, such as 'group0', of the names of all vectors of a limb group (equal branches, such as
-    legs)."""
+    """Return the prefix, such as 'group0', of the names of all vectors of a limb group (equal branches)."""
     return f"group{group}"
 
 
 def constants_of(group: int) -> str:
-    """Return the name of the vector that holds the constants that differ between the limbs of a group. Limbs are equal
-    branches, such as legs."""
+    """Return the name of the vector of the constants that differ between the limbs of a group."""
     return f"{group_name(group)}_constants"
 
 
@@ -72,13 +70,11 @@ class SumsOverLimbs(Protocol):
         stands for the value of every limb."""
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Return new input symbols that stand for these values. An input differs between limbs (equal branches) if its
-        value does."""
+        """Return new input symbols for these values. An input differs between limbs if its value does."""
 
 
 class Tracer:
-    """Records operations on symbols. `symbols` makes inputs, and `finish` makes the PROGRAM (list of operations to
-    generate)."""
+    """Records operations on symbols: `symbols` makes inputs, and `finish` makes the PROGRAM."""
 
     __slots__ = ("__weakref__", "_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
@@ -95,8 +91,7 @@ class Tracer:
         return [self.symbol(slot) for slot in slots_of(vector, count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Return new input symbols that stand for these values. Later, `substituted` (replay.py) puts the values in
-        their place."""
+        """Return new input symbols for these values, which `substituted` (replay.py) puts in their place."""
         if self.limb_sums is None:
             return self.symbols(vector, len(values))
         return self.limb_sums.stand_ins(vector, values)
@@ -106,8 +101,7 @@ class Tracer:
         return Symbol(self, self.record((_LOAD, slot, None)))
 
     def record(self, step: Step) -> int:
-        """Return the index of the value that an operation computes. The operation is recorded if no equal operation has
-        been."""
+        """Return the index of the value of an operation, which is recorded if no equal one has been."""
         index = self.known.get(step)
         if index is None:
             index = self.known[step] = len(self.steps)
@@ -345,8 +339,7 @@ class Symbol:
         return self.tracer.operated(Op.SQRT, (self,))
 
     def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
-        """Return the result of an operation, such as a minimum, on symbols and numbers. This symbol is one of the
-        arguments."""
+        """Return the result of an operation, such as a minimum, on this symbol and other arguments."""
         return self.tracer.operated(op, arguments)
 
     @property

@@ -147,8 +147,7 @@ def bars(case: CaseResult, function: str) -> str:
 
 
 def scaling(result: BenchResult, function: str) -> str:
-    """Draw times against the number of joints, for Pinocchio and for psdmc's two forms of code (factored and
-    expanded)."""
+    """Draw times against the number of joints, for Pinocchio and psdmc's factored and expanded code."""
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()

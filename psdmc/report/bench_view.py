@@ -23,8 +23,7 @@ LAYOUT_TITLES = {"state": "one state per call", "rows": "batch, rows", "lanes": 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of a robot's table in the benchmark page, as text: the result of one library. `ours` is true for
-    psdmc."""
+    """One row of a robot's table as text: the result of one library. `ours` is true for psdmc."""
 
     who: str
     how: str
@@ -105,8 +104,7 @@ def quoted_table() -> tuple[Cells, ...]:
 
 
 def own_table(result: BenchResult) -> tuple[Cells, ...]:
-    """Return table 5 of the paper Denso-2022 with times measured on this machine. The table is empty if the Denso robot
-    was not measured."""
+    """Return table 5 of Denso-2022 with times of this machine; empty if the Denso was not measured."""
     case = next((case for case in result.cases if case.name == "Denso"), None)
     if case is None:
         return ()
@@ -130,8 +128,7 @@ def _quoted(method: str, inverse: float, forward: float, inverse_one: float, for
 
 
 def published_rows(result: BenchResult) -> tuple[Cells, ...]:
-    """Return rows with the times of inverse and forward dynamics in ns, for the robots whose times the method's authors
-    published."""
+    """Return rows with times of inverse and forward dynamics in ns, for robots that the authors published."""
     rows = []
     for case in result.cases:
         theirs = PUBLISHED.get(case.name)
@@ -178,8 +175,7 @@ def _operations(case: CaseResult, rival: str) -> str:
 
 
 def thread_rows(result: BenchResult) -> tuple[tuple[str, str, str, Cells, str], ...]:
-    """Return rows with the times in ns per state by number of threads. A row says how many times faster the most
-    threads are than one thread."""
+    """Return rows with ns per state by number of threads, and the speed-up of the most threads over one."""
     rows = []
     for case in result.cases:
         for function, layout in dict.fromkeys((t.function, t.layout) for t in case.threads):
@@ -195,8 +191,7 @@ def thread_rows(result: BenchResult) -> tuple[tuple[str, str, str, Cells, str], 
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """Times that were published for one robot, in ns per call, and the time of its derivation in s. A time is None if
-    it was not published."""
+    """Published times of one robot in ns per call, and of its derivation in s; None if not published."""
 
     robot: str
     source: str

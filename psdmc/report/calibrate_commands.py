@@ -7,7 +7,7 @@ from pathlib import Path
 
 from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
 from psdmc.backends.c.names import identifier
-from psdmc.backends.own_files import content_of
+from psdmc.backends.manifest import content_of
 from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import (
@@ -132,8 +132,7 @@ def calibrate_command(
 
 
 def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
-    """Write C code for the friction and motors of a calibrated model into a folder. Raise InputError if the model is
-    not calibrated."""
+    """Write C code for the friction and motors into a folder. Raise InputError without a calibration."""
     found = model.calibrated
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")

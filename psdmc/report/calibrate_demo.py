@@ -1,5 +1,4 @@
-"""`make calibrate-demo`: plan, simulate and calibrate the virtual Denso, and compare the result with its true
-parameters."""
+"""`make calibrate-demo`: plan, simulate and calibrate the virtual Denso, and compare with the truth."""
 
 from __future__ import annotations
 
@@ -44,8 +43,7 @@ def run_demo(
     workers: int = 2,
     say: Callable[[str], None] = print,
 ) -> dict[str, Comparison]:
-    """Plan, simulate, calibrate and report each variant of the demonstration. Return how each result compares with the
-    true parameters."""
+    """Plan, simulate, calibrate and report each variant; return how each compares with the true parameters."""
     begin = time.monotonic()
 
     def step(text: str) -> None:

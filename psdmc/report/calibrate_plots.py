@@ -1,5 +1,4 @@
-"""Pictures of a calibration as SVG text, similar to figures 2 to 5 of the paper on the calibration of a Denso robot
-(published_denso.py)."""
+"""Pictures of a calibration as SVG text, like figures 2 to 5 of Denso-2022 (published_denso.py)."""
 
 from __future__ import annotations
 

@@ -74,8 +74,7 @@ def _both(held_out: Quality, fit: Quality) -> list[str]:
 
 
 def parameter_table(record: Calibrated) -> str:
-    """Return the table of base parameters: the robot file's value, the value found, standard deviation, unit and
-    equation (table 4 of Denso-2022)."""
+    """Return the table of base parameters with values of file and fit (table 4 of Denso-2022)."""
     head = ["Parameter", "In the file", "Found", "±", "Relative", "Unit", "Equation", "In the data", "Group"]
     rows = []
     for row in record.parameters:
@@ -108,8 +107,7 @@ def spring_table(record: Calibrated) -> str:
 
 
 def joint_number(row: NumberRow | None) -> str:
-    """Return a value of a joint with its standard deviation as text. A value that the data alone do not determine is in
-    brackets, with the reason."""
+    """Return a joint's value and deviation as text; in brackets with a reason if the data lack it."""
     if row is None:
         return NOTHING
     if not row.seen:

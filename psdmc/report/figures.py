@@ -108,8 +108,7 @@ def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQua
 
 
 def draw_parameters(figure: Figure, known: Calibrated) -> None:
-    """Draw the calibrated base parameters with confidence intervals, with one axis for each unit. Open circles are the
-    values of the robot file."""
+    """Draw the base parameters with confidence intervals, an axis per unit. Open circles: the robot file."""
     units = list(dict.fromkeys(row.unit for row in known.parameters))
     groups = [[row for row in known.parameters if row.unit == unit] for unit in units]
     axes = figure.subplots(len(units), 1, squeeze=False, height_ratios=[len(rows) + 2 for rows in groups])
@@ -211,8 +210,7 @@ def draw_torque(figure: Figure, step: StepQuality, efforts: Mapping[str, str]) -
 
 
 def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
-    """Return the tables of a calibration as LaTeX text, by file name. They need the packages booktabs, longtable and
-    siunitx."""
+    """Return the tables of a calibration as LaTeX, by file name, for booktabs, longtable and siunitx."""
     equations = [parameter.terms for parameter in model.base_parameters]
     parameters = [
         [
@@ -256,8 +254,7 @@ def _seen(row: NumberRow) -> str:
 
 
 def tabular(columns: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "tabular") -> str:
-    """Return a LaTeX table from cells in LaTeX. A longtable continues on the next page and repeats the head of the
-    table."""
+    """Return a LaTeX table from cells in LaTeX. A longtable repeats its head on each page."""
     packages = "booktabs,siunitx" if kind == "tabular" else f"booktabs,{kind},siunitx"
     lines = [
         f"{MARK}; needs \\usepackage{{{packages}}}",

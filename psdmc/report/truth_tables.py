@@ -1,5 +1,4 @@
-"""The part of a report that only a virtual robot has: its true parameters and the tables of Denso-2022, with the values
-found."""
+"""The part of a report that only a virtual robot has: true parameters beside tables of Denso-2022."""
 
 from __future__ import annotations
 

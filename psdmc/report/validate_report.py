@@ -27,8 +27,7 @@ MARK = '"schema": 1,\n "kind": "'
 
 @dataclass(frozen=True, slots=True)
 class TableView:
-    """A table of the HTML page on a validation. `short` are the rows that the terminal shows. `prose` tells whether the
-    last column is text."""
+    """A table of the page. The terminal shows the rows `short`; with `prose`, the last column is text."""
 
     title: str
     head: Sequence[str]

@@ -1,5 +1,4 @@
-"""Draws a robot on an HTML page in 3D: links, axes, frames, bodies of the file and of a calibration, and the motion of
-logs."""
+"""Draws a robot on an HTML page in 3D: links, axes, frames, bodies of file and calibration, and logs."""
 
 from __future__ import annotations
 
@@ -248,8 +247,7 @@ def _poses(chain: Mechanism, q: Array) -> Array:
 
 
 def write_view(view: Viewed, path: str | Path) -> None:
-    """Write the 3D page of a robot. Raise InputError if plotly is not installed, or if the path has a file that is no
-    page of `psdmc view`."""
+    """Write the 3D page of a robot. Raise InputError without plotly, or if the path has another file."""
     script = _plotly()
     require_own_page(path)
     write_whole(path, page(view, script))
@@ -285,8 +283,7 @@ def page(view: Viewed, script: str) -> str:
 
 
 def embedded(value: Any) -> str:
-    """Return a value as JSON text for an HTML <script> element. Characters are escaped so that no text in the value can
-    end the element."""
+    """Return a value as JSON for an HTML <script> element, escaped so that no text can end the element."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

@@ -156,8 +156,7 @@ def _unit(value: object) -> tuple[float, ...]:
 
 
 def merged_loops(found: Tables, given: Tables) -> tuple[Mapping[str, Any], ...]:
-    """Return the tables of a file, with the keys that given tables of the same name replace, then the other given
-    tables."""
+    """Return the tables of a file, with keys replaced by given tables of the same name, then the others."""
     own = {table["name"]: dict(table) for table in found}
     others, changed = [], set[str]()
     for table in given:

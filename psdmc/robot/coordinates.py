@@ -55,8 +55,7 @@ def own_coordinates(n: int) -> tuple[Coordinate, ...]:
 
 
 def leaders(coordinates: Sequence[Coordinate]) -> tuple[int, ...]:
-    """Return the indices of the joints that are not mimic joints, in order. The entries of q are the positions of these
-    joints."""
+    """Return the indices of the joints that are not mimic joints: q has their positions, in order."""
     return tuple(i for i, coordinate in enumerate(coordinates) if coordinate == Coordinate(i))
 
 

@@ -198,8 +198,7 @@ Triple = tuple[float, float, float]
 
 
 def angle(value: object, accepted: Range = limits.ANGLE) -> float:
-    """Return an angle in rad, read from a number (rad) or a text such as "90 deg" or "1.5 rad". Raises ValueError for
-    anything else."""
+    """Return an angle in rad from a number or a text such as "90 deg" or "1.5 rad". Raises ValueError."""
     if not isinstance(value, str):
         return within(accepted)(value)
     plain = value.strip(WHITE_SPACE)
@@ -219,8 +218,7 @@ def finite(value: object) -> float:
 
 
 def within(accepted: Range) -> Callable[[object], float]:
-    """Return a reading function for finite numbers whose magnitude must lie in a range. The ValueError of this function
-    names the range."""
+    """Return a reader of finite numbers within a range, which its ValueError names."""
 
     def convert(value: object) -> float:
         number = finite(value)
@@ -245,8 +243,7 @@ class CheckedTable:
                 problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
 
     def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
-        """Return the value of a key of the table, converted by a reading function. If the value is missing or wrong,
-        return `default`."""
+        """Return a key's value, converted by a reading function; `default` if it is missing or wrong."""
         if key not in self.table:
             return default
         try:

@@ -1,5 +1,4 @@
-"""Recognises the format of a robot file by its name and first element, and converts it to the URDF or DH table that
-psdmc reads."""
+"""Recognises a robot file's format by name and first element, and converts it to a URDF or DH table."""
 
 from __future__ import annotations
 

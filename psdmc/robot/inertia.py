@@ -35,8 +35,7 @@ def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
 
 
 def about_com(parameters: Array) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass (3,) and inertia about the centre of mass (6,) from standard parameters. The mass
-    must not be zero."""
+    """Return mass (not zero), centre (3,) and inertia about it (6,) from standard parameters."""
     mass = float(parameters[0])
     com = parameters[1:4] / mass if mass else np.zeros(3)
     shift = standard_parameters(mass, com, np.zeros(6))[4:]
@@ -59,8 +58,7 @@ def inertia_matrix(six: Array) -> Array:
 
 
 def six_of(matrix: Array) -> Array:
-    """Return the six components Ixx, Ixy and so on (order of INERTIA_NAMES) of a symmetric matrix (3, 3), from the
-    upper triangle."""
+    """Return the components Ixx, Ixy ... (INERTIA_NAMES) of a symmetric matrix (3, 3), of its upper triangle."""
     return matrix[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
 
 

@@ -1,5 +1,4 @@
-"""Finds equal limbs of a robot, such as the legs of a quadruped: branches on the same body with the same joint
-structure."""
+"""Finds equal limbs of a robot, such as legs: branches on one body with the same joint structure."""
 
 from __future__ import annotations
 
@@ -49,8 +48,7 @@ class _Tree:
             self.shapes[i] = known.setdefault(shape, len(known))
 
     def joints(self, branch: int) -> tuple[int, ...]:
-        """Return the joints of a branch. In branches of equal structure, corresponding joints have the same place in
-        this order."""
+        """Return the joints of a branch, in an order that is the same for branches of equal structure."""
         found = [branch]
         for child in sorted(self.children[branch], key=lambda child: (self.shapes[child], child)):
             found += self.joints(child)

@@ -115,8 +115,7 @@ def listed(names: Iterable[str], most: int = 12) -> str:
 
 
 def gravity_fault(gravity: Sequence[float]) -> str | None:
-    """Return a description of what is wrong with a gravity vector (three finite numbers, m/s^2), or None if nothing
-    is."""
+    """Return what is wrong with a gravity vector (three finite numbers, m/s^2), or None if nothing is."""
     faults = [GRAVITY.fault(component) for component in gravity]
     return next((fault for fault in faults if fault), None) or GRAVITY_LENGTH.fault(math.hypot(*gravity))
 

@@ -134,8 +134,7 @@ def _each_once(what: str, given: Sequence[str]) -> tuple[str, ...]:
 
 
 def parsed_contact(text: str) -> tuple[str, int]:
-    """Return name and number of rows of a contact from a text such as "lf_foot" (a point, 3) or "lf_foot:6" (a
-    surface, 6)."""
+    """Return a contact's name and rows from a text: "lf_foot" (a point, 3) or "lf_foot:6" (a surface, 6)."""
     name, colon, rows = text.rpartition(":")
     if not colon or not rows.isdecimal():
         return text, POINT
@@ -157,8 +156,7 @@ def _contacts(contacts: Sequence[str]) -> tuple[str, ...]:
 
 
 def _loops(tables: object) -> tuple[Mapping[str, Any], ...]:
-    """Plain tables, in which NumPy's arrays and numbers are lists and numbers. Their contents are checked with the robot's
-    links."""
+    """Plain tables with lists and numbers for NumPy's; their contents are checked with the robot's links."""
     plain = _plain(tables)
     faults = [
         (number, key, value)

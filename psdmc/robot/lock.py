@@ -85,8 +85,7 @@ def _note(joint: UrdfJoint, held: Mapping[str, float], lock: Mapping[str, float]
 
 
 def _moved(joint: UrdfJoint, value: float) -> Placement:
-    """The placement of the child link in the file's joint frame; that at zero where the joint's type has no single
-    position."""
+    """The placement of the child in the file's joint frame; at zero if the type has no single position."""
     if not _has_position(joint):
         return Placement.identity()
     axis = Placement(link_rotation(snap_axis(np.array(joint.axis), 0.0)[0]), np.zeros(3))

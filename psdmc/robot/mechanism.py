@@ -235,8 +235,7 @@ class Mechanism:
 
     @property
     def contacts(self) -> tuple[NamedFrame, ...]:
-        """The named frames at which contacts are possible. If the user declared none, each named frame is a contact
-        point."""
+        """The named frames at which contacts are possible; by default each named frame is a contact point."""
         return tuple(frame for frame in self.frames if frame.rows)
 
     @property
@@ -291,8 +290,7 @@ class Mechanism:
 
     @property
     def base_frame(self) -> str:
-        """Return the name of the frame in which gravity and placements are given: base frame, or world frame if the
-        base floats."""
+        """Return the name of the frame of gravity and placements: base, or world frame if the base floats."""
         return "world frame" if self.has_free_root else BASE_FRAME
 
     @property
@@ -341,8 +339,7 @@ def _entry_names(joint: str, several: Sequence[str]) -> tuple[str, ...]:
 
 
 def serial_parents(n: int) -> tuple[int, ...]:
-    """Return the parents of a serial chain of n bodies: the base for the first body, and the previous body for each
-    other one."""
+    """Return the parents of a serial chain of n bodies: the base, then each previous body."""
     return tuple(range(BASE, n - 1))
 
 

@@ -13,8 +13,7 @@ from psdmc.robot.urdf import UrdfJoint
 
 
 class Followed(NamedTuple):
-    """Describes which joint a mimic joint follows, directly or through other mimic joints: q = ratio q_joint +
-    offset."""
+    """Describes which joint a mimic joint follows, maybe through others: q = ratio q_joint + offset."""
 
     joint: UrdfJoint
     ratio: float

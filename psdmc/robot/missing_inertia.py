@@ -131,8 +131,7 @@ def with_massless_warning(chain: Mechanism) -> Mechanism:
 
 
 def massless_words(chain: Mechanism) -> str:
-    """Return the beginning of a sentence that lists the links without inertia, such as "link 'fore' has no
-    <inertial>"."""
+    """Return the start of a sentence on links without inertia, such as "link 'fore' has no <inertial>"."""
     if len(chain.massless) == 1:
         return f"link '{chain.massless[0]}' has no <inertial>"
     return f"{len(chain.massless)} links ({listed(chain.massless, MOST_NAMED)}) have no <inertial>"
@@ -145,8 +144,7 @@ def unknown_option(chain: Mechanism) -> str:
 
 
 def idle_joints(chain: Mechanism) -> tuple[int, ...]:
-    """Return the joints that move no mass, no inertia and no drive inertia. Masses that a joint moves through mimic
-    joints count."""
+    """Return the joints that move no mass, inertia or drive inertia, not even through mimic joints."""
     moved = {i for body, x in enumerate(chain.parameters) if x[:DRIVE].any() for i in chain.path_to(body)}
     moved |= {i for i, x in enumerate(chain.parameters) if x[DRIVE] != 0.0}
     moving = {leader for i in moved for leader, _ in chain.coordinates[i].shares}

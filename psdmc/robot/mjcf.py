@@ -195,8 +195,7 @@ def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None
 
 
 def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
-    """Return notes, with names, on elements of the MJCF file that the rigid-body model leaves out, such as
-    actuators."""
+    """Return notes, with names, on elements that the rigid-body model leaves out, such as actuators."""
     joints, bodies = range(model.njnt), range(model.nbody)
     found = {
         "actuators are not modelled: efforts are those of the joints": _names(

@@ -175,8 +175,7 @@ def _included(path: Path, document: _Document, reading: _Reading) -> _Count:
 
 
 def _attached(element: Element, document: _Document, reading: _Reading) -> _Count:
-    """Return the element that <attach> inserts: the whole model, or one body of it. It is a copy where it is attached
-    again."""
+    """Return the element that <attach> inserts: the model, or one of its bodies; a copy if used again."""
     path, name = document.models.get(element.get("model", "")), element.get("body")
     if path is None:
         return _Count(1.0, 0.0)
@@ -229,8 +228,7 @@ ROOM = ("nkey", "nuserdata", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_sit
 
 
 def refuse_large(element: Element, source: str) -> None:
-    """Raise InputError if an element of an MJCF file asks for more points, cells or numbers than a robot's file
-    needs."""
+    """Raise InputError if an MJCF element asks for more points, cells or numbers than a robot needs."""
     if element.tag == "mesh" and element.get("builtin"):
         most = MAX_CORNERS if element.get("builtin") == CONE else MAX_POINTS
         _refuse(_points(element), most, "points", f"mesh {_name(element)}", source)

@@ -28,14 +28,12 @@ def armatures(mujoco: Any, model: Any) -> Array:
 
 
 def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
-    """Return the actuators that have an armature (rotor inertia) but do not act on a joint; for example, they act on a
-    tendon."""
+    """Return the actuators that have an armature (rotor inertia) but act on no joint, such as on a tendon."""
     return [k for k in _with_armature(model) if model.actuator_trntype[k] not in _joint_transmissions(mujoco)]
 
 
 def reflected(model: Any, actuator: int) -> float:
-    """Return the inertia of an actuator as seen at the joint: the actuator's armature times the square of the gear
-    ratio."""
+    """Return an actuator's inertia at the joint: its armature times the square of the gear ratio."""
     return float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
 
 
@@ -62,16 +60,14 @@ def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
 
 
 def is_active(mujoco: Any, model: Any, equality: int) -> bool:
-    """Return whether an equality constraint is active. It is inactive if the file switches off this constraint, or all
-    constraints."""
+    """Return whether an equality constraint is active: the file may switch off one, or all."""
     bits = mujoco.mjtDisableBit
     off = int(model.opt.disableflags) & int(bits.mjDSBL_EQUALITY | bits.mjDSBL_CONSTRAINT)
     return bool(model.eq_active0[equality]) and not off
 
 
 def gravity(mujoco: Any, model: Any) -> tuple[float, float, float]:
-    """Return the acceleration of gravity in m/s^2 along the world's axes. It is zero if the file switches gravity
-    off."""
+    """Return gravity in m/s^2 along the world's axes; zero if the file switches it off."""
     if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return 0.0, 0.0, 0.0
     x, y, z = model.opt.gravity.tolist()
@@ -103,8 +99,7 @@ def _sizes(model: Any) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of bodies and joints, by the numbers that MuJoCo gives them. Bodies and joints without a name in the file
-    get a new name."""
+    """Names of bodies and joints by MuJoCo's numbers; those without a name get a new one."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]

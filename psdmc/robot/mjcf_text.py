@@ -222,8 +222,7 @@ COMPILER = {
 
 
 def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
-    """Return a <mujoco> element with the bodies, inertias, joints, drive inertias and gravity of the compiled model,
-    and nothing else."""
+    """Return a <mujoco> element with only the compiled model's bodies, inertias, joints, drives and gravity."""
     root = Element("mujoco", model="kept")
     SubElement(root, "compiler", COMPILER)
     SubElement(root, "option", gravity=_kept_numbers(model.opt.gravity))

@@ -46,8 +46,7 @@ States = tuple[Array, Array, Array]
 
 
 class NotCompared(Exception):
-    """An exception: MuJoCo is not installed or cannot read a robot, so nothing is compared with MuJoCo. The message
-    says why."""
+    """An exception: MuJoCo is not installed or cannot read a robot. The message says why."""
 
 
 def mujoco_version() -> str:

@@ -26,8 +26,7 @@ def words(text: str) -> list[str]:
 
 
 def decimal(word: str) -> float | None:
-    """Return the number that a word represents. Return None if the word is no finite decimal number, or if it is too
-    long or too small."""
+    """Return the number of a word; None if it is no finite decimal number, too long or too small."""
     if len(word) > MAX_CHARACTERS or not DECIMAL.fullmatch(word):
         return None
     value = float(word)

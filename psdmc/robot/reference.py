@@ -45,8 +45,7 @@ class Reference:
 
     @property
     def contacts(self) -> list[tuple[int, int]]:
-        """Return for each contact the number of the contact's frame in Pinocchio's model, and the number of rows (3 or
-        6)."""
+        """Return each contact's frame number in Pinocchio's model, and its number of rows (3 or 6)."""
         ids = self.frame_ids
         return [
             (frame, rows) for frame, rows in zip(ids, self.rows or (POINT,) * len(ids), strict=True) if rows
@@ -99,8 +98,7 @@ class Reference:
 
     @property
     def joint_types(self) -> list[JointType]:
-        """Return the types of the joints in the order of Pinocchio's model. All joints with one coordinate count as
-        revolute."""
+        """Return the types of joints in Pinocchio's order. Those with one coordinate count as revolute."""
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
@@ -128,8 +126,7 @@ class Reference:
     def inverse_dynamics_derivatives(
         self, q: Array, qd: Array, qdd: Array, wrenches: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return the derivatives of the joint torques by q, qd and qdd, an array (..., n, n) each. Row i belongs to
-        tau[i]."""
+        """Return the derivatives of the torques by q, qd and qdd, (..., n, n) each; row i is of tau[i]."""
         by_q, by_qd, by_qdd = np.moveaxis(self._loaded(torque_derivatives, wrenches, q, qd, qdd), -3, 0)
         return by_q, by_qd, by_qdd
 
@@ -164,8 +161,7 @@ class Reference:
         return mean
 
     def integrated(self, q: Array, way: Array) -> Array:
-        """Return the positions (..., nq) after a motion from q at constant rates. `way` is the rates multiplied by the
-        duration."""
+        """Return positions (..., nq) after a motion from q at constant rates; `way` is rates times duration."""
 
         def moved(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.asarray(pinocchio.integrate(model, *state))
@@ -350,8 +346,7 @@ class OnCoordinates:
         return self.following.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))
 
     def on_joints(self, q: Array, *rates: Array) -> tuple[Array, ...]:
-        """Return the positions and rates (..., n) of all n joints from those of the joints that follow no other
-        joint."""
+        """Return positions and rates (..., n) of all n joints from those of the joints that do not follow."""
         return self.following.positions(q), *map(self.following.rates, rates)
 
     @property

@@ -152,8 +152,7 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
 
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
-    """Return whether parameters of some bodies are assumed zero or unknown, so that the file alone does not determine
-    these bodies."""
+    """Return whether some parameters are assumed zero or unknown, and not determined by the file."""
     return bool(_assumed(loaded.mechanism))
 
 

@@ -56,8 +56,7 @@ def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
 
 
 def snap_translation(translation: Array, chain_length: float) -> Array:
-    """Return a translation (3,) in m, in which entries that are only rounding errors (LENGTH_ROUNDING) are set to
-    zero."""
+    """Return a translation (3,) in m with entries of rounding size (LENGTH_ROUNDING) set to zero."""
     return np.where(np.abs(translation) > LENGTH_ROUNDING * chain_length, translation, 0.0) + 0.0
 
 

@@ -121,8 +121,7 @@ def _last_joints(robot: UrdfRobot) -> list[UrdfJoint]:
 
 
 def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
-    """Describe the tree, and the options that select the chain that psdmc took in earlier releases, unless its root is
-    free."""
+    """Describe the tree, and the options for earlier releases' chain, unless its root is free."""
     if robot.free_root is not None:
         return f"the whole tree, to its ends {listed(ends)}"
     try:
@@ -144,8 +143,7 @@ def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
 
 
 def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
-    """Return the joints on the path from link `start` outward to link `end`. Return None if `end` is not beyond
-    `start`."""
+    """Return the joints from link `start` outward to link `end`; None if `end` is not beyond `start`."""
     above = {joint.child: joint for joint in robot.joints}
     path: list[UrdfJoint] = []
     link = end

@@ -41,8 +41,7 @@ normalized."""
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The placement of a frame in another one, as in a URDF: xyz (m), and either rpy (rad) or a unit quaternion (x, y,
-    z, w)."""
+    """A frame's placement in another, as in a URDF: xyz (m), and rpy (rad) or a unit quaternion (x, y, z, w)."""
 
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)

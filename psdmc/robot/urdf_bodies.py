@@ -61,8 +61,7 @@ def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, 
 
 
 def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
-    """Return the standard parameters (10,) of a link about another frame, in which the link has the placement
-    `place`."""
+    """Return a link's standard parameters (10,) about a frame in which it has the placement `place`."""
     if body is None:
         return np.zeros(10)
     at = place @ placement_of(body.origin)

@@ -1,5 +1,4 @@
-"""Makes a robot from a URDF: places the joints and merges the inertias of links that move together, by the numbers of
-the file."""
+"""Makes a robot from a URDF: places joints, and merges the inertias of links that move together."""
 
 from __future__ import annotations
 
@@ -224,8 +223,7 @@ WORLD = "universe"
 
 
 def on_free_root(robot: UrdfRobot) -> UrdfRobot:
-    """Return the robot with a free joint (six degrees of freedom) between the world frame and the frame of the root
-    link."""
+    """Return the robot with a free joint between the world frame and the frame of the root link."""
     name = free_name(ROOT_JOINT, {joint.name for joint in robot.joints})
     world = free_name(WORLD, set(robot.inertials))
     free = UrdfJoint(

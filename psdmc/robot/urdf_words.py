@@ -88,8 +88,7 @@ def joint_faults(joint: Element) -> list[str]:
 
 
 def robot_faults(root: Element) -> list[str]:
-    """Return a sentence for each word directly in the <robot> element that is not allowed there. An unknown version
-    gives a sentence, too."""
+    """Return a sentence for each word directly in <robot> that is not allowed, or an unknown version."""
     version = " ".join(words(root.get("version", "1.0")))
     faults = [] if version in VERSIONS else [f"version {shown(version)} is not supported"]
     if len(_unknown(root)) > MAX_UNKNOWN:

@@ -125,8 +125,7 @@ def numbers(
 def number(
     element: Element | None, attribute: str, default: float, accepted: Range, *, is_magnitude: bool = False
 ) -> float:
-    """Return one number from an attribute. Raises ValueError if the number is out of range, or negative although
-    `is_magnitude` is true."""
+    """Return one number from an attribute. Raises ValueError out of range, or for a negative magnitude."""
     value = numbers(element, attribute, (default,), accepted)[0]
     if is_magnitude and value < 0.0 and element is not None:
         raise ValueError(f"<{element.tag}> {attribute}='{value:g}' is negative, expected no less than zero")

@@ -136,8 +136,7 @@ def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
 
 
 def leading_rows(span: Array) -> NDArray[np.int64]:
-    """Return for each of the k columns of a reduced echelon form (rows, k) the row of the column's leading one,
-    (k,)."""
+    """Return the row of the leading one of each of the k columns of a reduced echelon form, (k,)."""
     leads: NDArray[np.int64] = np.argmax(span != 0.0, axis=0).astype(np.int64)
     return leads
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at
-from psdmc.backends.own_files import edited_files
+from psdmc.backends.manifest import edited_files
 from psdmc.errors import InputError, ToolchainError
 from psdmc.progress import Progress, Step, silent
 from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
@@ -62,8 +62,7 @@ def build_package(directory: str | Path, edited: bool = False, progress: Progres
 
 
 def _check_files(root: Path, edited: bool) -> None:
-    """InputError where files differ from the manifest, which has their digests from when they were checked against the
-    model."""
+    """InputError if files differ from the manifest, whose digests are from the check against the model."""
     found = edited_files(root)
     if found is None:
         fault = "no emitted package (no manifest.json of psdmc's)" if root.is_dir() else "no such folder"

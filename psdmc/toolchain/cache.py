@@ -37,8 +37,7 @@ from psdmc.toolchain.cache_room import (
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
-    """Return the key of a cache entry: a hex digest of file names, texts and everything else on which the library
-    depends."""
+    """Return the key of a cache entry: a hex digest of all on which the library depends."""
     platform = (sys.platform, sysconfig.get_platform(), str(sysconfig.get_config_var("SOABI")))
     digest = hashlib.sha256()
     for part in (*platform, *parts, *(item for path in sorted(files) for item in (path, files[path]))):
@@ -88,8 +87,7 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
 
 
 def found(key: str) -> Path | None:
-    """Return the folder of the cache entry for a key, or None if there is no complete, unaltered entry. Errors are
-    those of `cached`."""
+    """Return the folder of the entry for a key; None without a complete, unaltered one. Errors: see `cached`."""
     final = open_cache() / key
     if not re.fullmatch(r"[0-9a-f]{64}", key) or not is_sound(final):
         return None

@@ -1,5 +1,4 @@
-"""Limits the size of the compile cache. Leftovers of killed builds are removed first, then the entries that were not
-used for longest."""
+"""Limits the compile cache: leftovers of killed builds go first, then what was not used for longest."""
 
 from __future__ import annotations
 
@@ -48,8 +47,7 @@ def cache_contents() -> CacheContents:
 
 
 def clear_cache() -> int:
-    """Remove all entries of the compile cache and the leftovers of killed builds. Return the number of entries
-    removed."""
+    """Remove all entries and the leftovers of killed builds; return the number of entries removed."""
     place = cache_directory()
     entries = _entries(place)
     with hold(place):
@@ -60,8 +58,7 @@ def clear_cache() -> int:
 
 
 def make_room(place: Path, keep: Path, limit: int) -> None:
-    """Remove the least recently used entries until the cache has at most `limit` bytes. The entry `keep` and entries
-    that were just used stay."""
+    """Remove the least recently used entries, but not `keep`, until the cache has at most `limit` bytes."""
     entries = _entries(place)
     total = sum(size for _, size, _ in entries)
     old = time.time() - IN_USE
@@ -83,8 +80,7 @@ def sweep(place: Path) -> None:
 
 
 def new_folder(place: Path) -> tuple[int, Path]:
-    """Return a new empty folder to build in, and a handle whose lock marks the folder as in use while this process
-    runs."""
+    """Return a new empty build folder, and a handle whose lock marks it as used by this process."""
     while True:
         own = place / f".build-{secrets.token_hex(8)}"
         own.mkdir(mode=0o700)
@@ -99,8 +95,7 @@ def new_folder(place: Path) -> tuple[int, Path]:
 
 @contextlib.contextmanager
 def hold(place: Path) -> Iterator[None]:
-    """Within the block, lock the cache folder, so that no other process moves entries. File systems without locks are
-    accepted."""
+    """Within the block, lock the cache folder against other processes, where the file system has locks."""
     handle = _opened(place)
     try:
         lock(handle)
@@ -282,8 +277,7 @@ def _home() -> Path:
 
 
 def cache_limit() -> int:
-    """Return the size limit in bytes from PSDMC_CACHE_SIZE: a number, or one with K, M, G or T. Raises InputError for
-    other text."""
+    """Return the size limit in bytes from PSDMC_CACHE_SIZE, such as 2G. Raises InputError for other text."""
     text = os.environ.get(SIZE_VARIABLE) or DEFAULT_SIZE
     found = re.fullmatch(r"([0-9]{1,12})([KMGT]?)", text.strip().upper())
     if found is None:

@@ -93,8 +93,7 @@ def is_direct(function: Signature, units: Sequence[tuple[int, int]]) -> bool:
 
 
 def with_gravity(function: Signature) -> inspect.Signature:
-    """Return the Python signature of the method for a generated function, with the argument `gravity` if the function
-    depends on gravity."""
+    """Return the method's signature for a generated function, with `gravity` if it depends on gravity."""
     found = signature_of(function)
     if not function.depends_on_gravity:
         return found

@@ -1,5 +1,4 @@
-"""Checks the arguments of a method of a robot: the inputs, theta_b and out. Compiled robots and models share these
-checks."""
+"""Checks a method's arguments (inputs, theta_b, out), for compiled robots and models."""
 
 from __future__ import annotations
 
@@ -115,8 +114,7 @@ def other_shape(
 
 
 def common_lead(function: Signature, arrays: Sequence[Array]) -> tuple[int, ...]:
-    """Return the batch axes (leading axes, one entry per state) to which all inputs broadcast. Raises InputError if the
-    inputs do not broadcast."""
+    """Return the batch axes to which all inputs broadcast. Raises InputError if they do not."""
     pairs = list(zip(function.inputs, arrays, strict=True))
     leads = [array.shape[: array.ndim - len(quantity.axes)] for quantity, array in pairs]
     if len(set(leads)) < 2:
@@ -140,8 +138,7 @@ def has_rows(function: Signature, theta_b: ArrayLike | None) -> bool:
 
 @cache
 def with_rows(function: Signature) -> Signature:
-    """Return the signature of a function with theta_b as an additional input, so that each state can have another
-    theta_b."""
+    """Return a function's signature with theta_b as an additional input, one per state."""
     return replace(function, inputs=(*function.inputs, THETA_B))
 
 
@@ -239,7 +236,6 @@ def _faults(array: Any, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Iterato
 
 
 def takes_results(array: Array, inputs: Sequence[Array]) -> bool:
-    """Return whether C code may write results into an array of the caller. The array must be contiguous and share no
-    memory with an input."""
+    """Return whether C may write results into a caller's array: contiguous, sharing no memory with inputs."""
     plain = array.flags.carray and array.dtype.isnative
     return plain and not any(np.may_share_memory(array, given) for given in inputs)

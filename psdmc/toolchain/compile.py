@@ -1,5 +1,4 @@
-"""Keeps compiled libraries and their interfaces in the compile cache, so that a second equal call of `compile` only
-loads them."""
+"""Keeps compiled libraries and interfaces in the compile cache: an equal `compile` only loads them."""
 
 from __future__ import annotations
 
@@ -166,16 +165,14 @@ def _known(gravity_input: bool) -> dict[str, Signature]:
 
 @cache
 def sources_digests() -> tuple[str, ...]:
-    """Return NumPy's version and a digest of psdmc's source files. If one of them changes, cached programs are not
-    used."""
+    """Return NumPy's version and a digest of psdmc's sources, on which cached programs depend."""
     root = resources.files("psdmc")
     modules = [file for file in root.iterdir() if file.name.endswith(".py")]
     return (np.__version__, digest([*modules, *(root / folder for folder in DECIDES)]))
 
 
 def digest(places: Iterable[Traversable]) -> str:
-    """Return a SHA-256 digest of the names and contents of these files, and of all files in these folders and their
-    subfolders."""
+    """Return a SHA-256 digest of names and contents of these files, and of all files in these folders."""
     found = hashlib.sha256()
     for name, content in _files("", places):
         found.update(repr((name, content)).encode())

@@ -44,8 +44,7 @@ Vector = NDArray[np.float64]
 
 
 class JointLimits(NamedTuple):
-    """Limits of n joints as arrays (n,), in rad or m and their rates, N m or N. A limit that the robot file does not
-    give is infinite."""
+    """Limits of n joints as arrays (n,), rad or m and rates, N m or N; infinite if the file has none."""
 
     lower: Vector
     upper: Vector

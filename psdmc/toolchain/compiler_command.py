@@ -141,8 +141,7 @@ def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
-    """Run a program and return the standard output. Raises ToolchainError with a line of the error output if the
-    program fails."""
+    """Run a program and return its output. Raises ToolchainError with a line of errors if it fails."""
     done = attempt(words, what, cwd)
     if done.returncode != 0:
         raise failure(words, what, done)
@@ -150,8 +149,7 @@ def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
 
 
 def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end and return the result, with any exit status. Raises ToolchainError if it cannot be run
-    or takes too long."""
+    """Run a program and return the result, with any exit status. Raises ToolchainError if it fails to start or end."""
     try:
         return subprocess.run(
             words, cwd=cwd, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False

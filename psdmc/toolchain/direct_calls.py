@@ -55,8 +55,7 @@ class DirectCalls:
 
 
 def direct_calls() -> DirectCalls:
-    """Return whether direct calls work, and compile the extension module if needed. The function never raises an
-    error."""
+    """Return whether direct calls work; compile the extension if needed. Never raises an error."""
     if os.environ.get(VARIABLE, "").strip() == "0":
         return DirectCalls(None, f"{VARIABLE} is 0", f"unset {VARIABLE}")
     return _found()

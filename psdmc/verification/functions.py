@@ -53,8 +53,7 @@ ROUNDED = 1e-4
 
 
 class _Remembering(RobotOnArrays):
-    """A robot that computes derivatives of torques once for the same states. Most functions that have derivatives need
-    them."""
+    """A robot that computes derivatives of torques once for the same states, as most functions need them."""
 
     @cached_property
     def _known(self) -> dict[tuple[bytes, ...], tuple[Array, Array, Array]]:

@@ -14,7 +14,7 @@ from bundled import bundled_model
 from command_line import files_in, typed
 
 from psdmc import compiler
-from psdmc.backends.own_files import MANIFEST
+from psdmc.backends.manifest import MANIFEST
 from psdmc.errors import InputError
 from psdmc.model.calibrated_json import from_json
 from psdmc.model.dynamics_model import DynamicsModel

@@ -16,7 +16,7 @@ from bundled import bundled_model
 from command_line import typed
 
 import psdmc
-from psdmc.backends.own_files import MANIFEST, target_of
+from psdmc.backends.manifest import MANIFEST, target_of
 from psdmc.errors import InputError
 from psdmc.lower.kernels import wanted
 from psdmc.toolchain.build_package import checks_of

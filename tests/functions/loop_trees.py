@@ -19,7 +19,7 @@ from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.reference import reference
-from psdmc.verification.source import with_passive_joints
+from psdmc.verification.check import with_passive_joints
 
 Array = np.ndarray
 

@@ -10,7 +10,7 @@ from fixtures import digest
 from mutate_package import OUTSIDE
 from outcome import BrokenRule
 
-from psdmc.backends.own_files import JOURNAL, MANIFEST, edited_files
+from psdmc.backends.manifest import JOURNAL, MANIFEST, edited_files
 from psdmc.backends.write import write_package
 
 EARLIER = {"Makefile": "old:\n", "src/b.c": "/* old b.c */\n", "src/stale.c": "/* stale */\n"}

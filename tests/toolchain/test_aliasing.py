@@ -40,11 +40,11 @@ def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     real, build = request.param
     with pytest.MonkeyPatch.context() as patch:
         if build == "parts":
-            patch.setattr("psdmc.backends.c.parts.LONG", 30)
-            patch.setattr("psdmc.backends.c.parts.PART", 30)
+            patch.setattr("psdmc.backends.c.make_kernel_view.LONG", 30)
+            patch.setattr("psdmc.backends.c.make_kernel_view.PART", 30)
         if build == "clears":
-            patch.setattr("psdmc.backends.c.cleared.LEAST", 1)
-            patch.setattr("psdmc.backends.c.cleared.SHORTEST", 2)
+            patch.setattr("psdmc.backends.c.body.LEAST", 1)
+            patch.setattr("psdmc.backends.c.body.SHORTEST", 2)
         package = arm_package(options=EmitOptions(real=real))
     assert (package.has_parts, package.has_clears) == (build == "parts", build == "clears")
     flags = ["-O1" if request.param == OPTIMISED else "-O0", *BUILDS[build]]

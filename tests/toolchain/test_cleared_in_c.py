@@ -19,8 +19,8 @@ COUNT = 11
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     build, real = request.param
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("psdmc.backends.c.cleared.LEAST", 1)
-        patch.setattr("psdmc.backends.c.cleared.SHORTEST", 2)
+        patch.setattr("psdmc.backends.c.body.LEAST", 1)
+        patch.setattr("psdmc.backends.c.body.SHORTEST", 2)
         package = arm_package(options=EmitOptions(real=real))
     assert package.has_clears
     flags = ["-O0", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", build]

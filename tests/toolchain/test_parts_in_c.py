@@ -24,8 +24,8 @@ COUNT = 19
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     build, real = request.param
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("psdmc.backends.c.parts.LONG", 30)
-        patch.setattr("psdmc.backends.c.parts.PART", 40)
+        patch.setattr("psdmc.backends.c.make_kernel_view.LONG", 30)
+        patch.setattr("psdmc.backends.c.make_kernel_view.PART", 40)
         package = arm_package(options=EmitOptions(real=real))
     library = shared_library(package, tmp_path_factory.mktemp("parts"), ["-O0", *STRICT, *BUILDS[build]])
     return Direct(package, library)

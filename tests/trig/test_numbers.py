@@ -9,7 +9,7 @@ import mpmath as mp
 import pytest
 from slow_cases import slow_but_for
 
-from psdmc.backends.c.trig_numbers import c_number, polynomial
+from psdmc.backends.c.trig import c_number, polynomial
 from psdmc.backends.trig_numbers import NUMBERS, Real
 from psdmc.target.vectors import VectorUnit
 

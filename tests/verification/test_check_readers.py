@@ -13,7 +13,8 @@ from slow_cases import slow_but_for
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.provenance import provenance
 from psdmc.functions import RECIPES
-from psdmc.robot import dh_chain, urdf_chain
+from psdmc.robot import load as robot_load
+from psdmc.robot import urdf_chain
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement
 from psdmc.robot.snap import snap_axis
@@ -198,22 +199,22 @@ def shifted_row(real):
     return read
 
 
-dh_about = dh_chain.about
+dh_about = robot_load.about
 
 
 @pytest.mark.parametrize("make", slow_but_for([modified], [kr6, modified]))
 @pytest.mark.parametrize("mistake", ["twist", "turn", "offset", "convention"])
 def test_a_mistake_in_placing_a_dh_tables_joints_is_noticed(make, mistake: str, monkeypatch) -> None:
     if mistake == "convention":
-        real = dh_chain.read_dh
+        real = robot_load.read_dh
         other = {"standard": "modified", "modified": "standard"}
         monkeypatch.setattr(
-            dh_chain, "read_dh", lambda *a: replace(real(*a), convention=other[real(*a).convention])
+            robot_load, "read_dh", lambda *a: replace(real(*a), convention=other[real(*a).convention])
         )
     elif mistake == "offset":
-        monkeypatch.setattr(dh_chain, "read_dh", shifted_row(dh_chain.read_dh))
+        monkeypatch.setattr(robot_load, "read_dh", shifted_row(robot_load.read_dh))
     else:
-        monkeypatch.setattr(dh_chain, "about", reversed_twist if mistake == "twist" else offset_turn)
+        monkeypatch.setattr(robot_load, "about", reversed_twist if mistake == "twist" else offset_turn)
 
     assert "placements of links and tip" in [row.name for row in checked(make) if not row.passed]
 

@@ -35,8 +35,7 @@ class FunctionView:
 
     @property
     def is_regions(self) -> bool:
-        """Return whether the C code of the function consists of loops and calls of other functions. Otherwise, it is
-        straight-line code."""
+        """Return whether the C code is loops and calls of other functions, and not straight-line code."""
         return any(kernel.regions for kernel in self.kernels)
 
     @property

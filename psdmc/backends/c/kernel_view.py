@@ -20,8 +20,7 @@ LOOPED = 10
 
 @dataclass(frozen=True, slots=True)
 class VectorView:
-    """An input or output of a C function. `size` is how many real numbers belong to one state, `shape` are the lengths
-    of the array's axes."""
+    """An input or output of a C function: `size` real numbers per state, with the array axes `shape`."""
 
     name: str
     size: int
@@ -133,14 +132,12 @@ class KernelView:
 
     @property
     def needs_lanes(self) -> bool:
-        """Return whether another C function calls the variant that stores its results as [entry][lane], with one state
-        per lane."""
+        """Return whether another C function calls the variant that stores results as [entry][lane], one state per lane."""
         return not self.direct or "batch_soa" in self.prototypes
 
     @property
     def lanes(self) -> str:
-        """Return the name of the static C function that computes one state per SIMD lane and stores its results as
-        [entry][lane]."""
+        """Return the name of the static C function with one state per SIMD lane and results as [entry][lane]."""
         return f"{self.name}_lanes"
 
     @property
@@ -169,14 +166,12 @@ class KernelView:
 
     @property
     def whole(self) -> str:
-        """Return the name of the static C function for states that the code with limbs (such as legs) in lanes cannot
-        compute."""
+        """Return the name of the static C function for states that the code with limbs in lanes cannot compute."""
         return f"{self.name}_whole"
 
     @property
     def whole_arguments(self) -> str:
-        """Return C text of the arguments of `whole`, without pivots. The inputs are copies, because outputs may overlap
-        the inputs."""
+        """Return C text of the arguments of `whole` without pivots: copies of inputs, which outputs may overlap."""
         given = [f"{vector.name}_given" for vector in self.inputs]
         return ", ".join([*given, *(output.name for output in self.outputs)])
 

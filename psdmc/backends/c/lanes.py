@@ -1,5 +1,4 @@
-"""The SIMD vectors of the generated C: which widths exist, and how a square block of vectors is transposed in
-registers."""
+"""The SIMD vectors of the generated C: which widths exist, and how a square block of them is transposed."""
 
 from __future__ import annotations
 
@@ -50,15 +49,13 @@ class VectorWidth:
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:
-        """Return the steps that transpose a square block in registers. The block consists of `lanes` vectors with
-        `lanes` real numbers each."""
+        """Return the steps that transpose a block of `lanes` vectors with `lanes` real numbers each in registers."""
         distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
         return tuple(transpose_stage(self.lanes, distance) for distance in distances)
 
     @property
     def piece(self) -> int:
-        """Return how many neighbouring entries of an output row are stored at once, if a batch call stores groups of
-        outputs."""
+        """Return how many neighbouring entries of an output row are stored at once in groups of outputs."""
         return min(self.lanes, GROUP)
 
     @property
@@ -76,8 +73,7 @@ def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
 
 
 def transpose_stage(width: int, distance: int) -> TransposeStage:
-    """Return the step of a matrix transposition that exchanges groups of `distance` lanes between vectors of `width`
-    lanes."""
+    """Return the step of a transposition that exchanges groups of `distance` lanes between vectors of `width`."""
     first = [k - distance + width if k & distance else k for k in range(width)]
     second = [k + width if k & distance else k + distance for k in range(width)]
     return TransposeStage(distance, ", ".join(map(str, first)), ", ".join(map(str, second)))

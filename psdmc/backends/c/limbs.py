@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.c_expr import literal
 from psdmc.backends.c.lanes import TransposeStage, transpose_stage
-from psdmc.backends.c.limb_rows import FOUR
-from psdmc.backends.c.limb_stores import StoreView, store_views
+from psdmc.backends.c.limb_rows import FOUR, StoreView, store_views
 from psdmc.backends.c.lines import Body
 from psdmc.backends.options import EmitOptions
 from psdmc.program.cost import Cost
@@ -42,8 +41,7 @@ class LimbWidth:
 
     @property
     def filled(self) -> str:
-        """Return the C initialiser of a vector of limbs from macro arguments, of which each belongs to one limb (such
-        as a leg)."""
+        """Return the C initialiser of a vector of limbs from macro arguments, one per limb (such as a leg)."""
         names = [names_of(self.count)[k if k < self.count else 0] for k in range(self.parts * self.lanes)]
         parts = (names[k : k + self.lanes] for k in range(0, len(names), self.lanes))
         return ", ".join(f"{{{', '.join(part)}}}" for part in parts)
@@ -62,8 +60,7 @@ class LimbWidth:
 
     @property
     def piece(self) -> int:
-        """Return how many neighbouring outputs of one limb (such as a leg) one vector holds when it is stored, at most
-        four."""
+        """Return how many neighbouring outputs of one limb a vector holds when it is stored, at most four."""
         return min(self.lanes, FOUR)
 
     @property
@@ -107,8 +104,7 @@ class LimbVector(NamedByCount):
 
     @property
     def in_fours(self) -> bool:
-        """Return whether the number of limbs (such as legs) is a multiple of four, so that vectors of four have no
-        empty lane."""
+        """Return whether the number of limbs is a multiple of four, so that vectors of four have no empty lane."""
         return self.count % FOUR == 0
 
     @property
@@ -122,8 +118,7 @@ def names_of(count: int) -> list[str]:
 
 
 def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVector, ...]:
-    """Return the C vector types for groups of limbs. `counts` are the numbers of limbs, such as 4 for the legs of a
-    quadruped."""
+    """Return the C vector types for groups of limbs, whose numbers of limbs are `counts`."""
     narrowest = NARROWEST // options.real_bytes
     integer = "long long" if options.real == "float64" else "int"
     widest = max((unit.bytes // options.real_bytes for unit in options.target.vectors), default=1)

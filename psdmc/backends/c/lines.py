@@ -125,8 +125,7 @@ Line = Step | Store | Zeros | Cleared | GroupStore | Entry | Multiplication
 
 @dataclass(frozen=True, slots=True)
 class Angle:
-    """C text of one angle, and the C variables for its sine and cosine. A variable is None if the function does not
-    need the value."""
+    """C text of one angle, and the C variables for its sine and cosine; None if the value is not needed."""
 
     text: str
     sine: str | None

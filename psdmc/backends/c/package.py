@@ -17,13 +17,10 @@ from psdmc.backends.c.function_view import FunctionView, function_views
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.operations import CallView, call_views
-from psdmc.backends.c.patterns import Pattern, patterns
 from psdmc.backends.c.products import Shape
 from psdmc.backends.c.reals import CReal, c_real, check_range
-from psdmc.backends.c.references import ReferenceView, reference_view
-from psdmc.backends.c.self_test import given_vectors, labels
-from psdmc.backends.c.self_test_view import SelfTestView
-from psdmc.backends.c.tables import Table, tables
+from psdmc.backends.c.self_test import ReferenceView, SelfTestView, given_vectors, labels, reference_view
+from psdmc.backends.c.tables import Pattern, Table, patterns, tables
 from psdmc.backends.c.vectors_view import VectorsView
 from psdmc.backends.describe import uses_contacts, uses_frames
 from psdmc.backends.info import PackageInfo
@@ -183,14 +180,12 @@ class PackageView:
 
     @property
     def friction(self) -> FrictionView | None:
-        """Return the data for the C function of the calibrated joint friction; None if the package has no such
-        function."""
+        """Return the data for the C function of the calibrated joint friction; None if there is no such function."""
         return FrictionView(self.info.friction, self.robot, self.real) if self.info.friction else None
 
     @property
     def payload(self) -> PayloadView | None:
-        """Return the data for the C functions that add a load to theta_b (the base parameters); None if the package has
-        no such functions."""
+        """Return the data for the C functions that add a load to theta_b; None if there are no such functions."""
         return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
 
     @property
@@ -207,8 +202,7 @@ class PackageView:
 
     @property
     def pivot_size(self) -> int:
-        """Return the number of pivots (of a factorised matrix) that must be positive, for functions with one output of
-        this length."""
+        """Return the number of pivots that must be positive, for functions with one output of this length."""
         found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
         return next(found, self.n)
 
@@ -242,14 +236,12 @@ class PackageView:
 
     @property
     def fails_in_several(self) -> bool:
-        """Return whether a failed function of the package sets several outputs to NaN, or an output that is no vector
-        with one entry per joint."""
+        """Return whether a failed function sets several outputs to NaN, or one that is no vector with an entry per joint."""
         return any(k.positive and not (k.fails_alone and k.regions is None) for k in self._all_kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
-        """Return the sizes of all matrix products that follow straight-line code in functions of the package, without
-        duplicates."""
+        """Return the sizes of all matrix products that follow straight-line code, without duplicates."""
         return tuple(sorted({p.shape for function in self.functions for p in function.products}))
 
     @property

@@ -36,8 +36,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Shape:
-    """The shape of a product of two n x n matrices. The first `zero` columns of the right factor are always zero and
-    are not saved."""
+    """The shape of a product of two n x n matrices. The first `zero` columns of the right factor are zero, not saved."""
 
     n: int
     zero: int

@@ -16,8 +16,7 @@ from psdmc.program.theta_rows import THETAS
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Part of a function's C code: some lines of C text, or the statements of straight-line code, indented by a number
-    of spaces."""
+    """Part of a function's C code: lines of C text, or statements of straight-line code with their indentation."""
 
     spaces: int
     lines: tuple[str, ...]

@@ -29,8 +29,7 @@ class StoreGroups:
         self._missing: dict[Slot, int] = {}
 
     def completed_by(self, slot: Slot) -> list[Slot]:
-        """Return the groups of four outputs that become complete when the value of this output is known. Each group is
-        given by its first output."""
+        """Return the groups of four outputs, by their first output, that are complete once this output is known."""
         complete = []
         for start in self._starts(slot):
             first = Slot(slot.vector, start)

@@ -46,8 +46,7 @@ class VectorsView:
 
     @property
     def block_bytes(self) -> int:
-        """Return how many bytes one entry of q, or of another array, takes in a block of states with one state per
-        lane."""
+        """Return how many bytes one entry of q, or of another array, takes in a block with one state per lane."""
         return LANE_BLOCK_BYTES
 
     @property

@@ -92,8 +92,7 @@ class CrateView:
 
 
 def crate_view(given: Emission) -> CrateView:
-    """Return the data of a Rust crate for the templates. Raises InputError if there are no functions, or if an option
-    is not supported for Rust."""
+    """Return the data of a Rust crate. Raises InputError if there are no functions, or for an option that Rust lacks."""
     info, robot, functions = given.info, identifier(given.info.name), given.functions
     if not functions or info.l == 0:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one, of links with inertia")

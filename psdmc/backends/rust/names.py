@@ -43,6 +43,5 @@ def _character(one: str) -> str:
 
 
 def comment(untrusted: str) -> str:
-    """Return text that is safe in a line of Rust documentation: ASCII without backticks, which could end a block of
-    code."""
+    """Return text that is safe in a line of Rust documentation: ASCII without backticks, which end code."""
     return "".join(chr(b) if 32 <= b < 127 and b != 96 else f"<{b:02x}>" for b in utf8(untrusted))

@@ -22,8 +22,7 @@ class Builder(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A library that takes part in the benchmark. `counted` states whether the instructions of its functions are
-    counted."""
+    """A library in the benchmark. `counted` states whether the instructions of its functions are counted."""
 
     name: str
     build: Builder

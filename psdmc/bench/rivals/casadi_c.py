@@ -87,8 +87,7 @@ def _entered(
 
 
 def written(case: Case) -> tuple[str, dict[str, tuple[int, int]]]:
-    """Return the C code that CasADi generates for a robot, with the numbers of (multiplications, additions) of each
-    function."""
+    """Return CasADi's C code for a robot, with each function's numbers of (multiplications, additions)."""
     product = _generated(case)
     lines = (line.split() for line in product.with_suffix(".txt").read_text().splitlines())
     return product.read_text(), {name: (int(mul), int(add)) for name, mul, add in lines}

@@ -103,8 +103,7 @@ BY_COORDINATES = ("_jacobian", "_vjp", "_vjp_aba", "_vjp_ldl")
 
 
 def variant_of(symbol: str, function: str) -> str:
-    """Return the name of an algorithm for tables. It is the part of the C function's name that does not occur in the
-    name of psdmc's function."""
+    """Return an algorithm's name for tables: the part of the C name that psdmc's function does not have."""
     return symbol.removeprefix(function).strip("_").upper()
 
 
@@ -121,16 +120,14 @@ def is_comparable(case: Case, function: str) -> bool:
 
 
 def incomparable(case: Case, rival: str) -> list[Unavailable]:
-    """Return the functions of a library that are left out for this robot because they compute something else, with the
-    reason."""
+    """Return a library's functions that compute something else for this robot, with the reason."""
     if not case.has_drive_inertia:
         return []
     return [Unavailable(f"{rival}, regressor", "it has no columns for drive inertia, which this robot has")]
 
 
 def compiled(way: Way, flags: tuple[str, ...]) -> Path:
-    """Compile the C++ functions that call Pinocchio. Return the shared library, or raise ToolchainError with what is
-    missing."""
+    """Compile the C++ functions that call Pinocchio to a shared library. Raise ToolchainError with what is missing."""
     prefix = pinocchio_prefix()
     link = _library_flags(prefix) if way == "library" else ()
     # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: they cannot be mixed.
@@ -147,8 +144,7 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
 
 @lru_cache
 def pinocchio_prefix() -> Path:
-    """Return the folder in which Pinocchio's wheel has its headers and libraries. Raise ToolchainError if they, or
-    Eigen's headers, are missing."""
+    """Return the folder of Pinocchio's headers and libraries. Raise ToolchainError if they, or Eigen's, are missing."""
     found = find_spec("pinocchio")
     if found is None or found.origin is None:
         raise ToolchainError("the wheel 'pin' is not installed", "pip install pin")

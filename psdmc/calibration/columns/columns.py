@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.columns.effect import Content, Effect, Motion, Unknown
-from psdmc.calibration.columns.flags import joints_of
+from psdmc.calibration.columns.effect import Content, Effect, Motion, Spring, Unknown, joints_of
 from psdmc.calibration.columns.kinds import KINDS
-from psdmc.calibration.columns.spring import Spring
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
 from psdmc.calibration.logs.wording import quoted
@@ -117,15 +115,13 @@ class Columns:
         return np.array([unknown.start for unknown in self.unknowns])
 
     def values(self, motion: Motion) -> Array:
-        """Return the motor torques per unit of each unknown value, before any filter: an array (N samples, n joints, m
-        values)."""
+        """Return the motor torques per unit of each unknown value, before any filter: (N samples, n joints, m values)."""
         if not self.effects:
             return np.zeros((*motion.q.shape, 0))
         return np.concatenate([effect.columns(motion) for effect in self.effects], axis=2)
 
     def without_load(self) -> Columns:
-        """Return the effects that remain when those are left out whose friction depends on the torque of the rigid
-        bodies."""
+        """Return the effects without those whose friction depends on the torque of the rigid bodies."""
         kept = tuple(effect for effect in self.effects if not effect.by_load)
         return replace(self, effects=kept)
 

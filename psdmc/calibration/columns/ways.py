@@ -1,5 +1,4 @@
-"""Computes the length of a spring from the joint positions. The length is the distance between points of two links, or
-a sum of joint coordinates."""
+"""Computes the length of a spring: the distance between points of two links, or a sum of joint coordinates."""
 
 from __future__ import annotations
 

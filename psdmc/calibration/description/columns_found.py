@@ -77,8 +77,7 @@ class JointColumns:
 def joint_columns(
     description: LogDescription, joint_names: Sequence[str], tables: Mapping[str, Columns]
 ) -> tuple[JointColumns, ...]:
-    """Return the log columns of every joint, in the order of the model's joints. Raises InputError if a column is
-    missing or ambiguous."""
+    """Return every joint's log columns, in the model's order. Raises InputError if one is missing or ambiguous."""
     said = {joint.name: joint for joint in description.part(JOINTS)}
     found = []
     for name in joint_names:

@@ -109,8 +109,7 @@ def description_of(
 
 
 def is_description(path: Path) -> bool:
-    """Return whether a path names a log description: a .toml file with [[log]] but without [[run]], which campaigns
-    have."""
+    """Return whether a path names a log description: a .toml file with [[log]] but no campaign's [[run]]."""
     if path.suffix.lower() != ".toml":
         return False
     content = read_toml(path, "a log description or a campaign (.toml)")

@@ -417,8 +417,7 @@ def spelled_unit(what: What, names: Sequence[str]) -> str:
 
 
 def velocity_unit(time: Array, position: Array, velocity: Array) -> str:
-    """Return the unit in which the velocities (N, n) are the slopes of the positions (N, n) in rad; empty if no unit
-    fits."""
+    """Return the unit in which velocities (N, n) are the slopes of positions (N, n) in rad; empty if none fits."""
     if len(time) < 3 or not np.all(np.diff(time) > 0):
         return ""
     slope = np.gradient(position, time, axis=0)

@@ -27,8 +27,7 @@ class Reading:
 
 
 def unchanged(options: LinearOptions, value: object) -> LinearOptions:
-    """Return the options of the linear fit unchanged. Tables of a log description that do not affect the options use
-    this function."""
+    """Return the options of the linear fit unchanged, for tables that do not affect them."""
     return options
 
 

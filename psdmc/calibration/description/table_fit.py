@@ -1,5 +1,4 @@
-"""The table `[fit]`: options of the linear fit, such as the filter's cut-off, the validation share and the friction
-terms."""
+"""The table `[fit]`: options of the linear fit, such as filter cut-off, validation share and friction terms."""
 
 from __future__ import annotations
 

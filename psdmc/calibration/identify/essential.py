@@ -96,8 +96,7 @@ class _Problem:
         return values, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def covariance(self, dropped: NDArray[np.bool_]) -> Array:
-        """Return the covariance (m, m) of the m parameters if the dropped ones are known exactly. Rows and columns of
-        dropped parameters are zero."""
+        """Return the covariance (m, m) if the dropped parameters are known exactly: their rows and columns are zero."""
         free = np.flatnonzero(~dropped)
         covariance = np.zeros_like(self.information)
         own = self.information[np.ix_(free, free)]

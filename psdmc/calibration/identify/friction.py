@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.identify.friction_fit import JointFriction, fit_joint, unknowns_of
-from psdmc.calibration.identify.friction_run import JointRun, prepared
+from psdmc.calibration.identify.friction_fit import JointFriction, JointRun, fit_joint, prepared, unknowns_of
 from psdmc.calibration.identify.residuals import CORRELATED, quality
 from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, Robot, StepOptions
 from psdmc.calibration.logs.log import Array
@@ -19,16 +18,14 @@ from psdmc.processes import in_processes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionResult:
-    """The identified friction by joint name, in the order of the robot's joints, and warnings. A joint without a
-    friction run has no entry."""
+    """The identified friction by joint name, in the robot's order, without joints that had no run; and warnings."""
 
     joints: dict[str, JointFriction]
     warnings: tuple[str, ...]
 
     @property
     def delay(self) -> float:
-        """Return the time in s by which the recorded position lags behind the recorded current: the median over the
-        joints."""
+        """Return the time in s by which the position lags behind the current: the median over the joints."""
         return float(np.median([joint.delay for joint in self.joints.values()])) if self.joints else 0.0
 
 
@@ -68,8 +65,7 @@ def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:
-    """Return how well each joint's identified friction predicts the motor torque of its friction run, after the gravity
-    torque is subtracted."""
+    """Return how well each joint's friction predicts its run's motor torque, after the gravity torque is subtracted."""
     qualities, samples = {}, []
     for name, data in runs.items():
         if name in joints:

@@ -13,18 +13,24 @@ Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, ine
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import optimize
 
-from psdmc.calibration.identify.friction_run import JointRun
+from psdmc.calibration.identify.predictor import gravity_regressor, payload_torque
 from psdmc.calibration.identify.residuals import sample_correlation, widening
-from psdmc.calibration.identify.state_friction import PARAMETERS
-from psdmc.calibration.identify.steps import FrictionOptions
+from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
+from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, Robot, StepOptions
+from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.low_pass import LowPass
+from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
+from psdmc.robot.mechanism import Mechanism
 
 DELAY = 9
 FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
@@ -72,8 +78,7 @@ class JointFriction:
 
 
 def unknowns_of(found: JointFriction) -> Array:
-    """Return the ten unknowns of the friction fit at its result: seven of LuGre friction, then inertia, offset and
-    delay."""
+    """Return the ten unknowns of the fit at its result: seven of LuGre friction, then inertia, offset and delay."""
     own = [found.inertia, found.offset, found.delay]
     return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 
@@ -81,8 +86,7 @@ def unknowns_of(found: JointFriction) -> Array:
 def fit_joint(
     name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
 ) -> JointFriction:
-    """Return the friction of one joint. The fit starts with the two steps of the paper, or from an earlier result, and
-    ends with the refinement."""
+    """Return the friction of one joint, from the paper's two steps or an earlier result, then the refinement."""
     if options.law == "coulomb_viscous":
         sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
         return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
@@ -95,8 +99,7 @@ def fit_joint(
 
 
 def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionOptions) -> Array:
-    """The start that leads to the smallest residual. A missed Stribeck peak, or a false one, is a local minimum as
-    well."""
+    """The start with the smallest residual. A missed or a false Stribeck peak is a local minimum as well."""
     top = float(np.abs(data.qd).max())
     starts = [first]
     for speed in PEAK_SPEEDS:
@@ -235,8 +238,7 @@ def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
 
 
 def step_sizes(p: Array) -> Array:
-    """Return, for each of the ten unknowns p, the size of a change that has a clear effect on the torque. The fit uses
-    these sizes as units."""
+    """Return for each of the ten unknowns p a change that clearly affects the torque, used as its unit."""
     viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
     return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
 
@@ -265,3 +267,96 @@ def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptio
     if no_peak and PARAMETERS[2] not in unseen and options.law == "lugre":
         unseen.append(PARAMETERS[2])
     return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))
+
+
+# The friction run of one joint
+
+
+MOST_KEPT = 12
+"""Friction torques of one run that are held: those of a Jacobian and of the point that it belongs to."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointRun:
+    """The recording of the friction run of one joint, filtered and with its gravity torque.
+
+    fit, out  samples that are fitted, and samples that are held out for validation
+    kept      the latest simulated friction torques, by the bytes of the seven unknowns with which they were simulated
+    """
+
+    time: Array
+    period: float
+    qd: Array
+    qdd: Array
+    gravity: Array
+    measured: Array
+    low_pass: LowPass
+    every: NDArray[np.intp]
+    fit: NDArray[np.intp]
+    out: NDArray[np.intp]
+    kept: dict[bytes, Array] = field(default_factory=dict, repr=False)
+
+    def rigid(self, inertia: float, offset: float, delay: float) -> Array:
+        return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
+
+    def torque(self, p: Array) -> Array:
+        """Return the predicted motor torque at all samples of the run, before the low-pass filter.
+
+        p  (10,) the unknowns in the order of friction_fit.UNKNOWNS
+        """
+        return self.delayed(self.friction(p) + self.gravity + p[7] * self.qdd + p[8], p[9])
+
+    def friction(self, p: Array) -> Array:
+        """Return the predicted friction torque at all samples of the run. It depends on the first seven of the unknowns
+        p only. The simulation is skipped if its result for equal values is stored."""
+        key = p[:7].tobytes()
+        if key not in self.kept:
+            if len(self.kept) >= MOST_KEPT:
+                self.kept.clear()
+            self.kept[key] = friction_torque(STATE_LAW.from_unknowns(p[:7]), self.qd, self.period)
+        return self.kept[key]
+
+    def delayed(self, torque: Array, delay: float) -> Array:
+        """Return a torque shifted in time: at time t the given torque at t + delay, by interpolation."""
+        return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
+
+    def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
+        return np.asarray((self.low_pass(self.torque(p)) - self.measured)[rows])
+
+
+def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, options: StepOptions) -> JointRun:
+    """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move."""
+    states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
+    _require_alone(run, robot.chain, k, states)
+    gravity = (gravity_regressor(robot.regressor, states.q) @ theta_gravity)[:, k]
+    if run.tool is not None:
+        gravity = gravity + payload_torque(robot.chain, states.q, run.tool.mass, run.tool.com)[:, k]
+    rows = thinned(states, options.filter)
+    out = held_out(len(rows), options.split)
+    return JointRun(
+        time=states.time,
+        period=states.period,
+        qd=states.qd[:, k],
+        qdd=states.qdd[:, k],
+        gravity=gravity,
+        measured=robot.motors.torque(states.effort)[:, k],
+        low_pass=states.low_pass,
+        every=rows,
+        fit=rows[~out],
+        out=rows[out],
+    )
+
+
+def _require_alone(run: FrictionRun, chain: Mechanism, k: int, states: States) -> None:
+    rms = np.sqrt(np.mean(states.qd**2, axis=0))
+    if rms[k] == 0:
+        raise InputError(
+            f"{run.log.name}: joint {run.joint} does not move, so the log does not show its friction",
+            "move that joint in its friction runs",
+        )
+    others = [name for j, name in enumerate(chain.joint_names) if j != k and rms[j] > 0.05 * rms[k]]
+    if others:
+        raise InputError(
+            f"{run.log.name}: joint(s) {', '.join(others)} move in the friction run of joint {run.joint}",
+            "friction needs one joint at a time: `psdmc excite` plans such runs",
+        )

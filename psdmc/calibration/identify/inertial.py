@@ -146,8 +146,7 @@ def _stacked(parts: Sequence[_Rows]) -> _Rows:
 def _rows(
     robot: Robot, friction: FrictionResult, run: InertialRun, options: StepOptions, sensitive: bool = True
 ) -> _Rows:
-    """One run's rows. `sensitive` adds noise columns and slopes of friction, which a fit needs and a prediction does
-    not."""
+    """One run's rows; `sensitive` adds noise columns and slopes of friction, which only a fit needs."""
     states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
     at = thinned(states, options.filter)
     late = Late(states, friction.delay, at)

@@ -1,5 +1,4 @@
-"""A known load on a robot: the joint torques that it causes along a log, and the joints on which its weight has no
-effect."""
+"""A known load on a robot: the torques that it causes along a log, and joints that it does not load."""
 
 from __future__ import annotations
 
@@ -49,8 +48,7 @@ class KnownLoad:
         return not np.any(self.inertia)
 
     def added_to(self, model: DynamicsModel) -> DynamicsModel:
-        """Return the model with this load attached. Raises InputError if no real body has these values, or if the
-        model has no such frame."""
+        """Return the model with this load. Raises InputError if no real body has it, or the model lacks the frame."""
         return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
 
     def parameters(self, chain: Mechanism) -> Array:

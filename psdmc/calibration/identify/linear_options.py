@@ -59,8 +59,7 @@ class LinearOptions:
         return every_joint_s(self.exponents, self.offset)
 
     def for_robot(self, chain: Mechanism) -> LinearOptions:
-        """Return the options with the springs and friction of one robot, which are made from `tables`. Raises
-        InputError if the tables are wrong."""
+        """Return the options with one robot's springs and friction, from `tables`. Raises InputError if they are wrong."""
         folder = Path(self.tables_from).parent
         columns = read_columns(self.tables, chain, self.tables_from, self.offset, folder)
         return replace(self, columns=columns, offset=self.offset and columns.plain_offsets)

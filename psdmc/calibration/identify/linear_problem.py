@@ -1,5 +1,4 @@
-"""The rows of a linear least-squares problem. The columns of base parameters, friction and springs are filtered as the
-measured torques are."""
+"""The rows of a linear least-squares problem. Columns of all unknowns are filtered as the torques are."""
 
 from __future__ import annotations
 
@@ -85,8 +84,7 @@ class LinearProblem:
 
 
 def names_of(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Return the names of all values of the given friction terms, in order, such as the Coulomb and the viscous
-    coefficient."""
+    """Return the names of all values of the friction terms, such as the Coulomb and the viscous coefficient."""
     return tuple(name for term in terms for name in term.names)
 
 
@@ -163,8 +161,7 @@ def _ripples(log: AnyLog, states: States, options: LinearOptions) -> list[str]:
 def _columns(
     model: Regressor, states: States, at: NDArray[np.intp], options: LinearOptions, carried: Array | None
 ) -> tuple[Array, Array]:
-    """(rows, n, l + n f + m) columns, filtered like the torque; and the change of them by another draw of the position
-    noise."""
+    """(rows, n, l + n f + m) columns, filtered like the torque, and their change by another draw of noise."""
     measured = (states.q, states.qd, states.qdd)
     jittered = states.jittered()
     plain = _filtered_columns(model, states, measured, at, options, carried)
@@ -182,8 +179,7 @@ def _filtered_columns(
     carried: Array | None,
 ) -> Array:
     def whole(rows: slice) -> Array:
-        """Return the torque columns of rigid bodies and of springs and further friction in one array, at some rows of
-        the log."""
+        """Return the torque columns of bodies, springs and further friction as one array, at some rows of the log."""
         q, qd, qdd = (part[rows] for part in motion)
         rigid = model.regressor(q, qd, qdd)
         if not len(options.columns):

@@ -31,8 +31,7 @@ class Block:
 
 
 class Rows(Protocol):
-    """The blocks of samples of a linear least-squares problem, in the order of the samples. They can be read
-    repeatedly."""
+    """The blocks of samples of a linear least-squares problem, in order. They can be read repeatedly."""
 
     def __iter__(self) -> Iterator[Block]: ...
 

@@ -73,8 +73,7 @@ class LoadFit:
         return self.problem.never_negative
 
     def predicted(self, values: Array) -> Array:
-        """Return the predicted torques (N samples, n joints) for a vector with the load's parameters and each joint's
-        friction and offset."""
+        """Return the predicted torques (N, n) for a vector of the load's parameters and each joint's friction and offset."""
         return np.concatenate([block.columns @ values for block in self.problem.rows]) + self.rigid
 
 

@@ -131,8 +131,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def _added(chain: Mechanism, k: int, run: MotorRun, options: StepOptions) -> tuple[Array, Array, Array]:
-    """Angle, load torque (N m) and current that the load adds (A), averaged over both directions so that friction
-    cancels."""
+    """Angle, load torque (N m) and the load's current (A), averaged over both directions: friction cancels."""
     unloaded, loaded = (_both_ways(chain, k, log, options.filter) for log in (run.unloaded, run.loaded))
     low = max(unloaded[0][0], loaded[0][0])
     high = min(unloaded[0][-1], loaded[0][-1])

@@ -72,8 +72,7 @@ class Motors:
         return Motors(np.ones(n), np.zeros(n))
 
     def torque(self, effort: Array) -> Array:
-        """Return the motor torque (..., n), N m: the logged effort (..., n) times the torque constant of each of n
-        joints."""
+        """Return the motor torque (..., n), N m: the logged effort (..., n) times each joint's torque constant."""
         return np.asarray(effort * self.torque_constant)
 
     @property

@@ -36,8 +36,7 @@ def quality(measured: Array, predicted: Array) -> Quality:
 
 
 def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
-    """Return R^2 and root mean square error of each joint's predicted torque, from measured and predicted torques (N,
-    n)."""
+    """Return R^2 and RMSE of each joint's predicted torque, from measured and predicted torques (N, n)."""
     return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))
 
 
@@ -152,8 +151,7 @@ class Sandwich:
 
 
 def squares(n: int, variance: float) -> Sandwich:
-    """Return the covariance factors of n joints for an ordinary least-squares fit, whose weighted residual has
-    `variance`."""
+    """Return the covariance factors of n joints for an ordinary fit, whose weighted residual has `variance`."""
     return Sandwich(np.ones(n), np.full(n, variance), variance)
 
 

@@ -66,8 +66,7 @@ def require_packed_file(file: Path) -> None:
 
 
 def require_packed_messages(file: Path) -> None:
-    """Raise InputError if messages that are compressed one by one unpack to more than is plausible for the size of the
-    file."""
+    """Raise InputError if messages compressed one by one unpack to more than the file's size makes plausible."""
     if file.suffix.lower() != ".db3":
         raise InputError(
             f"{file}: messages packed one by one in a file that is not SQLite's are not read",
@@ -116,8 +115,7 @@ def require_mcap_size(path: Path) -> None:
 
 
 def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> None:
-    """InputError where `claims`, the packed and unpacked sizes of chunks or of their index entries, exceed what the
-    file's size allows."""
+    """InputError where `claims` (packed and unpacked sizes of chunks) exceed what the file's size allows."""
     file_bytes = file.seek(0, 2)
     packed, unpacked = (sum(sizes) for sizes in zip(*claims, strict=True)) if claims else (0, 0)
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)

@@ -35,8 +35,7 @@ def is_folder(path: Path) -> bool:
 
 @contextmanager
 def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
-    """Return the file, open for reading bytes. Raises InputError if it is missing, unreadable, empty, no regular file
-    or larger than `largest`."""
+    """Return the file, open for bytes. Raises InputError if it is no readable file of 1 to `largest` bytes."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):

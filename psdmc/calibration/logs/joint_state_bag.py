@@ -32,8 +32,7 @@ PIECE_MESSAGES = 4096
 
 
 class BagFormat(LogFormat):
-    """The base class of bag formats. A subclass finds the topics with joint states and reads their serialised
-    messages."""
+    """The base class of bag formats. A subclass finds topics with joint states and reads their messages."""
 
     has_topics = True
     what: str
@@ -91,8 +90,7 @@ class BagFormat(LogFormat):
 
     @contextmanager
     def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
-        """Return the columns of joint states: time_s, then position.<joint>, velocity.<joint> if all joints have one,
-        and effort.<joint>."""
+        """Return the columns: time_s, then position.<joint>, velocity.<joint> if all have one, effort.<joint>."""
         log = self.read(path, opening.topic, opening.held)
         parts = ("position", "velocity", "effort") if log.has_velocity else ("position", "effort")
         names = ("time_s", *(f"{part}.{joint}" for part in parts for joint in log.joint_names))

@@ -95,8 +95,7 @@ class LogFormat(ABC):
 
 
 class TableFormat(LogFormat):
-    """A format of tables. `pieces` reads tables with psdmc's own column names; `write` writes such tables, if
-    possible."""
+    """A format of tables: `pieces` reads them with psdmc's own column names; `write`, if it can, writes them."""
 
     @contextmanager
     def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:

@@ -61,8 +61,7 @@ class LowPass:
         return LowPass(signal.butter(options.order, options.cutoff, fs=1.0 / period, output="sos"))
 
     def __call__(self, values: Array) -> Array:
-        """What scipy.signal.sosfiltfilt gives, whose states are found once a filter and not once a call: half its time
-        on the logs of one joint."""
+        """What scipy.signal.sosfiltfilt gives, but the start states are found once a filter, not once a call."""
         pad = min(len(values) - 1, 3 * (2 * len(self.sections) + 1) * 8)
         before, behind = 2 * values[:1] - values[pad:0:-1], 2 * values[-1:] - values[-2 : -pad - 2 : -1]
         there = self._one_way(np.concatenate([before, values, behind]))

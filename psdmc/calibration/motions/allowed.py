@@ -38,8 +38,7 @@ class Allowed:
     clearance: Clearance | FloorPoints | None = None
 
     def faults(self, motion: Trajectory, load: Load | None = None) -> list[str]:
-        """Return one sentence for each limit that the motion violates. Cheap checks come first; after a fault, later
-        checks are skipped."""
+        """Return a sentence for each limit that the motion violates. After a fault, costlier checks are skipped."""
         found = limit_faults(motion, self.chain)
         if not found and self.torques is not None:
             taken = slice(None, None, max(1, round(LOOKED_AT / motion.period)))
@@ -178,8 +177,7 @@ class TorqueLimits:
         return tau if load is None else tau + payload_torque(self.chain, q, load.mass, load.com)
 
     def of(self, regressor: Array, qd: Array) -> Array:
-        """Return the joint torques (..., n), friction included, from the regressor (..., n, l) and the joint speeds
-        (..., n)."""
+        """Return joint torques (..., n) with friction, from the regressor (..., n, l) and the speeds (..., n)."""
         tau = np.asarray(regressor @ self.theta_b)
         return tau if self.friction is None else tau + self.friction(qd)
 
@@ -200,8 +198,7 @@ class TorqueLimits:
         return float(np.sum(beyond**2)) / len(tau), by_torque[..., None] * self.theta_b, by_speed
 
     def faults(self, tau: Array, share: float) -> list[str]:
-        """Return one sentence for each joint whose largest torque in `tau` (N, n) is above `share` of the joint's
-        limit."""
+        """Return a sentence for each joint whose largest torque in `tau` (N, n) is above `share` of its limit."""
         reach = np.abs(tau).max(axis=0)
         return [
             f"{joint.name}: torque {value:.4g} beyond {share:.0%} of {limit:g}"

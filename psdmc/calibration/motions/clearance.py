@@ -96,8 +96,7 @@ class FloorPoints:
     above: tuple[int, ...] = ()
 
     def first_touch(self, q: Array, step: float = LARGEST_STEP) -> str | None:
-        """Return a sentence on the first point that comes too close to the floor along a path of poses (N, n); None if
-        there is none."""
+        """Return a sentence on the first point too close to the floor along poses (N, n); None if there is none."""
         poses = np.array(list(spread(q, step)))
         heights = self._heights(poses)[:, list(self.above)]
         low = np.argwhere(heights < self.height + APART)
@@ -140,8 +139,7 @@ def touch(pair: tuple[str, str], pose: Array) -> str:
 
 
 def spread(q: Array, step: float) -> Iterator[Array]:
-    """Yield poses of a path (N, n) between which no joint moves by more than a step, including the poses where the
-    motion turns."""
+    """Yield poses of a path (N, n), at most a step of any joint apart, with those where the motion turns."""
     if not len(q):
         return
     moved = np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0)

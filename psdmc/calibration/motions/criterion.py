@@ -191,8 +191,7 @@ class FitColumns:
 
 
 def all_columns(model: Regressor, l: int, options: LinearOptions) -> FitColumns:
-    """Return the columns of the linear fit of a log, for states that are not filtered: base parameters, friction and
-    offsets."""
+    """Return the columns of a log's linear fit, for unfiltered states: base parameters, friction and offsets."""
 
     def terms(qd: Array) -> Array:
         return np.stack(friction_columns(options.terms, qd, options.sign_speed), axis=-1)

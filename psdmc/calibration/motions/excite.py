@@ -258,7 +258,6 @@ def motor_poses(
 
 
 def unfelt(chain: Mechanism, load: Load, effect: Array) -> tuple[int, ...]:
-    """Return the joints on which the load does not act in any pose: their axes are along gravity, or go through the
-    load."""
+    """Return the joints on which the load never acts: their axes are along gravity, or go through the load."""
     weight = load.mass * float(np.linalg.norm(chain.gravity))
     return tuple(int(k) for k in np.flatnonzero(effect.max(axis=0) <= UNFELT * weight))

@@ -1,5 +1,4 @@
-"""Options of the search for an exciting motion. They are in a separate module so that the command line need not import
-the search."""
+"""Options of the search for an exciting motion, apart so that the command line need not import the search."""
 
 from __future__ import annotations
 

@@ -77,8 +77,7 @@ class LimitedSines:
         return found
 
     def filled(self, point: Array, share: float) -> Array:
-        """Return the coordinates of a motion with the used share of every joint's limits reduced to `share`, if it was
-        larger."""
+        """Return a motion's coordinates with the used share of every joint's limits at most `share`."""
         found = point.copy().reshape(self.n, -1)
         found[:, -2] = np.minimum(found[:, -2], np.log(share / (1.0 - share)))
         return found.ravel()

@@ -71,8 +71,7 @@ def swept_range(joint: Joint, share: float) -> tuple[float, float]:
 
 
 def sweep_speed(joint: Joint, share: float) -> float:
-    """Return a share of the joint's speed limit, rad/s or m/s. For a joint without a limit, 2 rad/s or m/s takes its
-    place."""
+    """Return a share of the joint's speed limit, rad/s or m/s; without a limit, of 2 rad/s or m/s."""
     return share * (joint.limits.speed if np.isfinite(joint.limits.speed) else 2.0)
 
 

@@ -63,8 +63,7 @@ def _column(part: int, name: str, sliding: Sequence[str]) -> str:
 
 
 def read_trajectory(path: str | Path) -> Trajectory:
-    """Return a trajectory from its file. Raises InputError if a column is missing, a value is not finite or time steps
-    differ."""
+    """Return a trajectory from its file. Raises InputError for a missing column, a non-finite value or uneven times."""
     path = Path(path)
     columns = read_columns(path)
     names, sliding = _named(tuple(columns))
@@ -94,8 +93,7 @@ def read_trajectory(path: str | Path) -> Trajectory:
 
 
 def trajectory_joints(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the joints in the file of a trajectory, and of those that slide, without reading the whole
-    file."""
+    """Return the names of the joints in a trajectory's file, and of those that slide, from its head alone."""
     return _named(column_names(Path(path)))
 
 

@@ -96,8 +96,7 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Harness:
-    """A cable harness, an effect that no model in psdmc has: a spring that saturates at `torque` (N m) beyond about
-    `angle` (rad)."""
+    """A cable harness, which no model in psdmc has: a spring that saturates at `torque` (N m) beyond `angle` (rad)."""
 
     joints: tuple[str, ...]
     torque: float
@@ -287,8 +286,7 @@ def _harness(value: object, names: Sequence[str], faults: list[str]) -> Harness:
 
 
 def read_plant_urdf(path: Path, names: Sequence[str], tip: str | None) -> PlantUrdf:
-    """Return the URDF of a virtual robot. Raises InputError if the file is no URDF, or lacks the plant's joints or the
-    tip."""
+    """Return a virtual robot's URDF. Raises InputError if it is none, or lacks the plant's joints or the tip."""
     data = _bytes_of(path, LARGEST_URDF)
     with decoding(str(path), "a robot (.toml or .urdf)"):
         text = data.decode("utf-8-sig")
@@ -308,8 +306,7 @@ def read_plant_urdf(path: Path, names: Sequence[str], tip: str | None) -> PlantU
 
 
 def read_plant_robot(path: Path) -> PlantRobot:
-    """Return the DH table of a virtual robot. Raises InputError if the file is no such table, or if a value is
-    unknown."""
+    """Return a virtual robot's DH table. Raises InputError if it is none, or a value is unknown."""
     data = _bytes_of(path)
     content = toml_content(data, str(path), "a robot as a DH table (.toml)")
     with decoding(str(path), "a DH table"):

@@ -14,8 +14,7 @@ ALL = (*MOVED, "effort")
 
 
 def scaled(log: Log, factor: float | Sequence[float]) -> Log:
-    """Return the log with efforts multiplied by one factor, or one per joint. This imitates a wrong unit, or currents
-    instead of torques."""
+    """Return the log with efforts times one factor, or one per joint, as in a wrong unit or currents."""
     return replace(log, effort=log.effort * np.asarray(factor, dtype=np.float64))
 
 

@@ -52,8 +52,7 @@ class Payload:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VirtualRobot:
-    """A simulated robot: Pinocchio's model, motors and friction of the joints, sensors, and optionally a cable
-    harness."""
+    """A simulated robot: Pinocchio's model, motors, friction, sensors, and optionally a cable harness."""
 
     name: str
     model: Any
@@ -143,8 +142,7 @@ def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:
 def simulate(
     robot: VirtualRobot, trajectory: Trajectory, *, payload: Payload | None = None, seed: int = 0
 ) -> Log:
-    """Return the log of the robot's sensors while it runs a trajectory from rest. The log has one row for each row (time
-    step) of the trajectory."""
+    """Return the log of the robot's sensors while it runs a trajectory from rest: a row per time step."""
     shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
     rigid = _rigid_torque(_loaded(robot, payload), *shifted)
     tau = rigid + _friction(robot, trajectory, shifted[0], shifted[1], rigid)

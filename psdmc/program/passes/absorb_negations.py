@@ -91,8 +91,7 @@ def _into_producers(program: Program) -> Program:
 
 
 def _negate(body: list[Instr], uses: Sequence[int], index: int) -> bool:
-    """Change the sign of a value in place where that costs nothing and no other instruction uses it. Returns whether it
-    was done."""
+    """Change a value's sign in place if that costs nothing and no other instruction uses it; say if so."""
     instr = body[index]
     if uses[index] != 1:
         return False

@@ -100,8 +100,7 @@ def _parts_of_larger_sums(program: Program, uses: Sequence[int]) -> list[bool]:
 
 
 def _signed_factors(body: tuple[Instr, ...], uses: Sequence[int], index: int) -> list[tuple[int, list[int]]]:
-    """Sign and factors of each term of a chain of sums, left to right. Written with a stack, since chains can be
-    thousands long."""
+    """Sign and factors of each term of a chain of sums, left to right, by a stack: chains can be long."""
     terms: list[tuple[int, list[int]]] = []
     stack = [(index, 1)]
     while stack:
@@ -193,8 +192,7 @@ class _Builder:
         return len(self.body) - 1
 
     def total(self, terms: tuple[_Term, ...]) -> int:
-        """Add instructions that compute the sum of some terms, and return the index of the sum's value. The first term
-        must have a plus sign."""
+        """Add instructions for the sum of some terms, the first with a plus sign; return the sum's index."""
         value = self._product(terms[0])
         for term in terms[1:]:
             op = Op.ADD if term.sign > 0 else Op.SUB

@@ -20,8 +20,7 @@ Term = tuple[bool, int]
 
 
 def cycles(latency: Latency) -> dict[Op, int]:
-    """Return for each kind of operation (sum, product, sine ...) the number of processor cycles until its result is
-    ready."""
+    """Return for each operation (sum, product, sine ...) the processor cycles until its result is ready."""
     return {op: 0 if op.unit is Unit.NONE else getattr(latency, op.unit) for op in Op}
 
 

@@ -136,8 +136,7 @@ class JointType:
         return (*q[: part.start], *unit(q[part]), *q[part.stop :]) if part.stop else tuple(q)
 
     def normalized(self, q: Array) -> Array:
-        """Return coordinates (nq, ...) in which quaternions, and pairs of cosine and sine, have length one. The result
-        has the precision of q."""
+        """Return coordinates (nq, ...) with quaternions and pairs of length one, in the precision of q."""
         return np.stack(self.restored(list(q)))
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -146,8 +145,7 @@ class JointType:
         return tuple(here + way for here, way in zip(q, step, strict=True))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """Return the nv constant rates that bring a joint from q to `other` in one second. A rotation is at most half a
-        turn."""
+        """Return the nv constant rates from q to `other` in one second, with a rotation of at most half a turn."""
         return tuple(there - here for here, there in zip(q, other, strict=True))
 
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -185,8 +183,7 @@ class JointType:
 
     @property
     def v_orders(self) -> tuple[int, ...]:
-        """Return the exponent of the metre in the unit of each rate: 0 for an angular velocity, 1 for a linear
-        velocity."""
+        """Return the exponent of the metre in each rate's unit: 0 for an angular, 1 for a linear velocity."""
         return tuple(0 if any(angular) else 1 for _, angular in self.twists)
 
     @property
@@ -206,8 +203,7 @@ class JointType:
 
     @property
     def drive_order(self) -> int:
-        """Return the exponent of the metre in the unit of the joint's drive inertia, which is effort per
-        acceleration."""
+        """Return the exponent of the metre in the unit of the drive inertia, effort per acceleration."""
         return self.effort_order - self.length_order
 
     def __eq__(self, other: object) -> bool:

@@ -78,8 +78,7 @@ def arc(square: Scalar, cosine: Scalar) -> Scalar:
 
 
 def rates_of(quaternion: Sequence[Scalar], angular: Sequence[Scalar]) -> Quaternion:
-    """Return the time derivative of a quaternion whose frame turns at an angular velocity, given along the axes of the
-    rotated frame."""
+    """Return the derivative of a quaternion at an angular velocity along the axes of the rotated frame."""
     x, y, z = (0.5 * rate for rate in angular)
     return product(quaternion, (x, y, z, 0.0))
 

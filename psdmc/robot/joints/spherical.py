@@ -19,8 +19,7 @@ from psdmc.robot.joints.scalars import unit
 
 
 class Spherical(WideJoint):
-    """The spherical joint. q is a unit quaternion (x, y, z, w); rates are the angular velocity along the moved frame's
-    axes, rad/s."""
+    """The spherical joint: q is a unit quaternion (x, y, z, w), rates are about the moved frame's axes, rad/s."""
 
     __slots__ = ()
 

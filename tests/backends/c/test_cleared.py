@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from psdmc.backends.c.body import make_body
-from psdmc.backends.c.cleared import LEAST, cleared, without_zeros
+from psdmc.backends.c.body import LEAST, cleared, make_body, without_zeros
 from psdmc.backends.c.lines import Cleared
 from psdmc.program.program import Instr, Op, Program, Slot
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from jinja2 import DictLoader, Environment
 
-from psdmc.backends import kept_templates
+from psdmc.backends import render as kept_templates
 from psdmc.backends.c.render import environment
-from psdmc.backends.kept_templates import CodeBesideTemplates
+from psdmc.backends.render import CodeBesideTemplates
 
 NAME = "rates.h.jinja"
 SOURCE = "{% for x in rates %}\n{{ x }};\n{% endfor %}"

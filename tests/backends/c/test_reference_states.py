@@ -11,7 +11,7 @@ from bundled import bundled_model, bundled_robot
 from psdmc.backends.reference_states import COUNT, LOAD, ReferenceStates, reference_states
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.random_parameters import random_parameters
+from psdmc.model.random_states import random_parameters
 from psdmc.robot.reference import Reference, reference
 
 ROBOTS = ("two_link", "scara", "kr6")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.calibration.identify import friction_run
-from psdmc.calibration.identify.friction_run import MOST_KEPT, JointRun
+from psdmc.calibration.identify import friction_fit
+from psdmc.calibration.identify.friction_fit import MOST_KEPT, JointRun
 from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
 from psdmc.friction.state import STATE_LAW
@@ -35,7 +35,7 @@ def test_friction_is_simulated_once_for_equal_parameters(run: JointRun, monkeypa
         simulated.append(given)
         return friction_torque(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(friction_run, "friction_torque", counted)
+    monkeypatch.setattr(friction_fit, "friction_torque", counted)
 
     first, second = run.torque(unknowns()), run.torque(unknowns(inertia=0.8, offset=-0.3))
     assert len(simulated) == 1

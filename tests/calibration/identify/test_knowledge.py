@@ -12,11 +12,10 @@ from bundled import bundled_model
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.estimate import FitOptions, Prior
-from psdmc.calibration.identify.knowledge import knowledge_of
+from psdmc.calibration.identify.knowledge import Confidence, knowledge_of, theta_covariance, with_prior
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.identify.stated_prior import Confidence, theta_covariance, with_prior
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.record import Calibration

@@ -11,8 +11,7 @@ from calibration.conftest import smooth_log
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.logs.even_grid import even_grid
-from psdmc.calibration.logs.filter import filtered, independent_rows, stretches
+from psdmc.calibration.logs.filter import even_grid, filtered, independent_rows, stretches
 from psdmc.calibration.logs.formats import npz, parquet, text
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from arms import LENGTH, pinocchio_of, urdf
 
-from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
+from psdmc.calibration.campaign_plan import CampaignOptions, allowed_of, plan_campaign
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.allowed import GivenLimits, bounded
@@ -19,7 +19,6 @@ from psdmc.calibration.motions.criterion import all_columns, scaled
 from psdmc.calibration.motions.excite import excite
 from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.limited_sines import LimitedSines
-from psdmc.calibration.motions.looked_at import allowed_of
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.compiler import derive
 from psdmc.errors import InputError

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from arms import urdf
 
+from psdmc.calibration.campaign_plan import allowed_of
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions import search
@@ -16,7 +17,6 @@ from psdmc.calibration.motions.allowed import GivenLimits, bounded
 from psdmc.calibration.motions.criterion import all_columns
 from psdmc.calibration.motions.excite import excite
 from psdmc.calibration.motions.excite_options import ExciteOptions
-from psdmc.calibration.motions.looked_at import allowed_of
 from psdmc.calibration.motions.search import walked
 from psdmc.compiler import derive
 

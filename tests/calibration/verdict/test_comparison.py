@@ -14,8 +14,7 @@ from worn_arm import VISCOUS, Worn, recorded
 
 import psdmc
 from psdmc.calibration.compared import Comparison
-from psdmc.calibration.comparison import compare
-from psdmc.calibration.torque_differences import STATES, _states
+from psdmc.calibration.comparison import STATES, _states, compare
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot
 from psdmc.robot.reference import reference

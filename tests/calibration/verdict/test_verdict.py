@@ -96,7 +96,7 @@ def test_a_fit_that_no_body_is_near_is_not_usable_and_says_so(arm, plant_log, mo
     def fails(*_: object) -> None:
         raise NotPhysical("clarabel failed")
 
-    monkeypatch.setattr(sys.modules["psdmc.calibration.fitted_logs"], "nearest_physical", fails)
+    monkeypatch.setattr(sys.modules["psdmc.calibration.calibrate"], "nearest_physical", fails)
 
     found = verdict_on(arm, plant_log)
 

@@ -297,8 +297,7 @@ class _Patterns:
         self._names: dict[tuple[int, ...], str] = {}
 
     def of(self, shape: Sequence[int], zero: Iterable[int] = ()) -> str:
-        """Return the C name of the sparsity pattern of an array that is stored row by row. `zero` are the indices of
-        entries that are always zero."""
+        """Return the C name of the sparsity pattern of an array stored by rows; `zero` are the indices of zero entries."""
         return self._named(_numbers(shape, frozenset(zero)))
 
     def unread(self, shape: Sequence[int]) -> str:

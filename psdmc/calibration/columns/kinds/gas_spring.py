@@ -1,13 +1,10 @@
-"""A gas spring between two points of two links. Its nearly constant force pushes the points apart, and grows as the
-spring becomes shorter."""
+"""A gas spring between points of two links: its nearly constant force pushes, and grows as it shortens."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from psdmc.calibration.columns.effect import Effect, Kind, Unknown
-from psdmc.calibration.columns.flags import flag
-from psdmc.calibration.columns.spring import Spring, push, rub, stretch
+from psdmc.calibration.columns.effect import Effect, Kind, Spring, Unknown, flag, push, rub, stretch
 from psdmc.calibration.columns.ways import anchored_way
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism

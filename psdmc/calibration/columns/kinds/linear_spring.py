@@ -1,13 +1,10 @@
-"""A spring whose tension grows with its length. The length is the distance between two points of two links, or a sum of
-joint positions."""
+"""A spring whose tension grows with a length: the distance of two points, or a sum of joint positions."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from psdmc.calibration.columns.effect import Effect, Kind, Unknown
-from psdmc.calibration.columns.flags import flag
-from psdmc.calibration.columns.spring import Spring, pull, rub, stretch
+from psdmc.calibration.columns.effect import Effect, Kind, Spring, Unknown, flag, pull, rub, stretch
 from psdmc.calibration.columns.ways import anchored_way, jointed_way
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism

@@ -100,8 +100,7 @@ def _array(content: bytes) -> Any:
 
 
 def _head(stream: IO[bytes], size: int) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape and type of a member's array; ValueError if its header claims more numbers than follow, for which NumPy
-    would allocate memory."""
+    """Shape and type of a member's array; ValueError if its header claims more numbers than follow."""
     is_first = np.lib.format.read_magic(stream) == (1, 0)
     read = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(stream)

@@ -105,8 +105,7 @@ def _for_rosbags(path: Path) -> Path:
 
 
 def _packs_messages(folder: Path) -> bool:
-    """Whether a bag's metadata may say that its messages are compressed one by one. True in doubt, as YAML has many
-    ways to write a word."""
+    """Whether a bag's metadata may say that messages are compressed one by one. True in doubt: YAML has many ways."""
     try:
         with (folder / METADATA).open("rb") as file:
             text = file.read(LARGEST_METADATA).decode("utf-8", "replace").lower()

@@ -89,8 +89,7 @@ def _with_line_ends(file: BinaryIO, name: str) -> BinaryIO:
 
 
 class CsvReader:
-    """Reads a CSV file in pieces: its header, then complete lines in order. Errors state the number of the line in the
-    file."""
+    """Reads a CSV file in pieces: its header, then complete lines. Errors state the number of the line."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -159,8 +158,7 @@ def plain_text(data: bytes, name: str, before: int = 0) -> str:
 
 
 def _separator(header: str) -> str:
-    """The separator that leaves a column of time; else the one that leaves most columns, spaces only where no other mark
-    separates any."""
+    """The separator that leaves a column of time; else the one with most columns, spaces only as the last."""
     counts: dict[str, int] = {}
     for separator in SEPARATORS:
         try:
@@ -397,8 +395,7 @@ def _is_date(text: str) -> bool:
 
 
 def seconds_of(text: str) -> float:
-    """Return the seconds since 1970 of a date in ISO 8601 format, UTC if it has no time zone. Raises ValueError for
-    other text."""
+    """Return the seconds since 1970 of an ISO 8601 date, UTC without a time zone. Raises ValueError for other text."""
     date = datetime.fromisoformat(text.strip().strip('"'))
     return (date if date.tzinfo is not None else date.replace(tzinfo=UTC)).timestamp()
 
