@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize planted-faults
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +58,9 @@ test-processes: $(READY) ## kill every command 50 times at random moments, and c
 
 test-demo: $(READY) ## run the complete calibration campaigns of the virtual Denso; make test tries an arm of two joints
 	PSDMC_DEMO=whole $(RUN)/python -m pytest -n $(JOBS) -q tests/calibration/test_demo.py tests/calibration/identify/test_coverage.py
+
+planted-faults: $(READY) ## plant faults in good logs and print what calibrate says, as in docs/verdict.md; UR10=LOG.csv adds a real robot
+	$(RUN)/python docs/planted_faults.py $(UR10)
 
 test-accuracy: $(READY) ## measure the accuracy of the compiled C for every robot, function and sine; make test takes some
 	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py tests/end_to_end/test_random_chains.py tests/functions tests/trig/test_accuracy.py \

@@ -101,8 +101,9 @@ def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[
             "[[joint]]",
             f'name = "{name}"',
             f"torque_constant = {constant}",
-            f"drive_inertia = {0.1 * rub}",
         ]
+        if urdf.suffix == ".urdf":  # a DH table states its own
+            lines.append(f"drive_inertia = {0.1 * rub}")
         lines += [
             f"coulomb = {rub}",
             f"static = {1.3 * rub}",
@@ -116,12 +117,11 @@ def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[
         return model, load_virtual_robot(plant)
 
 
-def timing(ur10: Path | None) -> Iterator[tuple[str, Calibration | str]]:
-    """Good logs of several seeds, rates and noises, and of each robot one clipped and one late."""
-    sources: list[tuple[str, DynamicsModel, Log]] = []
+def good_logs(ur10: Path | None) -> Iterator[tuple[str, DynamicsModel, Log]]:
+    """Twenty good logs of four virtual robots, with several seeds, rates and noises, and a real UR10's."""
     for seed, rate in enumerate((125.0, 200.0, 250.0, 500.0, 1000.0)):
         model, log, _ = denso_log(25.0, rate, seed)
-        sources.append((f"virtual Denso, {rate:g} Hz", model, log))
+        yield f"virtual Denso, {rate:g} Hz", model, log
     for urdf, constants in PLANTS.items():
         for seed, (rate, noise) in enumerate(
             ((125.0, 1e-3), (125.0, 1e-2), (200.0, 3e-3), (250.0, 3e-2), (500.0, 1e-3))
@@ -129,11 +129,15 @@ def timing(ur10: Path | None) -> Iterator[tuple[str, Calibration | str]]:
             model, robot = urdf_plant(example_urdf(urdf), constants, noise)
             log = simulate(robot, sines(model, 25.0, rate, seed), seed=seed)
             log = replace(log, effort=log.effort * np.array(constants), quantity="motor_torque")
-            sources.append((f"virtual {urdf.partition('.')[0]}, {rate:g} Hz, noise {noise:.1%}", model, log))
+            yield f"virtual {urdf.partition('.')[0]}, {rate:g} Hz, noise {noise:.1%}", model, log
     if ur10 is not None:
         model = derive(example_urdf("ur10_robot.urdf"), drive_inertia=True, expand=False)
-        sources.append(("real UR10", model, read_log(ur10).ordered(model.joint_names)))
-    for what, model, log in sources:
+        yield "real UR10", model, read_log(ur10).ordered(model.joint_names)
+
+
+def timing(ur10: Path | None) -> Iterator[tuple[str, Calibration | str]]:
+    """Good logs, and each of them clipped and late."""
+    for what, model, log in good_logs(ur10):
         for how, made in (
             ("", log),
             (", clipped at 40 %", clipped(log, 0.4)),

@@ -197,6 +197,33 @@ def _lacking(values: Values) -> str:
     )
 
 
+ERRORS = {
+    "zero": "the position of {joint} is logged {size} too {side} (`offset` of [position])",
+    "ratio": "the reduction ratio of {joint} is wrong: its position is logged {size} too {side}, its effort {size} too "
+    "{other} (`gear_ratio`)",
+    "position": "the position of {joint} is logged {size} too {side} (`scale` of [position])",
+    "torque": "the effort of {joint} is logged {size} too {side} (`scale` of [effort])",
+    "tilt": "the base leans by {size} from the gravity of the robot file (`gravity`)",
+}
+"""Sentences of errors of a log by kind, with the key that corrects each."""
+
+
+def _one_error(item: Values) -> str:
+    value, std, unit = abs(item["value"]), item["std"], item["unit"]
+    size = f"{100 * value:.3g} +- {100 * std:.1g} %" if unit == "1" else f"{value:.2g} +- {std:.1g} {unit}"
+    side, other = ("large", "small") if item["value"] > 0 else ("small", "large")
+    return ERRORS[item["kind"]].format(joint=item["joint"], size=size, side=side, other=other)
+
+
+def _log_error(values: Values) -> str:
+    items = values["items"]
+    return (
+        f"the log fits better if {', or '.join(_one_error(item) for item in items)}; that explains "
+        f"{items[0]['explains']:.0%} of what the fit leaves at joint {items[0]['felt']}: check, and correct it in a log "
+        "description or in the robot file"
+    )
+
+
 def _odd_log(values: Values) -> str:
     return (
         "{log} contradicts the other logs: they predict its torque at joint {joint} with RMSE {rmse:.3g} {unit}, its own "
@@ -241,6 +268,11 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
         "until it is warm before you record, or leave out the first part by --warm SECONDS"
     ),
     "late": _late,
+    "log_error": _log_error,
+    "unstated_load": lambda v: (
+        f"the robot seems to carry a load of {v['mass']:.3g} +- {v['std']:.1g} kg at its tip that the file does not state: "
+        f"the load explains {v['explains']:.0%} of the difference from the file; the calibrated values contain the load"
+    ),
     "not_physical": lambda v: f"no mass distribution of a real robot is near the fit ({v['why']})",
     "starved": lambda v: (
         f"{_by_step(v)}: {v['samples'] / v['unknowns']:.1f} each, at least {v['limit']:g} are needed"

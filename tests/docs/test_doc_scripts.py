@@ -15,7 +15,7 @@ import psdmc
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-SCRIPTS = ["verdicts.py", "long_log.py", "excitation.py"]
+SCRIPTS = ["verdicts.py", "planted_faults.py", "long_log.py", "excitation.py"]
 
 
 @pytest.mark.parametrize("script", slow_but_for(SCRIPTS[:1], SCRIPTS))

@@ -44,6 +44,8 @@ class CheckOptions:
     smallest_motion    rad or m, peak to peak; a joint with less motion is at rest
     longest            s, longest log that is accepted
     fastest            Hz, largest plausible sampling rate
+    jump               smallest rate of a jump of the position, in units of the joint's speed; a log with one is rejected
+    interpolated       share of rows that lie on straight lines from which the log gets a remark
     """
 
     largest_gap: float = 10.0
@@ -58,6 +60,8 @@ class CheckOptions:
     smallest_motion: float = 1e-5
     longest: float = 86_400.0
     fastest: float = 1e6
+    jump: float = 5.0
+    interpolated: float = 0.01
 
 
 class Fault(NamedTuple):
@@ -248,6 +252,22 @@ def _rates(of: Looked) -> Iterator[Fault]:
         )
 
 
+def _jumping(of: Looked) -> Iterator[Fault]:
+    """Faults of positions that jump: an encoder that stood still or lost counts, or rows that are missing without a gap
+    in time."""
+    joints = zip(of.chain.leading_joints, of.survey.jumps, of.survey.speed.tolist(), strict=True)
+    for joint, jump, speed in joints:
+        if jump is None:
+            continue
+        allowed = _allowed(joint.limits.speed, of.options.free_speed, of.options)
+        if abs(jump.rate) > max(of.options.jump * speed, allowed):
+            yield Fault(
+                f"joint {joint.name}: position jumps by {jump.size:.3g} {joint.type.position_unit} after "
+                f"{jump.time:.6g} s, {abs(jump.rate) / max(speed, 1e-12):.3g} times as fast as it moves otherwise",
+                "an encoder stood still, or rows are missing: give the stretches before and after as logs of their own",
+            )
+
+
 def _nothing_there(of: Looked) -> Iterator[Fault]:
     if np.all(of.survey.motion < of.options.smallest_motion):
         yield Fault("no joint moves", "give a log of a motion; `psdmc excite` plans one")
@@ -280,6 +300,16 @@ def _still(of: Looked) -> Iterator[str]:
         yield Remark(f"joint(s) {listed(still)} stand still", "standing")
 
 
+def _interpolated(of: Looked) -> Iterator[str]:
+    share = of.survey.straight
+    if share > of.options.interpolated:
+        yield Remark(
+            f"{share:.0%} of the rows look interpolated: all positions and efforts lie on straight lines there, so "
+            "accelerations are missing; leave these rows out",
+            "interpolated",
+        )
+
+
 def _dead_effort(of: Looked) -> Iterator[str]:
     efforts = zip(of.log.joint_names, of.survey.largest_effort, strict=True)
     if dead := [name for name, effort in efforts if not effort > 0]:
@@ -289,8 +319,14 @@ def _dead_effort(of: Looked) -> Iterator[str]:
 _FAULTS: tuple[tuple[Callable[[Looked], Iterator[Fault]], ...], ...] = (
     (_no_numbers, _units),
     (_times,),
-    (_positions, _speeds, _rates, _nothing_there),
+    (_positions, _speeds, _rates, _jumping, _nothing_there),
 )
 """In stages: the checks of a stage make sense only where earlier stages found no fault."""
 
-_REMARKS: tuple[Callable[[Looked], Iterator[str]], ...] = (_jitter, _saturation, _still, _dead_effort)
+_REMARKS: tuple[Callable[[Looked], Iterator[str]], ...] = (
+    _jitter,
+    _saturation,
+    _still,
+    _dead_effort,
+    _interpolated,
+)

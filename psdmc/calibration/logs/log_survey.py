@@ -37,6 +37,20 @@ class NoNumber:
     value: float
 
 
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """A position that changes from one row to the next far more than before and after, rad or m.
+
+    time  s, of the row before the jump
+    size  change of the position
+    rate  change divided by the time between the rows, or by the log's period if that is longer
+    """
+
+    time: float
+    size: float
+    rate: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
     """Statistics of a log with n joints, over all rows.
@@ -50,6 +64,8 @@ class Survey:
     slope_velocity  (n,) sum of logged velocity times rate of change of the position; None if the log has no velocity
     largest_effort  (n,) largest absolute effort
     saturated       efforts that stay at an extreme value while the joint moves
+    jumps           the largest jump of each joint's position; None if there is none
+    straight        share of rows in which all positions and efforts lie on straight lines, as interpolated values do
     """
 
     no_numbers: tuple[NoNumber, ...]
@@ -60,6 +76,8 @@ class Survey:
     slope_velocity: Array | None
     largest_effort: Array
     saturated: tuple[Saturated, ...]
+    jumps: tuple[Jump | None, ...]
+    straight: float
 
     @property
     def velocity_ratios(self) -> dict[int, float]:
@@ -88,6 +106,8 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
     low, high, reach = np.full(n, np.inf), np.full(n, -np.inf), np.zeros(n)
     power, by_velocity, has_velocity = np.zeros(n), np.zeros(n), False
     largest = np.zeros(n)
+    jumps: list[Jump | None] = [None] * n
+    straight = 0
     every = -(-len(log) // MOST_SLOPES)
     slopes: list[Array] = []
     efforts: list[Array] = []
@@ -109,6 +129,8 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
             efforts.append(part.effort[1:-1][(-first) % every :: every])
             own = part.rows(start - max(start - 1, 0), start - max(start - 1, 0) + STRETCH_ROWS)
             _note_no_numbers(bad, own, start)
+            jumps = [_larger(*both) for both in zip(jumps, _jumps(part, log.period), strict=True)]
+            straight += _straight_rows(own)
             largest = np.maximum(largest, np.abs(own.effort).max(axis=0))
         ranked = np.concatenate(slopes)
         speed = np.quantile(np.abs(ranked), FAST_SHARE, axis=0) if len(ranked) else np.zeros(n)
@@ -125,6 +147,8 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
             else saturated(
                 log.joint_names, np.concatenate(efforts), ranked, np.asarray(speed), saturated_share
             ),
+            tuple(jumps),
+            straight / len(log),
         )
 
 
@@ -132,6 +156,53 @@ def position_slope(log: Log) -> Array:
     """Return central differences (N - 2, n) of the position over two periods. They are too coarse for dynamics but
     sufficient to distinguish units."""
     return np.asarray((log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None])
+
+
+ALONE = 10.0
+"""Ratio of a jump to the changes before and after it: a fast motion, or a single wrong sample, has similar neighbours."""
+
+
+def _jumps(part: Log, period: float) -> list[Jump | None]:
+    """The largest isolated change of each joint's position."""
+    found: list[Jump | None] = [None] * len(part.joint_names)
+    if len(part) < 4:
+        return found
+    steps = np.diff(part.position, axis=0)
+    size = np.abs(steps)
+    is_alone = size[1:-1] > ALONE * np.maximum(size[:-2], size[2:])
+    lasts = np.maximum(np.diff(part.time), period)
+    for k in np.flatnonzero(is_alone.any(axis=0)).tolist():
+        row = 1 + int(np.argmax(np.where(is_alone[:, k], size[1:-1, k], -1.0)))
+        found[k] = Jump(float(part.time[row]), float(steps[row, k]), float(steps[row, k] / lasts[row]))
+    return found
+
+
+def _larger(one: Jump | None, other: Jump | None) -> Jump | None:
+    if one is None or other is None:
+        return one or other
+    return one if abs(one.size) >= abs(other.size) else other
+
+
+EXACTLY = 1e-9
+"""Share of a column's range by which interpolated values leave a straight line: rounding. Motion leaves it by far more."""
+STRAIGHT_ROWS = 6
+"""Rows on one line, in all columns, that are no chance."""
+
+
+def _straight_rows(part: Log) -> int:
+    """The number of rows in stretches in which all positions and efforts lie on lines and some effort is not constant."""
+    if len(part) < STRAIGHT_ROWS:
+        return 0
+    values = np.concatenate([part.position, part.effort], axis=1)
+    close = EXACTLY * np.ptp(values, axis=0)
+    slopes = np.diff(values, axis=0) / np.diff(part.time)[:, None]
+    bends = np.abs(np.diff(slopes, axis=0)) * part.period
+    n = len(part.joint_names)
+    changes = np.any(np.abs(slopes * part.period)[:, n:] > close[n:], axis=1)[1:]
+    on_line = np.all(bends <= close, axis=1) & changes
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], on_line.astype(np.int8), [0]])))
+    lengths = edges[1::2] - edges[::2]
+    return int(lengths[lengths >= STRAIGHT_ROWS].sum())
 
 
 def _note_no_numbers(bad: dict[str, NoNumber], part: Log, start: int) -> None:

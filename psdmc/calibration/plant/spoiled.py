@@ -64,3 +64,101 @@ def late(log: Log, rows: int) -> Log:
     return replace(
         log, time=log.time[rows:], position=log.position[rows:], velocity=velocity, effort=log.effort[:-rows]
     )
+
+
+def borrowed(log: Log, joint: int, other: Log, other_joint: int) -> Log:
+    """Return the log with the columns of one joint taken from a joint of another robot's log, at the same times.
+
+    The result ends where the shorter log ends.
+    """
+    times = other.time - other.time[0]
+    kept = log.at(log.time - log.time[0] <= times[-1])
+
+    def changed(own: Array, theirs: Array) -> Array:
+        column = np.interp(kept.time - kept.time[0], times, theirs[:, other_joint])
+        return _with_column(own, joint, column)
+
+    velocity = kept.velocity
+    if velocity is not None:
+        rates = other.velocity if other.velocity is not None else np.gradient(other.position, times, axis=0)
+        velocity = changed(velocity, rates)
+    return replace(
+        kept,
+        position=changed(kept.position, other.position),
+        velocity=velocity,
+        effort=changed(kept.effort, other.effort),
+    )
+
+
+def drifting(log: Log, share: float) -> Log:
+    """Return the log with efforts whose clock is slower than that of the positions by this share."""
+    since = log.time - log.time[0]
+    effort = [np.interp((1.0 - share) * since, since, column) for column in log.effort.T]
+    return replace(log, effort=np.stack(effort, axis=1))
+
+
+def bridged(log: Log, gaps: int, seconds: float) -> Log:
+    """Return the log with evenly spread gaps of this length, whose samples are replaced by straight lines."""
+    since = log.time - log.time[0]
+    starts = (np.arange(gaps) + 0.5) * since[-1] / gaps
+    lost = np.any((since[:, None] > starts) & (since[:, None] < starts + seconds), axis=1)
+
+    def filled(values: Array) -> Array:
+        return np.stack([np.interp(log.time, log.time[~lost], column[~lost]) for column in values.T], axis=1)
+
+    velocity = None if log.velocity is None else filled(log.velocity)
+    return replace(log, position=filled(log.position), velocity=velocity, effort=filled(log.effort))
+
+
+def quantised(log: Log, share: float) -> Log:
+    """Return the log with efforts rounded to steps of this share of each joint's range of effort."""
+    step = share * np.maximum(np.ptp(log.effort, axis=0), 1e-12)
+    return replace(log, effort=np.round(log.effort / step) * step)
+
+
+def geared(log: Log, joint: int, factor: float) -> Log:
+    """Return the log that a wrong reduction ratio of one joint gives: position and velocity times the factor, effort
+    divided by the factor."""
+    factors = np.ones(len(log.joint_names))
+    factors[joint] = factor
+    moved = _changed(log, MOVED, lambda values: values * factors)
+    return replace(moved, effort=log.effort / factors)
+
+
+def offset(log: Log, joint: int, angle: float) -> Log:
+    """Return the log with one joint's position shifted by a constant, as by a wrong zero position; rad or m."""
+    shift = np.zeros(len(log.joint_names))
+    shift[joint] = angle
+    return replace(log, position=log.position + shift)
+
+
+def rough(log: Log, share: float, seed: int = 0) -> Log:
+    """Return the log with white noise added to the efforts, of this share of each joint's standard deviation."""
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal(log.effort.shape) * share * np.std(log.effort, axis=0)
+    return replace(log, effort=log.effort + noise)
+
+
+def stuck(log: Log, joint: int, start: float, seconds: float) -> Log:
+    """Return the log in which one joint's encoder stands still for some time that begins `start` s after the first row."""
+    since = log.time - log.time[0]
+    rows = np.flatnonzero((since >= start) & (since < start + seconds))
+    position, velocity = log.position.copy(), log.velocity
+    position[rows, joint] = position[rows[0], joint]
+    if velocity is not None:
+        velocity = velocity.copy()
+        velocity[rows, joint] = 0.0
+    return replace(log, position=position, velocity=velocity)
+
+
+def backwards(log: Log, row: int, seconds: float) -> Log:
+    """Return the log whose clock is set back by this time at one row."""
+    time = log.time.copy()
+    time[row:] -= seconds
+    return replace(log, time=time)
+
+
+def _with_column(values: Array, joint: int, column: Array) -> Array:
+    changed = values.copy()
+    changed[:, joint] = column
+    return changed

@@ -24,6 +24,7 @@ from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.delivered import delivered, sprung
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
 from psdmc.calibration.verdict.findings import Demand, Findings
+from psdmc.calibration.verdict.log_errors import log_errors, unstated_load
 from psdmc.calibration.verdict.record import Calibration, with_verdict
 from psdmc.calibration.verdict.suspects import suspect, unit_suspect
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
@@ -97,6 +98,9 @@ def judge(
     likely = _suspects(found)
     if likely and not against:
         (against if fits_poorly(found) else doubted).append(Ground("contradicted"))
+    if not against:
+        for ground, is_certain in hidden_errors(found):
+            (against if is_certain else doubted).append(ground)
     return Verdict(
         against=tuple(against),
         doubted=tuple(doubted),
@@ -113,6 +117,19 @@ def _suspects(found: Findings) -> tuple[Ground, ...]:
         return ()
     named = (suspect(found.evidence), unit_suspect(found.gains))
     return tuple(ground for ground in named if ground is not None)
+
+
+def hidden_errors(found: Findings) -> Iterator[tuple[Ground, bool]]:
+    """Yield errors of a log that otherwise looks good, and whether each of them makes the log unusable."""
+    errors = log_errors(found.evidence, found.record.model)
+    if errors:
+        names = ("kind", "joint", "value", "std", "unit", "explains", "felt")
+        items = [{name: getattr(each, name) for name in names} for each in errors]
+        yield Ground("log_error", {"items": items}), errors[0].certain
+        return
+    load = unstated_load(found.evidence)
+    if load is not None:
+        yield Ground("unstated_load", asdict(load)), False
 
 
 # Reasons
