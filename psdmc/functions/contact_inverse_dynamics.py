@@ -36,6 +36,9 @@ BASE_ROWS = 6
 
 LINEAR = 3
 
+ROUNDED = 1e-12
+"""Entries of Pinocchio's Jacobians below this are rounding; if all are, least squares would find a rank."""
+
 MU = replace(
     held.MU,
     means="regularisation, 0 or more (not a friction coefficient): the weight of |forces|^2 in the sum that psdmc "
@@ -162,6 +165,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
             free = np.eye(len(on))[:, :contacts][:, on[:contacts]]
             free[contacts:] = -np.linalg.solve(of_loops, own[:contacts][on[:contacts]][:, passive].T)
         rows, count = own[:, base].T, free.shape[1]
+        rows = np.where(np.abs(rows) > ROUNDED, rows, 0.0)  # loops within the robot have no force on its base
         whole = np.vstack([rows @ free, np.sqrt(mu) * np.eye(count)])
         right = np.append(tau[k, base] - rows @ start, np.zeros(count))
         forces[k] = start + free @ np.linalg.lstsq(whole, right, rcond=1e-8)[0]

@@ -7,8 +7,8 @@ from functools import cache, cached_property
 
 import numpy as np
 import pinocchio as pin
-from contact_trees import FOOT, TRUNK, OneByOne
-from mimic_trees import as_urdf
+from contact_trees import OneByOne
+from mimic_trees import FOOT, TRUNK, as_urdf, placed
 from random_trees import TREES, RandomTree
 
 from psdmc.derivation.derive import derive_model
@@ -121,18 +121,6 @@ class LoopTree:
         if not isinstance(many, tuple):
             return [(many,), (np.array(each),), (plain,)]
         return [many, tuple(map(np.array, zip(*each, strict=True))), plain]
-
-
-def placed(model: pin.Model, data: pin.Data, link: str, world: pin.SE3) -> dict[str, object]:
-    """A frame of a loop, in a link, that is where `world` is."""
-    place = world
-    if model.existFrame(link) and link != "universe":
-        place = data.oMf[model.getFrameId(link)].inverse() * world
-    return {
-        "link": link,
-        "xyz": place.translation.tolist(),
-        "rpy": pin.rpy.matrixToRpy(place.rotation).tolist(),
-    }
 
 
 @cache
