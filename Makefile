@@ -49,7 +49,7 @@ coverage: $(READY) ## run all tests and show the share of each file that they ru
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal --cov --cov-report=term --cov-report=html:$(GENERATED)/coverage $(COVERED)
 
 CAMPAIGN ?= --robots 10000
-campaign: $(READY) ## compare 10,000 random chains and 1,000 trees with Pinocchio and MuJoCo, an hour or more; CAMPAIGN='--robots 500 --trees 50' for less
+campaign: $(READY) ## compare 10,000 random chains, 1,000 trees and 300 robots with contacts and loops with Pinocchio and MuJoCo, some hours; CAMPAIGN='--robots 500 --trees 50 --contacts 20' for less
 	@mkdir -p $(GENERATED)
 	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --journal $(GENERATED)/campaign.jsonl --json $(GENERATED)/campaign.json
 

@@ -10,6 +10,16 @@ from random_trees import RandomTree
 
 from psdmc.robot.coordinates import Coordinate
 
+TRUNK = (
+    '<inertial><origin xyz="0.1 0 -0.05"/><mass value="6"/>'
+    '<inertia ixx="0.2" iyy="0.3" izz="0.25" ixy="0.01" ixz="0" iyz="-0.02"/></inertial>'
+)
+
+FOOT = (
+    '<link name="foot{i}"/><joint name="to_foot{i}" type="fixed"><parent link="link{i}"/><child link="foot{i}"/>'
+    '<origin xyz="0.2 -0.1 0.3" rpy="0.4 -0.7 1.1"/></joint>'
+)
+
 
 def as_urdf(tree: RandomTree, coordinates: Sequence[Coordinate]) -> str:
     """The tree with its followers as mimic joints, numbers to all their digits."""
@@ -40,3 +50,15 @@ def as_urdf(tree: RandomTree, coordinates: Sequence[Coordinate]) -> str:
             '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
         )
     return "".join([*parts, "</robot>"])
+
+
+def placed(model: pin.Model, data: pin.Data, link: str, world: pin.SE3) -> dict[str, object]:
+    """A frame of a loop, in a link, that is where `world` is."""
+    place = world
+    if model.existFrame(link) and link != "universe":
+        place = data.oMf[model.getFrameId(link)].inverse() * world
+    return {
+        "link": link,
+        "xyz": place.translation.tolist(),
+        "rpy": pin.rpy.matrixToRpy(place.rotation).tolist(),
+    }

@@ -1,4 +1,4 @@
-"""The contact-space inertia: contact forces per unit acceleration of the active contacts."""
+"""The contact-space inertia: forces per unit acceleration of the active contacts and of closed loops."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import numpy as np
 
 from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.functions import delassus
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
-from psdmc.recipes.contacts import ACTIVE, CONTACTS, MU, ROW_WORDS, Held, active_rows
+from psdmc.recipes.contacts import ACTIVE, CONSTRAINT_WORDS, CONTACTS, MU, Held, held_rows
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 def trace(g: Ingredients) -> Outputs:
     q = g.inputs["q"]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
-    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    rows = Constraints(g.frames, g.named, g.loops, g.root).jacobian(q)
     return _values(factors, rows, Held.of(g))
 
 
@@ -41,8 +42,9 @@ def _values(factors: Factors, jacobian: Sequence[Sequence[Scalar]], mask: Held) 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, count = list(given["q"].T), len(given["q"])
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
-    rows = contacts.contact_jacobian(robot.frames, robot.chain.frames, q)
-    mask = Held.on_arrays(robot, given)
+    loops = robot.chain.loops
+    rows = Constraints(robot.frames, robot.chain.frames, loops).jacobian(q)
+    mask = Held.on_arrays(robot, given, loops)
     with np.errstate(all="ignore"):
         found = _values(factorize([list(row) for row in mass]), rows, mask)
         return {name: entries(value, count) for name, value in found.items()}
@@ -50,7 +52,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     found = delassus.RECIPE.pinocchio(robot, given)["D"]
-    masks = active_rows(robot, given)
+    masks = held_rows(robot, given)
     for matrix, on, mu in zip(found, masks, np.reshape(given[MU.name], -1), strict=True):
         own = np.ix_(on, on)
         inverse = np.linalg.inv(matrix[own] + mu * np.eye(on.sum()))
@@ -64,13 +66,14 @@ RECIPE = Recipe(
         "contact_space_inertia",
         332,
         "inverse (J M(q)^-1 J^T + mu I)^-1 in the rows and columns of the active contacts, zero in the others; both "
-        "triangles; J as in contact_jacobian; active is 0 or 1 for each contact, mu is not negative",
+        "triangles; J as in delassus, with closed loops, which are always active; active is 0 or 1 for each "
+        "contact, mu is not negative",
         (Q, ACTIVE, MU),
         (
             Quantity(
                 "Lambda",
-                ("contact_rows", "contact_rows"),
-                means=f"symmetric matrix {ROW_WORDS.format('rows and columns')}",
+                ("constraint_rows", "constraint_rows"),
+                means=f"symmetric matrix {CONSTRAINT_WORDS.format('rows and columns')}",
                 unit="J s^2",
                 powers=(-1, -1),
             ),
@@ -78,7 +81,7 @@ RECIPE = Recipe(
         theta=True,
         summary="Compute the contact-space inertia (J M^-1 J^T + mu I)^-1 of the active contacts. J is the "
         "Jacobian of these contacts (`contact_jacobian`), M the mass matrix, and I the identity matrix. Rows and "
-        "columns of other contacts are zero.",
+        "columns of other contacts are zero. Closed loops count as active contacts, and their rows follow.",
         factorises=(MASS_MATRIX, CONTACTS),
     ),
     "contact-space inertia",
@@ -88,4 +91,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     matters=("fold_double_angle",),
+    closes=True,
 )

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 _ROWS = "A contact point has three linear {0}. A contact surface has three linear and then three angular {0}"
 ROW_WORDS = f"along the axes of the base frame. {_ROWS}"
+CONSTRAINT_WORDS = (
+    f"{ROW_WORDS}. Then follow the {{0}} of closed loops, if the robot has any, along and about the axes of each loop's "
+    "first frame"
+)
 LOCAL_ROW_WORDS = f"along the axes of each contact. {_ROWS}"
 
 ACTIVE = Quantity(
@@ -219,6 +223,12 @@ def active_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool
     return np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
 
 
+def held_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Return which rows of the contacts are active, and true for each row of the closed loops, (k, rows)."""
+    loops = sum(len(rows) for _, _, rows in robot.loops)
+    return np.pad(active_rows(robot, given), ((0, 0), (0, loops)), constant_values=True)
+
+
 def dense_solution(
     robot: Reference, given: Mapping[str, Array], jacobian: Array, load: Array, wanted: Array
 ) -> tuple[Array, Array]:
@@ -228,9 +238,7 @@ def dense_solution(
     Jacobian of the active contacts and mu the regularisation. Load and wanted may have columns, (k, nv, columns) and
     (k, rows, columns); the results then have them, too.
     """
-    masks = active_rows(robot, given)
-    loops = jacobian.shape[1] - masks.shape[1]
-    masks = np.pad(masks, ((0, 0), (0, loops)), constant_values=True)
+    masks = held_rows(robot, given)
     motion, forces = np.zeros(load.shape), np.zeros(wanted.shape)
     for k, (mass, on, mu) in enumerate(
         zip(robot.mass_matrix(given["q"]), masks, np.reshape(given[MU.name], -1), strict=True)

@@ -66,7 +66,8 @@ class PassiveJoints(NamedTuple):
     ) -> PassiveJoints:
         """Return the equations at q. `si` returns a constant from its value and its unit."""
         jacobian = loop_jacobian(frames, loops, q, root)
-        numbers, every = _passive_rates(frames, loops, si)
+        numbers, slides = passive_rates(frames, loops)
+        every = [si(1.0, "m") if slide else 1.0 for slide in slides]
         scales = [every[k] for k in numbers]
         whole = [[scale * x for scale, x in zip(every, row, strict=True)] for row in jacobian]
         rows = [[row[k] for k in numbers] for row in whole]
@@ -140,10 +141,8 @@ def _sizes(loops: Sequence[Loop], rows: Sequence[Sequence[Scalar]]) -> list[Scal
     return [sums[kind] for kind in kinds]
 
 
-def _passive_rates(
-    frames: Sequence[Frame], loops: Sequence[Loop], si: Callable[[float, str], Scalar]
-) -> tuple[list[int], list[Scalar]]:
-    """Numbers of the passive rates, and a radian or a metre for each rate."""
+def passive_rates(frames: Sequence[Frame], loops: Sequence[Loop]) -> tuple[list[int], list[bool]]:
+    """Return the numbers of the passive rates, and for each rate whether it is linear (m/s), not angular (rad/s)."""
     passive = {joint for loop in loops for joint in loop.passive}
     own = [
         (j, order)
@@ -152,4 +151,4 @@ def _passive_rates(
         for order in frame.joint.v_orders
     ]
     numbers = [k for k, (joint, _) in enumerate(own) if joint in passive]
-    return numbers, [si(1.0, "m") if order else 1.0 for _, order in own]
+    return numbers, [order != 0 for _, order in own]

@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
-from psdmc.functions import OF_FILE_MASSES, SIGNATURES, recipe_of
+from psdmc.functions import OF_FILE_MASSES, SIGNATURES
 from psdmc.program.signature import Quantity, Signature
 
 STUB = Path(__file__).with_name("call.pyi")
@@ -78,11 +78,9 @@ def documentation(function: Signature) -> str:
     made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
     axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
     axes |= {"l"} if function.theta else set()
-    closes = recipe_of(function.name).closes
-    axes |= {"contact_rows", *(("loop_rows",) if closes else ())} if "constraint_rows" in axes else set()
-    sizes = _SIZES if closes else {**_SIZES, "constraint_rows": _WITHOUT_LOOPS}
+    axes |= {"contact_rows", "loop_rows"} if "constraint_rows" in axes else set()
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
-    lengths = [(size, meaning) for size, meaning in sizes.items() if size in {*axes, *lead}]
+    lengths = [(size, meaning) for size, meaning in _SIZES.items() if size in {*axes, *lead}]
     parts = [
         _rows(given),
         returned,
@@ -112,11 +110,6 @@ _SIZES = {
     "constraint_rows": "contact_rows + loop_rows: first the rows of all contacts, then those of all closed loops",
     "nonzeros": "number of matrix entries that can differ from zero at some state",
 }
-
-_WITHOUT_LOOPS = (
-    "equal to contact_rows, because psdmc cannot yet generate this function for robots with closed loops"
-)
-
 
 _FIXED_MASSES = (
     "The masses and inertias of the links are those of the robot file, with loads that `DynamicsModel.with_payload` added. "

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from campaign_contacts import STATES, ContactRobot, contact_errors
 from campaign_draw import robot_of
 from campaign_lowered import lowered_errors
 from campaign_oracles import MuJoCo, Pinocchio, Textbook
@@ -64,6 +65,8 @@ def measured(seed: int, count: int, *, lowered: bool) -> Found:
     """The robot of a seed at `count` random states, lowered and compiled as well where asked. Raises whatever psdmc does:
     nothing is expected to, but refusals of robots of many scales."""
     robot = robot_of(seed)
+    if isinstance(robot, ContactRobot):
+        return Found(contact_errors(robot), {"contacts and loops": STATES})
     oracle = Pinocchio.of_robot(robot)
     coordinates = oracle.joints.coordinates
     states = random_states(seed, len(coordinates), count, robot.is_floating)
@@ -122,6 +125,8 @@ def failures(errors: dict[str, float]) -> dict[str, float]:
 def limit_of(what: str) -> float:
     if what.startswith("MuJoCo"):
         return MUJOCO_LIMIT
+    if what.startswith("contacts"):
+        return 1.0  # of the bound of each state
     return SINGLE_LIMIT if "float32" in what else LIMIT
 
 

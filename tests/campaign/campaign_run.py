@@ -4,6 +4,8 @@ python tests/campaign/campaign_run.py --robots 1000          the chains of seeds
 python tests/campaign/campaign_run.py --robots 1000:2000 --journal generated/campaign.jsonl
                                                              the next thousand, added to what that file holds
 python tests/campaign/campaign_run.py --robots 0 --trees 100 the trees of seeds 1,000,000 to 1,000,099 alone
+python tests/campaign/campaign_run.py --robots 0 --trees 0 --contacts 300
+                                                             robots with contacts and loops, seeds 2,000,000 to 2,000,299
 python tests/campaign/campaign_run.py --lowered-only         those of them alone that are lowered and compiled
 python tests/campaign/campaign_run.py --seed 52 --urdf       one robot again, all its errors and its file
 """
@@ -24,13 +26,14 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
-from campaign_draw import FIRST_TREE, described, robot_of  # noqa: E402
+from campaign_contacts import STATES as CONTACT_STATES  # noqa: E402
+from campaign_draw import FIRST_CONTACTS, FIRST_TREE, described, robot_of  # noqa: E402
 from campaign_journal import Outcome, append, read, report, summary  # noqa: E402
 from campaign_measure import failures, limit_of, measured  # noqa: E402
 
 from psdmc.toolchain.cache_room import cache_contents, clear_cache  # noqa: E402
 
-ROBOTS, TREES, STATES, LOWERED_EVERY = 10_000, 1_000, 1_000, 50
+ROBOTS, TREES, CONTACTS, STATES, LOWERED_EVERY = 10_000, 1_000, 300, 1_000, 50
 
 MOST_ENTRIES = 300
 """Of a process's compile cache."""
@@ -44,6 +47,7 @@ def outcome(seed: int, states: int, every: int, commit: str) -> Outcome:
     started = time.process_time()
     _tidy_cache()
     lowered = is_lowered(seed, every)
+    states = states if seed < FIRST_CONTACTS else CONTACT_STATES
     one: Outcome = {"seed": seed, "commit": commit, "count": states, "lowered": lowered}
     one["mixed"] = robot_of(seed).is_mixed
     try:
@@ -68,8 +72,9 @@ def _tidy_cache() -> None:
 
 
 def is_lowered(seed: int, every: int) -> bool:
-    """One robot in `every`, at another place in each such block, so that robots of every kind are among them."""
-    return every > 0 and seed % every == seed // every % every
+    """Robots with contacts, and one other robot in `every`, at another place in each such block, so that robots of every
+    kind are among them."""
+    return seed >= FIRST_CONTACTS or (every > 0 and seed % every == seed // every % every)
 
 
 def outcomes(seeds: Sequence[int], states: int, every: int, jobs: int, commit: str) -> Iterator[Outcome]:
@@ -116,6 +121,12 @@ def arguments() -> argparse.Namespace:
     add = parser.add_argument
     add("--robots", type=seed_range, default=range(ROBOTS), help="seeds of chains: N or A:B")
     add("--trees", type=seed_range, default=range(TREES), help=f"trees by seed less {FIRST_TREE:,}: N or A:B")
+    add(
+        "--contacts",
+        type=seed_range,
+        default=range(CONTACTS),
+        help=f"by seed less {FIRST_CONTACTS:,}: N or A:B",
+    )
     add("--states", type=int, default=STATES, help="random states of each robot")
     add("--lowered-every", type=int, default=LOWERED_EVERY, help="lower and compile one in so many; 0: none")
     add("--lowered-only", action="store_true", help="those robots alone")
@@ -146,7 +157,11 @@ def main() -> int:
 
 def _run(chosen: argparse.Namespace, journal: Path) -> None:
     known = read(journal)
-    wanted = [*chosen.robots, *(FIRST_TREE + number for number in chosen.trees)]
+    wanted = [
+        *chosen.robots,
+        *(FIRST_TREE + number for number in chosen.trees),
+        *(FIRST_CONTACTS + number for number in chosen.contacts),
+    ]
     seeds = [seed for seed in wanted if seed not in known]
     if chosen.lowered_only:
         seeds = [seed for seed in seeds if is_lowered(seed, chosen.lowered_every)]

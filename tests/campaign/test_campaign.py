@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign_draw import FIRST_TREE, described, robot_of
+from campaign_contacts import contact_errors, random_contact_robot
+from campaign_draw import FIRST_CONTACTS, FIRST_TREE, described, robot_of
 from campaign_journal import append, read, report, summary
 from campaign_lowered import FUNCTIONS, _answered
 from campaign_measure import EXPANDED_JOINTS, Found, failures, measured
@@ -26,6 +27,8 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.lower.search import BUDGET, Search
 from psdmc.program.interpret import interpret
 from psdmc.robot.load import LoadedRobot, load_robot_text
+
+Array = np.ndarray
 
 SEEDS = range(40)
 TREES = range(FIRST_TREE, FIRST_TREE + 16)
@@ -231,6 +234,42 @@ def test_a_seed_is_a_robot() -> None:
     assert (
         described(tree) == "5 joints, 1 of them mimic joints, tilted, tilts 8e-09 to 0.04 rad, floating True"
     )
+
+
+def test_robots_with_contacts_and_loops_are_of_all_kinds() -> None:
+    robots = [random_contact_robot(FIRST_CONTACTS + k) for k in (3, 4, 6, 7)]
+    assert {*"".join(robot.kinds for robot in robots)} == {*"RPS"}
+    mechanisms = [robot.loaded.mechanism for robot in robots]
+    assert {robot.has_free_root for robot in mechanisms} == {True, False}
+    assert {len(robot.loops) for robot in mechanisms} == {0, 1, 2}
+    assert {len(robot.contacts) for robot in mechanisms} == {1, 2, 3}
+    assert {rows for robot in mechanisms for rows in robot.rows_of_contacts} == {3, 6}
+    words = "joints RRP, 3 rates, parents (-1, 0, 1), contacts of (6,) rows, loops of [3] rows"
+    assert described(robot_of(FIRST_CONTACTS + 7)) == words
+
+
+CONTACTS_QUICK = FIRST_CONTACTS + 7
+CONTACTS = slow_but_for([CONTACTS_QUICK], [FIRST_CONTACTS + k for k in (2, 5, 6, 7, 10, 14, 15)])
+
+
+@pytest.mark.parametrize("seed", CONTACTS)
+def test_robots_with_contacts_and_loops(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All layouts have the values of the dense systems, and a digit beyond their bound is found."""
+    name = "constrained_forward_dynamics"
+    if seed == CONTACTS_QUICK:
+        monkeypatch.setattr("campaign_contacts.ALWAYS", (name,))
+        monkeypatch.setattr("campaign_contacts.IN_TURN", ((),))
+    errors = contact_errors(random_contact_robot(seed))
+    assert {what.split(", ")[1] for what in errors} == {"one state", "rows", "lanes", "batch"}
+    assert not failures(errors)
+    if seed == CONTACTS_QUICK:
+        right = RECIPES[name]
+
+        def wrong(*given: object) -> dict[str, Array]:
+            return {name: values * (1.0 + 1e-8) for name, values in right.pinocchio(*given).items()}
+
+        monkeypatch.setitem(RECIPES, name, replace(right, pinocchio=wrong))
+        assert len(failures(contact_errors(random_contact_robot(seed)))) == 4
 
 
 def test_what_does_not_pass_is_named() -> None:

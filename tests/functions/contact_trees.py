@@ -8,7 +8,7 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from mimic_trees import as_urdf
+from mimic_trees import FOOT, TRUNK, as_urdf
 from pinocchio_robots import path_of
 from random_trees import TREES, RandomTree
 from unoptimised import without_optimisation
@@ -51,18 +51,6 @@ FUNCTIONS = (
 SHAPES = ("a trunk with two arms", "four legs on a body", "a wrist with two fingers")
 COUNT = 16
 """States: two for each mask of three contacts."""
-
-
-TRUNK = (
-    '<inertial><origin xyz="0.1 0 -0.05"/><mass value="6"/>'
-    '<inertia ixx="0.2" iyy="0.3" izz="0.25" ixy="0.01" ixz="0" iyz="-0.02"/></inertial>'
-)
-
-
-FOOT = (
-    '<link name="foot{i}"/><joint name="to_foot{i}" type="fixed"><parent link="link{i}"/><child link="foot{i}"/>'
-    '<origin xyz="0.2 -0.1 0.3" rpy="0.4 -0.7 1.1"/></joint>'
-)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from functools import cache, cached_property
 
 import numpy as np
 import pinocchio as pin
-from contact_trees import FOOT, TRUNK, OneByOne
-from mimic_trees import as_urdf
+from contact_trees import OneByOne
+from mimic_trees import FOOT, TRUNK, as_urdf, placed
 from random_trees import TREES, RandomTree
 
 from psdmc.derivation.derive import derive_model
@@ -40,6 +40,9 @@ FUNCTIONS = (
     "impulse_derivatives",
     "impulse_vjp",
     "impulse_jvp",
+    "delassus",
+    "contact_space_inertia",
+    "contact_inverse_dynamics",
 )
 COUNT = 16
 
@@ -120,18 +123,6 @@ class LoopTree:
         return [many, tuple(map(np.array, zip(*each, strict=True))), plain]
 
 
-def placed(model: pin.Model, data: pin.Data, link: str, world: pin.SE3) -> dict[str, object]:
-    """A frame of a loop, in a link, that is where `world` is."""
-    place = world
-    if model.existFrame(link) and link != "universe":
-        place = data.oMf[model.getFrameId(link)].inverse() * world
-    return {
-        "link": link,
-        "xyz": place.translation.tolist(),
-        "rpy": pin.rpy.matrixToRpy(place.rotation).tolist(),
-    }
-
-
 @cache
 def loop_tree(seed: int, floating: bool) -> LoopTree:
     """Four legs on a body: two feet are joined, a third one is joined to the base, the last one can touch the world."""
@@ -158,3 +149,45 @@ def loop_tree(seed: int, floating: bool) -> LoopTree:
         tables.append({"rows": rows, **ends})
     loaded = load_robot_text(text, "urdf", floating=floating, contacts=["foot7"], loops=tables)
     return LoopTree(loaded, q)
+
+
+LEG = "".join(
+    f'<link name="{name}{{k}}"><inertial><origin xyz="{length / 2} 0.01 0"/><mass value="{2 * length}"/>'
+    f'<inertia ixx="0.002" iyy="{0.02 * length}" izz="0.005" ixy="0" ixz="0.0003" iyz="0"/></inertial></link>'
+    f'<joint name="{name}{{k}}" type="continuous"><parent link="{parent}"/><child link="{name}{{k}}"/>'
+    f'<origin xyz="{place}" rpy="{turn}"/><axis xyz="0 1 0"/></joint>'
+    for name, length, parent, place, turn in (
+        ("crank", 0.2, "base", "{x} 0.1 0", "0.2 0 {k}"),
+        ("coupler", 0.5, "crank{k}", "0.2 0 0", "0 0 0"),
+        ("rocker", 0.4, "crank_base{k}", "0.45 0 0", "0 0 0"),
+    )
+) + (
+    '<link name="crank_base{k}"/><joint name="to_crank_base{k}" type="fixed"><parent link="base"/>'
+    '<child link="crank_base{k}"/><origin xyz="{x} 0.1 0" rpy="0.2 0 {k}"/></joint>'
+    '<link name="foot{k}"/><joint name="to_foot{k}" type="fixed"><parent link="coupler{k}"/><child link="foot{k}"/>'
+    '<origin xyz="0.6 0.05 0.1" rpy="0.4 -0.7 1.1"/></joint>'
+)
+
+
+@cache
+def four_bar_legs() -> LoopTree:
+    """A floating body with two legs, each a four-bar whose coupler carries a foot. Coupler and rocker are passive. A passive
+    boom slides on a wall."""
+    legs = "".join(LEG.format(k=k, x=x) for k, x in enumerate((0.3, -0.3)))
+    boom = (
+        f'<link name="boom">{TRUNK}</link><joint name="boom" type="continuous"><parent link="base"/>'
+        '<child link="boom"/><origin xyz="0 0 0.2" rpy="0.3 0 0"/><axis xyz="0 0 1"/></joint>'
+    )
+    text = f'<robot name="legs"><link name="base">{TRUNK}</link>{legs}{boom}</robot>'
+    loops = [
+        {
+            "rows": ["x", "z"],
+            "first": {"link": f"rocker{k}", "xyz": [0.4, 0.0, 0.0]},
+            "second": {"link": f"coupler{k}", "xyz": [0.5, 0.0, 0.0]},
+            "passive": ["boom", *(f"{name}{i}" for i in range(2) for name in ("coupler", "rocker"))],
+        }
+        for k in range(2)
+    ]
+    loops.append({"rows": ["x"], "first": "universe", "second": {"link": "boom", "xyz": [0.0, 0.7, 0.1]}})
+    loaded = load_robot_text(text, "urdf", floating=True, contacts=["foot0:6", "foot1"], loops=loops)
+    return LoopTree(loaded, states_of(loaded.mechanism, np.random.default_rng(2), 1)[0][0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -91,6 +92,9 @@ VALUES = (
     "passive_motion",
     "loop_inverse_dynamics",
     "constrained_semi_implicit_euler",
+    "delassus",
+    "contact_space_inertia",
+    "contact_inverse_dynamics",
     "constrained_rk4_step",
 )
 
@@ -183,6 +187,25 @@ def test_a_loop_that_closes_leaves_a_four_bar_the_rate_of_its_one_coordinate(tmp
         expected = way * (way @ mass @ before) / (way @ mass @ way)
         np.testing.assert_allclose(found.qd_after, expected, atol=1e-12)
         assert found.impulses.shape == (sum(model.contacts.values()) + 2,)
+
+
+def test_forces_on_a_four_bar_move_its_one_coordinate(tmp_path: Path) -> None:
+    """The rows of the loop are eliminated from the Delassus matrix and from the contact-space inertia."""
+    model = four_bar(tmp_path)
+    cut, count = sum(model.contacts.values()), len(model.contacts)
+    for crank in (-2.0, 0.4, 1.5):
+        q = assembled(crank)
+        way = rates(q, 1.0)
+        along = model.contact_jacobian(q) @ way
+        expected = np.outer(along, along) / (way @ model.mass_matrix(q) @ way)
+        seen = model.delassus(q)
+        assert seen.shape == (cut + 2, cut + 2)
+        found = seen[:cut, :cut] - seen[:cut, cut:] @ np.linalg.solve(seen[cut:, cut:], seen[cut:, :cut])
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(seen).max())
+        inertia = model.contact_space_inertia(q, np.ones(count), 0.1)[:cut, :cut]
+        shifted = seen[cut:, cut:] + 0.1 * np.eye(2)
+        found = seen[:cut, :cut] - seen[:cut, cut:] @ np.linalg.solve(shifted, seen[cut:, :cut])
+        np.testing.assert_allclose(inertia @ (found + 0.1 * np.eye(cut)), np.eye(cut), atol=1e-11)
 
 
 def test_rates_of_a_four_bar_are_in_closed_form(tmp_path: Path) -> None:
@@ -364,18 +387,12 @@ def test_a_dead_point_names_the_loop(tmp_path: Path) -> None:
     assert np.isfinite(model.constrained_forward_dynamics(*state, mu=1e-6).qdd).all()
 
 
-def test_functions_without_loops_are_refused(tmp_path: Path) -> None:
+def test_functions_without_loops_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     model = four_bar(tmp_path)
-    others = (
-        "delassus",
-        "contact_inverse_dynamics",
-        "contact_space_inertia",
-    )
-    for name in others:
-        with pytest.raises(InputError, match=f"no {name}: for robots with closed loops"):
-            psdmc.compile(model, functions=[name])
-    with pytest.raises(InputError, match="no delassus: for robots with closed loops"):
-        model.delassus(np.zeros(3))
+    with monkeypatch.context() as patch:
+        patch.setitem(RECIPES, "delassus", replace(RECIPES["delassus"], closes=False))
+        with pytest.raises(InputError, match="no delassus: for robots with closed loops"):
+            model.delassus(np.zeros(3))
     plain = psdmc.derive("examples/robots/scara.toml", expand=False)
     assert plain.loops == {}
     with pytest.raises(InputError, match="no loop_error: the robot has no closed loops"):

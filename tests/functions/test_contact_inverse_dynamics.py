@@ -8,6 +8,7 @@ import pytest
 from against_pinocchio import EVERY, matches_pinocchio
 from contact_trees import BRICK, ContactTree, brick, contact_tree, floating_gripper
 from direct import Direct
+from loop_trees import four_bar_legs
 from slow_cases import slow_but_for
 from unoptimised import compiled
 
@@ -144,3 +145,30 @@ def test_c_returns_a_status_and_nan_in_every_layout() -> None:
     ]
     assert call(f"{NAME}_batch_soa", count, *laid) == 2
     assert np.array_equal(np.isnan(laid[-1].transpose(0, 2, 1).reshape(count, 6)), np.isnan(forces))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_forces_of_loops_take_away_the_torques_of_passive_joints(mu: float) -> None:
+    """Two legs with four-bars, a boom that slides on a wall, every set of feet: least squares of Pinocchio's numbers."""
+    own = four_bar_legs()
+    passive = list(own.loaded.mechanism.passive_rates)
+    masks = (np.arange(len(own.given["q"]))[:, None] >> np.arange(2)) & 1
+    given = {"active": masks.astype(float), "mu": np.full(len(masks), mu)}
+    expected = own.expected(NAME, **given)
+    for tau, forces in own.found(NAME, **given):
+        assert np.abs(forces - expected["forces"]).max() < 1e-10 * np.abs(expected["forces"]).max()
+        assert np.abs(tau - expected["tau"]).max() < 1e-10 * np.abs(expected["tau"]).max()
+        assert np.abs(tau[:, passive]).max() < 1e-10 * np.abs(tau).max()
+        assert not forces[masks.sum(axis=1) == 0][:, :9].any()
+
+
+def test_the_planned_motion_of_a_robot_with_loops_follows_from_its_torques() -> None:
+    """With the rates and accelerations of passive joints that keep loops closed; no foot acts in forward dynamics."""
+    own = four_bar_legs()
+    q, qd, qdd = (own.given[name] for name in ("q", "qd", "qdd"))
+    motion = own.model.passive_motion(q, qd, qdd)
+    still = np.zeros((len(q), 2))
+    tau, forces = own.model.contact_inverse_dynamics(q, motion.qd_closed, motion.qdd_closed, still)
+    found = own.model.constrained_forward_dynamics(q, motion.qd_closed, tau, still)
+    assert np.abs(found.qdd - motion.qdd_closed).max() < 1e-8 * np.abs(motion.qdd_closed).max()
+    assert np.abs(found.forces - forces).max() < 1e-8 * np.abs(forces).max()

@@ -34,6 +34,12 @@ def test_a_four_bar_has_the_torque_of_its_one_coordinate(tmp_path: Path) -> None
         tau, forces = model.loop_inverse_dynamics(*given)
         assert abs(tau[0] - expected) < 1e-8 * max(1.0, abs(expected))
         assert not tau[1:].any()
+        held = model.contact_inverse_dynamics(
+            q, found.qd_closed, found.qdd_closed, np.ones(len(model.contacts))
+        )
+        np.testing.assert_allclose(held.tau, tau, atol=1e-10)
+        np.testing.assert_allclose(held.forces[-2:], forces, atol=1e-10)
+        assert not held.forces[:-2].any()
         # The torque and the loops' forces move the mechanism so.
         moved = model.constrained_forward_dynamics(q, found.qd_closed, tau, np.zeros(len(model.contacts)))
         np.testing.assert_allclose(moved.qdd, found.qdd_closed, atol=1e-9)

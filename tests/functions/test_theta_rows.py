@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from direct import Direct
+from loop_trees import four_bar_legs
 from lowered import lowered
 from random_chains import _body
 from random_trees import TREES, RandomTree
@@ -25,10 +26,10 @@ from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS, OF_TREES, RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
-from psdmc.program.signature import Signature
+from psdmc.program.signature import OF_ROWS, Signature
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.recipes.packed import VALUES
-from psdmc.robot.reference import Reference
+from psdmc.robot.reference import Reference, reference
 from psdmc.toolchain.build_package import build_package, checks_of
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
@@ -41,6 +42,9 @@ COUNT = 37
 LIMIT = {"float64": 1e-12, "float32": 2e-4}
 """Of each output's largest entry."""
 
+LIMIT_OF_LOOPS = 1e-10
+"""The same for loops, whose equations have larger condition numbers."""
+
 QUICK = (
     "inverse_dynamics",
     "forward_dynamics",
@@ -51,14 +55,20 @@ QUICK = (
 EVERY = tuple(name for name in OF_TREES if SIGNATURES[name].theta and not SIGNATURES[name].calls)
 """Functions of robots without loops whose C is a straight line; those that call others have a test of their own."""
 
+OF_LOOPS = tuple(
+    name
+    for name, each in SIGNATURES.items()
+    if each.theta and not each.calls and {*OF_ROWS} & {axis for q in each.outputs for axis in q.axes}
+)
+"""Functions that close loops."""
+
 ROBOTS = {"fixed": ((-1, 0, 1), "RPR"), "floating": (TREES["a wrist with two fingers"], "FRSL")}
 
 
 @dataclass(frozen=True, eq=False)
 class Robots:
-    """A tree's model, and COUNT robots of its geometry with other bodies: theta_b of each, and Pinocchio's models."""
+    """A robot's model, and COUNT robots of its geometry with other bodies: theta_b of each, and Pinocchio's models."""
 
-    tree: RandomTree
     model: DynamicsModel
     thetas: Array
     pinocchio: tuple[Reference, ...]
@@ -108,13 +118,24 @@ def robots(name: str) -> Robots:
             place = pin.SE3(frame.placement.rotation.copy(), frame.placement.translation.copy())
             other.addFrame(pin.Frame(frame.name, joints[frame.joint], 0, place, pin.FrameType.OP_FRAME))
         references.append(Reference(other, "tip"))
-    return Robots(tree, model, np.array(thetas), tuple(references))
+    return Robots(model, np.array(thetas), tuple(references))
 
 
 @cache
-def package(name: str, real: str, functions: tuple[str, ...]) -> tuple[PackageView, CompiledRobot]:
-    kernels = lowered(robots(name).model, "factored", [f"{each}{THETA_ROWS}" for each in functions])
-    made = package_view(package_info(robots(name).model, "robot"), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
+def robots_with_loops() -> Robots:
+    """Contacts and closed loops with passive joints on a floating base."""
+    own, rng, thetas, references = four_bar_legs(), np.random.default_rng(6), [], []
+    for _ in range(COUNT):
+        bodies = np.array([[*_body(rng), 0.0] for _ in own.loaded.mechanism.joints])
+        thetas.append(own.model.B @ bodies.reshape(-1))
+        references.append(reference(own.loaded, parameters=bodies))
+    return Robots(own.model, np.array(thetas), tuple(references))
+
+
+@cache
+def package(model: DynamicsModel, real: str, functions: tuple[str, ...]) -> tuple[PackageView, CompiledRobot]:
+    kernels = lowered(model, "factored", [f"{each}{THETA_ROWS}" for each in functions])
+    made = package_view(package_info(model, "robot"), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
     return made, CompiledRobot(interface_of(made), compiled(made, False))
 
 
@@ -175,13 +196,21 @@ CASES = [(robot, real) for robot in ROBOTS for real in LIMIT]
 def test_each_row_is_pinocchios_with_its_own_bodies(
     robot: str, real: str, functions: tuple[str, ...]
 ) -> None:
-    own = robots(robot)
-    made, called = package(robot, real, functions)
+    every_layout_matches(robots(robot), real, functions, LIMIT[real])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("function", OF_LOOPS)
+def test_each_row_closes_its_loops_with_its_own_bodies(function: str) -> None:
+    every_layout_matches(robots_with_loops(), "float64", (function,), LIMIT_OF_LOOPS)
+
+
+def every_layout_matches(own: Robots, real: str, functions: tuple[str, ...], limit: float) -> None:
+    made, called = package(own.model, real, functions)
     library = Direct(made, called.library)
     for function in functions:
         signature = SIGNATURES[function]
         inputs = [own.given[q.name] for q in signature.inputs]
-        limit = LIMIT[real]
         expected = own.expected(function)
         compare(function, expected, named(signature, called.call(signature, inputs, own.thetas)), own, limit)
         whole = [*inputs, own.thetas]
