@@ -49,6 +49,7 @@ UNRELEASED = frozenset(
         "contact_jacobian",
         "contact_jacobian_local",
         "contact_space_inertia",
+        "assemble",
         "loop_drift",
         "loop_error",
         "loop_jacobian",

@@ -18,9 +18,10 @@ from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import for_every_gravity
+from psdmc.model.near_closed import near_closed
 from psdmc.model.random_states import on_joints, random_parameters
 from psdmc.program.gravity_input import GRAVITY
-from psdmc.program.signature import TAU, Q, Sizes
+from psdmc.program.signature import Q_GUESS, TAU, Q, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
@@ -164,9 +165,13 @@ def _drawn(model: DynamicsModel, gravity_input: bool) -> dict[str, Array]:
         rows_of_contacts=robot.rows_of_contacts,
         rows_of_loops=robot.rows_of_loops,
     )
-    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
+    read = {
+        q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q not in (TAU, Q_GUESS)
+    }
     read |= {GRAVITY.name: GRAVITY} if gravity_input else {}
     drawn = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q)))) for q in read.values()}
+    if robot.passive_rates:
+        drawn[Q_GUESS.name] = near_closed(robot, np.random.default_rng(SEED), CANDIDATES)
     return drawn | {q.name: on_joints(robot, drawn[q.name]) for q in read.values() if q.axes == Q.axes}
 
 

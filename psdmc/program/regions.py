@@ -84,7 +84,8 @@ Region = Straight | For | Call
 class Regions:
     """The body of a generated function as loops, calls and straight-line code.
 
-    arrays     the function's internal arrays: name -> length
+    arrays     the function's internal arrays: name -> length. An array with the name PIVOTS (signature.py) holds numbers
+               that must be positive at the end
     constants  arrays of fixed numbers: name -> numbers
     """
 

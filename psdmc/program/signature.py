@@ -330,12 +330,18 @@ Q = Quantity(
     "1",
     (1,),
 )
+Q_GUESS = replace(
+    Q,
+    name="q_guess",
+    means="joint positions, rad or m, of which those of passive joints are a guess; a ball joint or floating base has a "
+    "unit quaternion (x, y, z, w)",
+)
 QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s", "1/s", (1,))
 QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2", "1/s^2", (1,))
 TAU = Quantity(
     "tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints", unit="J", powers=(-1,)
 )
-"""Those of q, qd and qdd if states are drawn."""
+"""Those of q, qd and qdd if states are drawn; those of q_guess are drawn near closed loops (near_closed)."""
 
 BY_Q = (
     "If the robot has a ball joint or a floating base, q contains a quaternion and has more than nv entries. The "

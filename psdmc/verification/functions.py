@@ -11,9 +11,10 @@ import numpy as np
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.near_closed import near_closed
 from psdmc.model.random_states import on_joints
 from psdmc.model.standard_parameters import lack_of_standard_parameters
-from psdmc.program.signature import TAU, Q, Sizes
+from psdmc.program.signature import Q_GUESS, TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.packed import VALUES, unpacked
 from psdmc.recipes.recipe import Needs, Recipe
@@ -93,9 +94,11 @@ def function_errors(
         rows_of_contacts=chain.rows_of_contacts,
         rows_of_loops=chain.rows_of_loops,
     )
-    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
+    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != Q_GUESS}
     given = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes)))) for q in read.values()}
     given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}
+    if chain.passive_rates:
+        given[Q_GUESS.name] = near_closed(chain, np.random.default_rng(SEED), STATES)
     given[TAU.name] = robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])
     few = {name: values[:FEW] for name, values in given.items()}
     least = NOTHING * max(1.0, float(np.abs(given[TAU.name]).max(initial=0.0)))

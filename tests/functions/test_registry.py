@@ -79,7 +79,8 @@ def test_recipes_only_lean_on_functions_that_there_are() -> None:
         for other in (recipe.starts, recipe.shares):
             assert other is None or (other in RECIPES and RECIPES[other].starts is None), recipe.name
         assert not (recipe.starts and recipe.shares), recipe.name
-        assert recipe.signature.theta or not (recipe.starts or recipe.shares), recipe.name
+        is_searched = recipe.signature.theta or recipe.regions
+        assert is_searched or not (recipe.starts or recipe.shares), recipe.name
         if recipe.name in DEFAULT:
             assert "frames" not in {axis for q in recipe.signature.stored for axis in q.axes}
 

@@ -11,6 +11,7 @@ from psdmc.backends.c.c_expr import literal
 from psdmc.backends.c.lines import Body
 from psdmc.program.operations import Op
 from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight, read_late
+from psdmc.program.signature import PIVOTS
 from psdmc.program.theta_rows import THETAS
 
 
@@ -28,13 +29,16 @@ class RegionsView:
     """The body of a C function that contains loops or calls. First come declarations of the internal arrays and
     constants, then the parts of the code in their order.
 
-    kept  names and lengths of inputs that are copied first. The code reads them after it has written an output, and the
-          caller's arrays may overlap
+    kept    names and lengths of inputs that are copied first. The code reads them after it has written an output, and
+            the caller's arrays may overlap
+    tested  name and length of the internal array of pivots that must be positive at the end, besides those of called
+            functions; None if there is no such array
     """
 
     declarations: tuple[str, ...]
     pieces: tuple[Piece, ...]
     kept: tuple[tuple[str, int], ...]
+    tested: tuple[str, int] | None = None
 
     @property
     def calls(self) -> frozenset[Op]:
@@ -59,7 +63,8 @@ def regions_view(
     theta = next((name for name in inputs if name in ("theta_b", THETAS.name)), "")
     writer = _Writer(robot, theta, suffix, {*inputs, *body.constants})
     kept = tuple((name, inputs[name]) for name in read_late(body, tuple(inputs), outputs, theta))
-    return RegionsView((*constants, *arrays), tuple(writer.pieces(body.regions, 1)), kept)
+    tested = (PIVOTS, body.arrays[PIVOTS]) if PIVOTS in body.arrays else None
+    return RegionsView((*constants, *arrays), tuple(writer.pieces(body.regions, 1)), kept, tested)
 
 
 @dataclass(frozen=True, slots=True)
