@@ -67,7 +67,7 @@ def with_pinocchio(problem: ilqr.Problem, robot: pinocchio.Model) -> crocoddyl.S
     dynamics = [
         crocoddyl.DifferentialActionModelFreeFwdDynamics(state, actuation, c) for c in (running, final)
     ]
-    for one in dynamics:  # else Crocoddyl 3.2.1 beside Pinocchio 4.1 leaves gravity out of the accelerations
+    for one in dynamics:  # Crocoddyl 3.2.1, compiled with Pinocchio 4.0, else leaves gravity out beside 4.1
         one.armature = np.zeros(robot.nv)
     step = crocoddyl.IntegratedActionModelEuler(dynamics[0], problem.dt)
     last = crocoddyl.IntegratedActionModelEuler(dynamics[1], 0.0)

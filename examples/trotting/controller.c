@@ -8,6 +8,7 @@
 #include <osqp.h>
 #include <robot/robot.h>
 
+#include "consistent.h"
 #include "gait.h"
 #include "qp_pattern.h"
 #include "qp_workspace.h"
@@ -30,6 +31,7 @@ enum { BASE_ROWS = 0, FOOT_ROWS = ROOT, CONE_ROWS = FOOT_ROWS + FORCES, LOAD_ROW
 typedef double Matrix[ROWS][COLUMNS];
 
 static struct {
+    int method;
     double base[3], turn[4];          /* where the base is to be */
     double offset[FEET][2];           /* of the feet from the base, along the world's x and y */
     double floor[FEET];               /* z of a foot's frame on the floor */
@@ -39,11 +41,6 @@ static struct {
     Matrix A;
     double gradient[COLUMNS], lower[ROWS], upper[ROWS];
 } self;
-
-/* The dynamics of one state, from the package. */
-struct dynamics {
-    double M[RATES][RATES], h[RATES], J[FEET][6][RATES], drift[FEET][6], position[FEET][3];
-};
 
 /* CPU time of this thread: what other programs on the machine take is not counted. */
 static double seconds(void)
@@ -63,7 +60,7 @@ static void rotation(const double *quaternion, double R[3][3])
     memcpy(R, rows, sizeof rows);
 }
 
-int trot_begin(const double *q)
+int trot_begin(const double *q, int method)
 {
     static const char *const ends[FEET] = {"LF", "RF", "LH", "RH"};
     for (int k = 0; k < FEET; k++)
@@ -72,6 +69,7 @@ int trot_begin(const double *q)
     robot_forward_kinematics(q, &position[0][0], &turns[0][0][0]);
     robot_mass_matrix(q, &M[0][0]);
     memset(&self, 0, sizeof self);
+    self.method = method;
     memcpy(self.base, q, sizeof self.base);
     memcpy(self.turn, q + 3, sizeof self.turn);
     self.force_unit = M[0][0] * fabs(robot_gravity_acceleration[2]) / FEET;
@@ -200,36 +198,58 @@ static void torques(const struct dynamics *now)
     }
 }
 
+/* Torques, accelerations and forces by the quadratic programme. */
+static void by_programme(const struct dynamics *now, const double *base, double feet[FEET][3], struct command *command)
+{
+    for (int i = 0; i < ROOT; i++) self.gradient[i] = -qp_weights[i] * base[i];
+    dynamics_rows(now);
+    for (int k = 0; k < FEET; k++) {
+        foot_rows(k, feet[k], now);
+        force_rows(k);
+    }
+    const double begin = seconds();
+    command->solved = solved(&command->iterations);
+    command->qp_seconds = seconds() - begin;
+    if (command->solved) torques(now);
+    memcpy(command->acceleration, self.x, sizeof command->acceleration);
+    for (int i = 0; i < FORCES; i++) command->force[i] = self.force_unit * self.x[RATES + i];
+}
+
+/* The same by contact-consistent inverse dynamics, which knows no limits. */
+static void by_contacts(struct measurement measured, const struct dynamics *now, const double *base, double feet[FEET][3],
+                        struct command *command)
+{
+    double active[FEET], tau[RATES];
+    for (int k = 0; k < FEET; k++) active[k] = self.feet[k].on_floor;
+    command->qp_seconds = 0.0, command->iterations = 0;
+    command->solved = consistent(measured, now, base, feet, active, command->acceleration, tau, command->force) == 0;
+    if (!command->solved) return;
+    for (int i = 0; i < JOINTS; i++) self.tau[i] = fmin(fmax(tau[ROOT + i], -robot_effort_limit[1 + i]), robot_effort_limit[1 + i]);
+}
+
 void trot_step(struct measurement measured, struct command *command)
 {
     const double start = seconds();
     struct dynamics now;
-    double R[3][3], turns[FEET][3][3], base[ROOT], wanted[3];
+    double R[3][3], turns[FEET][3][3], base[ROOT], feet[FEET][3];
     rotation(measured.q + 3, R);
     robot_mass_matrix(measured.q, &now.M[0][0]);
-    robot_nonlinear_effects(measured.q, measured.v, now.h);
     robot_forward_kinematics(measured.q, &now.position[0][0], &turns[0][0][0]);
     robot_frame_jacobian(measured.q, &now.J[0][0][0]);
     robot_jacobian_dot_qd(measured.q, measured.v, &now.drift[0][0]);
 
     base_acceleration(measured, R, base);
-    for (int i = 0; i < ROOT; i++) self.gradient[i] = -qp_weights[i] * base[i];
-    dynamics_rows(&now);
     for (int k = 0; k < FEET; k++) {
-        foot_acceleration(k, measured, R, &now, wanted);
-        foot_rows(k, wanted, &now);
-        force_rows(k);
+        foot_acceleration(k, measured, R, &now, feet[k]);
         command->stance[k] = self.feet[k].on_floor;
     }
-
-    const double begin = seconds();
-    command->solved = solved(&command->iterations);
-    const double end = seconds();
-    if (command->solved) torques(&now);
+    if (self.method == BY_CONTACTS) {
+        by_contacts(measured, &now, base, feet, command);
+    } else {
+        robot_nonlinear_effects(measured.q, measured.v, now.h);
+        by_programme(&now, base, feet, command);
+    }
     memcpy(command->tau, self.tau, sizeof self.tau);
-    memcpy(command->acceleration, self.x, sizeof command->acceleration);
-    for (int i = 0; i < FORCES; i++) command->force[i] = self.force_unit * self.x[RATES + i];
-    command->qp_seconds = end - begin;
     command->whole_seconds = seconds() - start;
 }
 

@@ -1,7 +1,8 @@
 /* A whole-body controller that makes a quadruped trot in place, to be called at a fixed rate with what was just measured.
 
-   Every call solves one quadratic programme for the accelerations of all 18 rates and the forces at the four feet. Nothing
-   allocates or blocks. SI units; the world's z is up, and the floor is z = 0. */
+   Every call computes accelerations of all 18 rates, forces at the four feet, and torques, by one of two methods. The
+   quadratic programme keeps forces within friction pyramids and torques within limits. Contact-consistent inverse dynamics
+   solves equations alone. Nothing allocates or blocks. SI units; the world's z is up, and the floor is z = 0. */
 #ifndef CONTROLLER_H
 #define CONTROLLER_H
 
@@ -16,17 +17,19 @@ struct measurement {
 struct command {
     double tau[JOINTS];        /* N m, within the package's robot_effort_limit */
     double acceleration[RATES];
-    double force[FORCES];      /* N, on the feet, along the world's axes: what the QP counts on */
+    double force[FORCES];      /* N, on the feet, along the world's axes: what the method counts on */
     int stance[FEET];          /* whether the gait has the foot on the floor */
-    double qp_seconds;         /* CPU time, from the first of the QP's numbers to its solution */
+    double qp_seconds;         /* CPU time, from the first of the QP's numbers to its solution; 0 without QP */
     double whole_seconds;      /* CPU time of the whole call */
     int iterations;
     int solved;                /* 0: the torques are those of the call before */
 };
 
+enum { BY_PROGRAMME, BY_CONTACTS };
+
 /* Begins with all feet on the floor where they are; the base is to stay where it is. 0, or -1 where
    the package's frames are not left fore, right fore, left hind, right hind foot: LF..., RF..., LH..., RH... */
-int trot_begin(const double *q);
+int trot_begin(const double *q, int method);
 
 /* The torques from now on. */
 void trot_step(struct measurement measured, struct command *command);

@@ -24,8 +24,9 @@ class Controller:
         self._library: Any = self._ffi.dlopen(str((package / "trot" / "libtrot.so").resolve()))
         self._command = self._ffi.new("struct command *")
 
-    def begin(self, q: Array) -> None:
-        if self._library.trot_begin(self._reals(q)):
+    def begin(self, q: Array, method: str = "BY_PROGRAMME") -> None:
+        """`method` is one of those that controller.h names."""
+        if self._library.trot_begin(self._reals(q), getattr(self._library, method)):
             raise SystemExit("the package's frames are not feet named LF, RF, LH, RH, in this order")
 
     def step(self, time: float, q: Array, v: Array) -> Any:

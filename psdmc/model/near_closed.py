@@ -28,6 +28,9 @@ BACK, SHORT = 5, 1e-5
 """From each position kept, so many Newton steps of passive joints end with one below this length (rad or m). Positions near
 dead points need more steps."""
 
+REGULAR = 1e-4
+"""Each row of the passive joints' Jacobian has at least this share of its square that the rows after it do not explain."""
+
 CLOSED = 1e-9
 """m, or rad: largest error of closed loops."""
 
@@ -44,33 +47,36 @@ def near_closed(robot: Mechanism, rng: np.random.Generator, count: int) -> Array
     away = AWAY * away[:, passive] / np.abs(away).max()
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
-            q, _ = _stepped(frames, loops, q, range(robot.nv), damping=1.0)
+            q, _, _ = _stepped(frames, loops, q, range(robot.nv), damping=1.0)
         closed = np.abs(_rows(loop_error(frames, loops, list(q.T)), q)).max(axis=1) < CLOSED
         displaced = np.zeros((STARTS, robot.nv))
         displaced[:, passive] = away
         q = back = _rows(integrated(frames, list(q.T), list(displaced.T)), q)
         for _ in range(BACK):
-            back, size = _stepped(frames, loops, back, passive, damping=0.0)
-        closed &= size < SHORT * SHORT
+            back, size, share = _stepped(frames, loops, back, passive, damping=0.0)
+        closed &= (size < SHORT * SHORT) & (share > REGULAR)
     return np.resize(q[closed] if closed.any() else q, (count, robot.nq))
 
 
 def _stepped(
     frames: Sequence[Frame], loops: Sequence[Loop], q: Array, moving: Sequence[int], damping: float
-) -> tuple[Array, Array]:
-    """q after one Newton step of these rates, and the step's squared length before it was shortened."""
+) -> tuple[Array, Array, Array]:
+    """q after one Newton step of these rates, the step's squared length before it was shortened, and the smallest share of a
+    row's square that the rows after it do not explain."""
     errors = loop_error(frames, loops, list(q.T))
     rows = [[row[k] for k in moving] for row in loop_jacobian(frames, loops, list(q.T))]
     wide = [[inner_product(a, b) for b in rows] for a in rows]
     for k, error in enumerate(errors):
         wide[k][k] = wide[k][k] + damping * error * error
-    shares = solve(factorize(wide), errors)
+    factors = factorize(wide)
+    shares = solve(factors, errors)
+    rest = [pivot / wide[k][k] for k, pivot in enumerate(factors.pivots)]
     step = np.zeros((len(q), sum(frame.joint.nv for frame in frames if frame.follows is None)))
     step[:, list(moving)] = -_rows([inner_product(column, shares) for column in zip(*rows, strict=True)], q)
     size = np.sum(step * step, axis=1)
     step *= np.minimum(1.0, LONGEST / np.sqrt(size))[:, None]
     step[~np.isfinite(size)] = 0.0
-    return _rows(integrated(frames, list(q.T), list(step.T)), q), size
+    return _rows(integrated(frames, list(q.T), list(step.T)), q), size, _rows(rest, q).min(axis=1)
 
 
 def _rows(values: Sequence[Scalar], q: Array) -> Array:

@@ -15,6 +15,10 @@ from psdmc.program.operations import Op
 
 Row = list[Scalar]
 
+MARGIN = 1.0 / 64.0
+"""A row's orthogonal part is kept if its square times this counts in the square of the row. Rounding, divided by the size
+of the smallest kept part, is then a 64th of the bound, so it does not make a dependent row look independent."""
+
 
 class _Orthogonal(NamedTuple):
     """Vectors v_k = q_k + sum over j < k of shares[k][j] q_j, with orthogonal q.
@@ -38,8 +42,7 @@ def least_squares(rows: Sequence[Row], right: Sequence[Scalar], shift: Scalar) -
     shift  0 or more, without unit
 
     A row is treated as dependent on the rows before it if its part orthogonal to them is too short: shorter than about
-    1e-8 of the row in float64, or 2e-4 in float32. Then rounding loses the square of the part in the square of the
-    row. For every rank of A, the code executes the same operations.
+    1e-7 of the row in float64, or 2e-3 in float32. For every rank of A, the code executes the same operations.
 
     A = L Q, with orthogonal rows of Q. Then y = Q x minimises |L y - b|. L is lower triangular with ones on its diagonal,
     except for a zero column for each dependent row. If there is none, y follows by substitution. To include the shift,
@@ -76,8 +79,9 @@ def _orthogonal(vectors: Sequence[Row], weights: Sequence[Scalar], kept: Row | N
         size = _weighted(weights, own, own)
         if kept is None:
             whole = _weighted(weights, vector, vector)
-            keep = Op.SELECT(whole, whole + size, 1.0, 0.0)
-            size = Op.SELECT(whole, whole + size, size, 1.0)
+            more = whole + MARGIN * size
+            keep = Op.SELECT(whole, more, 1.0, 0.0)
+            size = Op.SELECT(whole, more, size, 1.0)
         else:
             keep = kept[k]
             size = size + (1.0 - keep)

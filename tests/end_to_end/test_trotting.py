@@ -1,4 +1,5 @@
-"""examples/trotting: a quadruped in MuJoCo under the whole-body controller in C, held against Pinocchio and MuJoCo.
+"""examples/trotting: a quadruped in MuJoCo under the whole-body controller in C, by its two methods, held against Pinocchio
+and MuJoCo.
 
 PSDMC_TREES=whole (make test-trees): ten seconds with a push; else (make test-slow) two without one."""
 
@@ -27,11 +28,12 @@ WITHIN = 0.05
 FROM = 0.75
 """s; all feet have begun to step, and whole periods of half a second follow."""
 GRAVITY = 9.81
+METHODS = ("quadratic programme", "inverse dynamics")
 
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The example's modules, its folder, model, world, controller and one run."""
+    """The example's modules, its folder, model, world, controller, and one run of each method."""
     if shutil.which("make") is None:
         pytest.skip("make is not installed")
     folder = tmp_path_factory.mktemp("trotting")
@@ -44,13 +46,14 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
         model, package = trot.prepared(folder, urdf)
         world = trot.World(urdf.read_text(), trot.BASE, model.joint_names[1:], trot.FEET)
         controller = trot.Controller(package)
-        run = trot.trot(world, controller, trot.standing(model), SECONDS, PUSH)
-        yield {"trot": trot, "folder": folder, "model": model, "world": world, "run": run}
+        start = trot.standing(model)
+        runs = {name: trot.trot(world, controller, start, SECONDS, PUSH, name) for name in METHODS}
+        yield {"trot": trot, "folder": folder, "world": world, "controller": controller, "runs": runs}
 
 
-@pytest.fixture(scope="module")
-def run(example: Any) -> Any:
-    return example["run"]
+@pytest.fixture(scope="module", params=METHODS)
+def run(example: Any, request: pytest.FixtureRequest) -> Any:
+    return example["runs"][request.param]
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +106,8 @@ def test_the_floor_carries_the_robot(run: Any, oracle: Any) -> None:
 
 
 def test_each_solution_obeys_pinocchios_dynamics(run: Any, oracle: Any) -> None:
-    """rnea(q, v, the QP's accelerations) less its forces on the feet is zero on the base and the torques on the joints; feet
-    on the floor push within the cone of friction, and feet in the air do not."""
+    """rnea(q, v, the controller's accelerations) less its forces on the feet is zero on the base and the torques on the
+    joints; feet in the air do not push."""
     model, data, feet = oracle
     weight = pin.computeTotalMass(model) * GRAVITY
     for i in range(0, len(run.time), 37):
@@ -115,9 +118,28 @@ def test_each_solution_obeys_pinocchios_dynamics(run: Any, oracle: Any) -> None:
             needed -= aligned[:3].T @ run.force[i, k]
         np.testing.assert_allclose(needed[:6], 0.0, atol=1e-3 * weight)
         np.testing.assert_allclose(needed[6:], run.tau[i], atol=1e-3 * weight)
-    x, y, z = np.moveaxis(run.force, -1, 0)
-    assert np.all(np.maximum(np.abs(x), np.abs(y)) <= 0.5 * z + 1e-3 * weight)
-    assert np.abs(z[run.stance == 0]).max() < 1e-3 * weight
+    assert np.abs(run.force[run.stance == 0]).max() < 1e-3 * weight
+
+
+def test_the_programme_keeps_forces_within_friction(example: Any, oracle: Any) -> None:
+    x, y, z = np.moveaxis(example["runs"]["quadratic programme"].force, -1, 0)
+    assert np.all(
+        np.maximum(np.abs(x), np.abs(y)) <= 0.5 * z + 1e-3 * pin.computeTotalMass(oracle[0]) * GRAVITY
+    )
+
+
+def test_methods_agree_where_no_limit_is_reached(example: Any) -> None:
+    """At the states of an undisturbed second, OSQP's solution is that of inverse dynamics, but for its small weights of
+    joints and forces."""
+    run, controller = example["runs"]["quadratic programme"], example["controller"]
+    controller.begin(run.q[0], "BY_CONTACTS")
+    for i in range(1000):
+        command = controller.step(run.time[i], run.q[i], run.v[i])
+        assert command.solved
+        np.testing.assert_allclose(
+            controller.array(command.acceleration)[:6], run.acceleration[i, :6], atol=0.01
+        )
+        np.testing.assert_allclose(controller.array(command.tau), run.tau[i], atol=0.5)
 
 
 def test_its_states_are_pinocchios(example: Any, oracle: Any) -> None:
@@ -138,18 +160,20 @@ def test_its_states_are_pinocchios(example: Any, oracle: Any) -> None:
 def test_the_command_says_how_it_went(
     example: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any, tmp_path: Path
 ) -> None:
-    picture = tmp_path / "trot.png"
-    words = ["trot.py", "--seconds", "0.6", "--folder", str(example["folder"]), "--plot", str(picture)]
-    monkeypatch.setattr(sys, "argv", words)
+    picture, moving = tmp_path / "trot.png", tmp_path / "trot.gif"
+    words = ["trot.py", "--seconds", "0.6", "--folder", str(example["folder"])]
+    monkeypatch.setattr(sys, "argv", [*words, "--plot", str(picture), "--animation", str(moving)])
     example["trot"].main()
     said = capsys.readouterr().out.splitlines()
 
     assert said[0] == "600 calls, 0.6 s, 2 steps"
-    assert said[1].startswith("base: at most 0.")
-    assert said[3].startswith("QP: 0 not solved")
-    assert said[4].startswith("QP: ")
-    assert said[4].endswith("us (99th percentile)")
+    assert said[1].split("  ")[-1].strip() == METHODS[1]
+    rows = {line[:34].strip(): line[34:].split() for line in said[2:-2]}
+    assert all(float(entry) < 1.0 for entry in rows["base from its start, at most (cm)"])
+    assert rows["calls without a solution"] == ["0", "0"]
+    assert rows["QP iterations, at most"][1] == "0"
     assert picture.stat().st_size > 10_000
+    assert moving.read_bytes().startswith(b"GIF89a")
 
 
 @pytest.mark.parametrize(
@@ -169,5 +193,5 @@ def test_a_package_of_another_robot_is_refused(
     assert old in changed.read_text()
     changed.write_text(changed.read_text().replace(old, new))
     with pytest.raises((SystemExit, subprocess.CalledProcessError)) as refused:
-        example["trot"].Controller(tmp_path / "other").begin(example["run"].q[0])
+        example["trot"].Controller(tmp_path / "other").begin(np.zeros(19))
     assert said in str(refused.value) + capfd.readouterr().err

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from loop_trees import loop_tree
+from psdmc.verification.source import with_passive_joints
 from slow_cases import slow_but_for
 from test_closed_loops import FOUR_BAR, GROUND, PIN, assembled, four_bar
 from test_loop_error import TREES
@@ -21,7 +23,6 @@ from psdmc.model.near_closed import near_closed
 from psdmc.recipes.passive import closer
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.verification.source import with_passive_joints
 
 CRANKS = np.linspace(-3.0, 3.0, 25)
 
@@ -152,3 +153,28 @@ def test_a_passive_ball_joint_turns_against_its_crank(tmp_path: Path) -> None:
     for robot in (model, psdmc.compile(model, functions=["assemble"])):
         found = robot.assemble(model.integrate(closed, away))
         np.testing.assert_allclose(found, closed, atol=1e-14)
+
+
+def test_a_palletiser_closes_as_its_parallelograms_do() -> None:
+    """Opposite bars of a parallelogram are parallel: each passive joint has the sum of motors' angles that keeps them so."""
+    folder = Path("examples/palletiser")
+    sums = {
+        "elbow": (-1, 1),
+        "wrist_joint": (0, -1),
+        "triangle_joint": (-1, 0),
+        "upper_link_joint": (0, 1),
+        "rod_joint": (1, -1),
+        "lower_link_joint": (1, 0),
+    }
+    tables = tomllib.loads((folder / "palletiser_loops.toml").read_text(encoding="utf-8"))["loop"]
+    loops = [table | {"follows": [], "passive": list(sums)} for table in tables]
+    model = psdmc.derive(folder / "palletiser.urdf", loops=loops, expand=False)
+    names = list(model.mechanism.q_names)
+    closed = np.zeros((9, len(names)))
+    motors = np.random.default_rng(2).uniform(-0.5, 0.5, (9, 2))
+    closed[:, [names.index("axis_2"), names.index("axis_3")]] = motors
+    for name, shares in sums.items():
+        closed[:, names.index(name)] = motors @ shares
+    passive = np.isin(names, list(sums))
+    guess = closed + 0.2 * passive * np.random.default_rng(3).uniform(-1.0, 1.0, closed.shape)
+    np.testing.assert_allclose(model.assemble(guess), closed, rtol=0.0, atol=1e-12)

@@ -4,6 +4,7 @@ forward dynamics with contacts."""
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from against_pinocchio import EVERY, matches_pinocchio
 from contact_trees import BRICK, ContactTree, brick, contact_tree, floating_gripper
@@ -18,6 +19,7 @@ from psdmc.backends.options import EmitOptions
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
 from psdmc.lower.kernels import lower
+from psdmc.recipes.least_squares import least_squares
 
 NAME = "contact_inverse_dynamics"
 ROUNDING = {"float64": 2.2e-16, "float32": 1.2e-7}
@@ -65,6 +67,26 @@ def test_trees_with_every_mask_have_the_least_squares_solution(seed: int, real: 
             assert np.abs(found.tau - expected["tau"]).max() < bound * np.abs(expected["tau"]).max()
             inactive = np.repeat(given["active"], own.loaded.mechanism.rows_of_contacts, axis=1) == 0.0
             assert not found.forces[inactive].any()
+
+
+def test_two_feet_on_an_almost_level_line() -> None:
+    """The five rows of A before the last are dependent but for the slope of the line, which is about as small as the bound
+    for dependent rows. An SVD with this bound has the same solution."""
+    rng = np.random.default_rng(0)
+    rows, right, expected = [], [], []
+    for slope, angle in zip(
+        10.0 ** rng.uniform(-10.0, -4.0, 4000), rng.uniform(0.0, 2.0 * np.pi, 4000), strict=True
+    ):
+        along = 0.4 * np.array([np.cos(angle), np.sin(angle), slope])
+        feet = [pin.skew(np.array([0.02, -0.03, -0.45]) + sign * along) for sign in (1.0, -1.0)]
+        rows.append(np.hstack([np.vstack([np.eye(3), turns]) for turns in feet]))
+        right.append(rng.standard_normal(6) * [300.0, 300.0, 300.0, 50.0, 50.0, 50.0])
+        expected.append(np.linalg.lstsq(rows[-1], right[-1], rcond=1e-8)[0])
+    entries = np.moveaxis(rows, 0, -1)
+    found = np.transpose(
+        least_squares([list(row) for row in entries], list(np.transpose(right)), np.zeros(4000))
+    )
+    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_forward_dynamics_gives_the_motion_back() -> None:
