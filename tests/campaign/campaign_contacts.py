@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 from direct import Direct
 from mimic_trees import FOOT, TRUNK, as_urdf, placed
-from psdmc.verification.source import with_passive_joints
+from psdmc.verification.check import with_passive_joints
 from random_trees import RandomTree
 from unoptimised import compiled
 

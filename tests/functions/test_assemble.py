@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from loop_trees import loop_tree
-from psdmc.verification.source import with_passive_joints
+from psdmc.verification.check import with_passive_joints
 from slow_cases import slow_but_for
 from test_closed_loops import FOUR_BAR, GROUND, PIN, assembled, four_bar
 from test_loop_error import TREES

@@ -30,7 +30,7 @@ BODY = (
 OF_THE_TIP = {
     recipe.title
     for recipe in RECIPES.values()
-    if {"frames", "contacts", "contact_rows"}
+    if {"frames", "contacts", "contact_rows", "constraint_rows"}
     & {axis for each in (*recipe.signature.inputs, *recipe.signature.outputs) for axis in each.axes}
 } | {"Jacobian"}
 """Functions that a frame's place matters to."""
