@@ -17,7 +17,6 @@ import numpy as np
 import pinocchio as pin
 from direct import Direct
 from mimic_trees import FOOT, TRUNK, as_urdf, placed
-from psdmc.verification.check import with_passive_joints
 from random_trees import RandomTree
 from unoptimised import compiled
 
@@ -37,6 +36,7 @@ from psdmc.robot.reference import Reference, reference
 from psdmc.robot.source_words import SPACE, STANDS_FOR_BALL
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
+from psdmc.verification.check import with_passive_joints
 
 Array = np.ndarray
 

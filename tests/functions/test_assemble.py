@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from loop_trees import loop_tree
-from psdmc.verification.check import with_passive_joints
 from slow_cases import slow_but_for
 from test_closed_loops import FOUR_BAR, GROUND, PIN, assembled, four_bar
 from test_loop_error import TREES
@@ -23,6 +22,7 @@ from psdmc.model.near_closed import near_closed
 from psdmc.recipes.passive import closer
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
+from psdmc.verification.check import with_passive_joints
 
 CRANKS = np.linspace(-3.0, 3.0, 25)
 
