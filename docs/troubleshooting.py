@@ -14,7 +14,7 @@ PAGE = Path(__file__).parent / "how-to/troubleshooting.md"
 class Entry:
     """A message that a user meets.
 
-    part     text that the message contains
+    part     text that the message contains; each … stands for a value of the user's
     cause    why psdmc prints it
     remedy   what to type or to change
     typed    a command that prints it, on the files that the test makes
@@ -120,13 +120,13 @@ ROBOT_FILES = (
         "derive arm.urdf --frames hand",
     ),
     Entry(
-        "link 'hand' does not exist",
+        "link '…' does not exist",
         "`--tip` or `--base` names no link.",
         "Choose one of the links that the hint lists.",
         "derive arm.urdf --tip hand",
     ),
     Entry(
-        "--lock 'elbow' is no JOINT=VALUE",
+        "--lock '…' is no JOINT=VALUE",
         "The locked joint has no value.",
         "Write `--lock elbow=0.5`, in rad or m.",
         "derive arm.urdf --lock elbow",
@@ -160,6 +160,12 @@ ROBOT_FILES = (
         "The file is a DH table, which has only one chain.",
         "Leave out `--base` and `--tip`.",
         "derive examples/robots/kr6.toml --tip link3",
+    ),
+    Entry(
+        "redundant rows:",
+        "A closed loop prevents motions that joints or other rows of the loop prevent already.",
+        "Leave out the rows that the message names ([Closed loops](loops.md)).",
+        "derive arm.urdf --loops loop.toml",
     ),
     Entry(
         "is not of the form NAME:=VALUE",
@@ -222,21 +228,21 @@ PACKAGES = (
         "emit-c arm.npz -o mine",
     ),
     Entry(
-        "real is 'float16'",
+        "real is '…'",
         "psdmc does not know the value of `--real`.",
         "Choose `float64` or `float32`.",
         "emit-c arm.npz --real float16",
     ),
     Entry(
-        "target is 'riscv'",
+        "target is '…'",
         "psdmc does not know the value of `--target`.",
         "Choose a target that the hint lists. The target `scalar` works with any C99 compiler.",
         "emit-c arm.npz --target riscv",
     ),
     Entry(
         "there is no adapter",
-        "The adapters of `--with` are for CasADi.",
-        "Write `--with casadi` or `--with casadi_theta`.",
+        "psdmc has no adapter with the name that you gave to `--with`.",
+        "Choose a name that the hint lists ([all adapters](adapters.md)).",
         "emit-c arm.npz --with acados",
     ),
     Entry(
@@ -275,7 +281,7 @@ LOGS = (
     Entry(
         "without limits to move within",
         "`excite` needs limits of speed and acceleration.",
-        "Give `--acceleration` (rad/s^2) and `--speed` (rad/s).",
+        "Give limits in rad/s^2 and rad/s: `--acceleration 5 --speed shoulder=2,elbow=2`.",
         "excite arm.npz -o campaign",
     ),
     Entry(
@@ -300,7 +306,7 @@ LOGS = (
 
 ARRAYS = (
     Entry(
-        "expected (..., 2)",
+        "has shape …, expected (...,",
         "The last axis of the array does not have one entry per joint.",
         "Give an array of shape (..., n) for n joints.",
         "robot.gravity([0, 0, 0])",
@@ -324,10 +330,16 @@ ARRAYS = (
         "robot.gravity([0, 0], theta_b=[1.0])",
     ),
     Entry(
-        "out for g has shape",
+        "out for … has shape",
         "The array that you passed as `out` has the wrong shape.",
         "Pass an array with the shape in the hint.",
         "robot.gravity(np.zeros((2, 2)), out=np.zeros(2))",
+    ),
+    Entry(
+        "is not positive definite at mu = 0",
+        "The active contacts or closed loops block more motions than the robot has.",
+        "Pass `mu=1e-6`, or activate fewer contacts ([redundant contacts](contacts.md#redundant-contacts)).",
+        "scara.constrained_forward_dynamics(*np.zeros((3, 4)), [1])",
     ),
     Entry(
         "is a masked array",
@@ -348,7 +360,7 @@ ARRAYS = (
         "psdmc.compile('examples/robots/two_link.toml')",
     ),
     Entry(
-        "payload mass is -1.0",
+        "payload mass is …",
         "The mass of the load is negative.",
         "Give a positive mass in kg.",
         "model.with_payload(-1, [0, 0, 0])",
@@ -392,7 +404,7 @@ AFTER = """## When nothing here fits
 
 - Run `psdmc doctor` to see which compilers and optional packages psdmc finds.
 - Run `psdmc COMMAND --help` to see all options of a command, with units and defaults.
-- Run `psdmc show FILE` to see the joints, limits, gravity and base parameters of a robot file or model.
+- Run `psdmc show FILE` to see the joints and masses of a robot file, or the joints, gravity and base parameters of a model.
 - If a message begins with "internal error", psdmc has a bug. Report the message, with the robot file or log.
 """
 

@@ -71,7 +71,10 @@ def excite(
     ] = None,
     speed: Annotated[
         list[str] | None,
-        typer.Option(metavar="JOINT=V,...", help="lower speed limit of a joint, rad/s or m/s"),
+        typer.Option(
+            metavar="JOINT=V,...",
+            help="speed limit of a joint, rad/s or m/s, if the robot file has none or a higher one",
+        ),
     ] = None,
     acceleration: Annotated[
         list[str] | None,
