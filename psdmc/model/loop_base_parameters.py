@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.closed_loops import loop_drift, loop_error, loop_jacobian
+from psdmc.dynamics.closed_loops import ANGULAR, loop_drift, loop_error, loop_jacobian
 from psdmc.dynamics.frames import Frame, frames_of
 from psdmc.dynamics.manifold import integrated, restored
 from psdmc.dynamics.scalar import Scalar
@@ -30,7 +30,7 @@ from psdmc.model.random_states import RANGES
 from psdmc.reproducible import lengths, times, triangle_solved
 from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import Array, Mechanism, frozen_array
+from psdmc.robot.mechanism import Array, Loop, Mechanism, frozen_array
 
 SEED, STARTS, STEPS = 29_199, 64, 40
 """Seed of random numbers; positions from which the loops are closed, and Newton steps of each."""
@@ -38,15 +38,16 @@ SEED, STARTS, STEPS = 29_199, 64, 40
 LONGEST = 0.5
 """rad or m: the largest change of a coordinate in a Newton step."""
 
-CLOSED = 1e-11
-"""rad or m: error of closed loops."""
+CLOSED, STILL = 1e-11, 1e-8
+"""rad or m: error of closed loops, and a Newton step after which only rounding is left of it."""
 
-DEPENDENT, REGULAR = 1e-7, 1e-2
+DEPENDENT, REGULAR = 1e-7, 2e-2
 """Share of a row of the loops' Jacobian that the rows before it do not explain. Below the first, the row is redundant. Between
 both, the position is near a dead point, where rounding grows."""
 
-WALK, STRIDE, CORRECTIONS = 32, 0.25, 4
-"""Steps from the closed position to the random ones; rad or m of a step; Newton steps that close the loops again."""
+WALK, STRIDE, CORRECTIONS = 24, 0.25, 4
+"""Steps from the closed position to the random ones; rad or m of a step; at most so many Newton steps close the
+loops again."""
 
 STATES, ROWS = 32, 4
 """Random states at least; equations at least for each base parameter of the tree."""
@@ -117,14 +118,12 @@ class LoopBaseParameters:
 
 
 def _as_text(row: Array) -> str:
-    terms = [
-        ("- " if value < 0.0 else "+ ")
-        + ("" if abs(value) == 1.0 else f"{abs(value):.6g} ")
-        + f"theta_b[{k}]"
-        for k, value in enumerate(row.tolist())
-        if value
-    ]
-    text = " ".join(terms)
+    factors = [f"{abs(value):.6g}" for value in row.tolist()]
+    text = " ".join(
+        f"{'-' if row[k] < 0.0 else '+'} {'' if factor == '1' else factor + ' '}theta_b[{k}]"
+        for k, factor in enumerate(factors)
+        if row[k]
+    )
     return text[2:] if text.startswith("+ ") else f"-{text[2:]}"
 
 
@@ -165,9 +164,9 @@ def _sampled(robot: Mechanism, representative: Array) -> tuple[Array, Array]:
     q = _closed_positions(robot, frames, rng, count)
     qd, qdd = (limit * rng.uniform(-1.0, 1.0, (nv, count)) for limit in RANGES[1:])
     rows = _jacobian(robot, frames, q)
-    qd = _allowed(rows, np.zeros(rows.shape[::2]), qd).motion
+    qd = _allowed(robot.loops, rows, np.zeros(rows.shape[::2]), qd).motion
     drift = _over(loop_drift(frames, robot.loops, list(q), list(qd)), count)
-    allowed = _allowed(rows, drift, qdd)
+    allowed = _allowed(robot.loops, rows, drift, qdd)
     wanted = np.flatnonzero(representative.any(axis=1))
     tree = recursive.link_regressor(robot, wanted.tolist(), [q.T, qd.T, allowed.motion.T])
     closed = tree.transpose(1, 2, 0).copy()  # rate, parameter, state
@@ -196,15 +195,17 @@ class _Allowed(NamedTuple):
     share: Array
 
 
-def _allowed(rows: Array, bias: Array, wanted: Array) -> _Allowed:
+def _allowed(loops: Sequence[Loop], rows: Array, bias: Array, wanted: Array) -> _Allowed:
     """Motion that loops with the Jacobian `rows` (rows, nv, states) allow, by orthonormal rows (Gram-Schmidt)."""
-    norms = np.sqrt(np.add.reduce(rows * rows, axis=1))
-    norms = np.maximum(norms, TOLERANCE * norms.max(axis=0, initial=1e-300))
+    sizes = np.add.reduce(rows * rows, axis=1)
+    kinds = np.array([(number, row >= ANGULAR) for number, loop in enumerate(loops) for row in loop.rows])
+    # A row can be zero in a dead point, so it is compared with all linear or angular rows of its loop.
+    norms = [np.sqrt(np.add.reduce(sizes[(kinds == kind).all(axis=1)])) for kind in kinds]
     known: list[Array] = []
     shifts: list[Array] = []
     shares = np.ones(rows.shape[2])
     for row, norm, own in zip(rows, norms, bias, strict=True):
-        rest, shift = row / norm, own / norm
+        rest, shift = (each / np.maximum(norm, 1e-300) for each in (row, own))
         for _ in range(2):  # twice, so that rounding of the first pass is removed, too
             for direction, other in zip(known, shifts, strict=True):
                 part = np.add.reduce(direction * rest)
@@ -239,7 +240,7 @@ def _moved(frames: Sequence[Frame], q: Array, step: Array) -> Array:
 def _newton(robot: Mechanism, frames: Sequence[Frame], q: Array) -> tuple[Array, Array, Array]:
     """q after a Newton step of all joints towards closed loops, the step's largest entry, and the share of `_Allowed`."""
     errors = _over(loop_error(frames, robot.loops, list(q)), q.shape[1])
-    step, _, share = _allowed(_jacobian(robot, frames, q), errors, np.zeros((robot.nv, q.shape[1])))
+    step, _, share = _allowed(robot.loops, _jacobian(robot, frames, q), errors, np.zeros((robot.nv, q.shape[1])))
     size = np.abs(step).max(axis=0, initial=0.0)
     step = np.where(np.isfinite(size), step * np.minimum(1.0, LONGEST / np.maximum(size, 1e-300)), 0.0)
     return _moved(frames, q, step), size, share
@@ -259,7 +260,9 @@ def _start(robot: Mechanism, frames: Sequence[Frame], rng: np.random.Generator) 
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
             q, _, share = _newton(robot, frames, q)
-        closed = _open(robot, frames, q) < CLOSED
+            closed = _open(robot, frames, q) < CLOSED
+            if closed[0] and share[0] > REGULAR:
+                break
     if not closed.any():
         raise InputError(
             f"{shown(robot.name)}: no closed position of its loops is found near the zero position",
@@ -288,13 +291,15 @@ def _closed_positions(
     with np.errstate(all="ignore"):
         for _ in range(WALK):
             wanted = goal + 0.5 * rng.uniform(-1.0, 1.0, goal.shape)
-            way = _allowed(_jacobian(robot, frames, q), none, wanted).motion
+            way = _allowed(robot.loops, _jacobian(robot, frames, q), none, wanted).motion
             way *= stride / np.maximum(np.abs(way).max(axis=0, initial=0.0), 1e-300)
             there, size, shares = _newton(robot, frames, _moved(frames, q, way))
             fits = (size < 0.25 * stride) & (shares > least)
             for _ in range(CORRECTIONS):
-                there, _, _ = _newton(robot, frames, there)
-            fits &= _open(robot, frames, there) < CLOSED
+                there, size, _ = _newton(robot, frames, there)
+                if not (size[fits] > STILL).any():
+                    break
+            fits &= (size < STILL) & (_open(robot, frames, there) < CLOSED)
             q = np.where(fits, there, q)
             goal = np.where(fits, goal, -goal)
             stride = np.where(fits, np.minimum(STRIDE, 1.5 * stride), 0.5 * stride)
