@@ -151,7 +151,9 @@ def print_loop_base_parameters(model: DynamicsModel, combinations: bool = False)
     print_line(str(found))
     if not combinations:
         return
-    several = [(str(k), text) for k, text in zip(found.kept, found.combinations(), strict=True) if " " in text]
+    several = [
+        (str(k), text) for k, text in zip(found.kept, found.combinations(), strict=True) if " " in text
+    ]
     if several:
         alone = found.count - len(several)
         print_line(f"{alone} of them can be identified alone, and {len(several)} in these combinations:")

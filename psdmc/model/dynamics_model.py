@@ -161,11 +161,12 @@ class DynamicsModel(Answers):
 
     @property
     def loop_base_parameters(self) -> LoopBaseParameters:
-        """Return the combinations of base parameters that torques of a mechanism with closed loops identify.
+        """Return the combinations of base parameters that the motors' torques identify, for a mechanism with closed loops.
 
-        The torques are those of the motors, and the force and moment at a floating base. psdmc finds the combinations by the
-        numerical rank of a regressor at random states, which takes about a second. Raises InputError if no closed position
-        of the loops is found.
+        The result has the attributes `count`, `matrix` and `kept`. If the base floats, its force and moment count as torques.
+        psdmc finds the count by the numerical rank of a regressor at random states, in a few seconds. Keep the result.
+
+        Raises InputError if no closed position of the loops is found.
         """
         return loop_base_parameters(self.mechanism, self.representative)
 

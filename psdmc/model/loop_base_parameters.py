@@ -6,7 +6,7 @@ regressor Y of the tree at random states that satisfy the loops, and projects it
 For a matrix N whose columns span this motion, N^T Y theta_b are the motors' torques. The count is therefore the same for all
 choices of passive joints.
 
-Source: Khalil and Bennis, Symbolic calculation of the base inertial parameters of closed-loop robots, 1995.
+Source: Gautier, Numerical calculation of the base inertial parameters of robots, Journal of Robotic Systems 8 (1991).
 """
 
 from __future__ import annotations
@@ -240,7 +240,9 @@ def _moved(frames: Sequence[Frame], q: Array, step: Array) -> Array:
 def _newton(robot: Mechanism, frames: Sequence[Frame], q: Array) -> tuple[Array, Array, Array]:
     """q after a Newton step of all joints towards closed loops, the step's largest entry, and the share of `_Allowed`."""
     errors = _over(loop_error(frames, robot.loops, list(q)), q.shape[1])
-    step, _, share = _allowed(robot.loops, _jacobian(robot, frames, q), errors, np.zeros((robot.nv, q.shape[1])))
+    step, _, share = _allowed(
+        robot.loops, _jacobian(robot, frames, q), errors, np.zeros((robot.nv, q.shape[1]))
+    )
     size = np.abs(step).max(axis=0, initial=0.0)
     step = np.where(np.isfinite(size), step * np.minimum(1.0, LONGEST / np.maximum(size, 1e-300)), 0.0)
     return _moved(frames, q, step), size, share

@@ -43,6 +43,6 @@ def require_no_loops(chain: Mechanism, what: str) -> None:
         raise InputError(
             f"{shown(chain.name)}: {what} is of robots without closed loops: torques of its motors contain forces of loop "
             f"{shown(chain.loops[0].name)}",
-            "fit model.loop_base_parameters to your logs yourself, as docs/how-to/loops.md shows; a parallelogram needs no "
-            "forces if you leave follows = [] out",
+            "fit model.loop_base_parameters to the logs yourself (docs/how-to/loops.md), or leave out follows = [] in a "
+            "parallelogram",
         )

@@ -25,9 +25,7 @@ CRANK, COUPLER, ROCKER, BASE = 0.2, 0.5, 0.4, 0.45
 """m: sides of a four-bar linkage."""
 
 
-def linkage(
-    bars: list[tuple[str, str, float]], *pins: tuple[tuple[str, float], tuple[str, float]]
-) -> str:
+def linkage(bars: list[tuple[str, str, float]], *pins: tuple[tuple[str, float], tuple[str, float]]) -> str:
     """A planar mechanism of bars (name, parent, distance of its joint from the parent's). Each pin joins points of two
     bars."""
     joints = "".join(
@@ -213,9 +211,7 @@ def test_redundant_rows_change_nothing(tmp_path: Path) -> None:
     (loop,) = model.mechanism.loops
     redundant = replace(model.mechanism, loops=(replace(loop, rows=(0, 1, 2)), replace(loop, name="again")))
 
-    found, expected = (
-        each.loop_base_parameters for each in (replace(model, mechanism=redundant), model)
-    )
+    found, expected = (each.loop_base_parameters for each in (replace(model, mechanism=redundant), model))
 
     assert found.kept == expected.kept
     np.testing.assert_allclose(found.matrix, expected.matrix, atol=1e-12)
