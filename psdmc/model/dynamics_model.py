@@ -163,7 +163,7 @@ class DynamicsModel(Answers):
     def loop_base_parameters(self) -> LoopBaseParameters:
         """Return the combinations of base parameters that the motors' torques identify, for a mechanism with closed loops.
 
-        The result has the attributes `count`, `matrix` and `kept`. If the base floats, its force and moment count as torques.
+        The result has the attributes `count`, `matrix` and `kept`. If the base floats, its force and moment count, too.
         psdmc finds the count by the numerical rank of a regressor at random states, in a few seconds. Keep the result.
 
         Raises InputError if no closed position of the loops is found.

@@ -3,8 +3,8 @@
 The base parameters of a model are those of the open tree. The motors of a closed mechanism move fewer coordinates, and feel
 the links only through the motion that the loops allow. So their torques depend on fewer combinations. psdmc computes the
 regressor Y of the tree at random states that satisfy the loops, and projects its rows onto the motion that the loops allow.
-For a matrix N whose columns span this motion, N^T Y theta_b are the motors' torques. The count is therefore the same for all
-choices of passive joints.
+For a matrix N whose columns span this motion, N^T Y theta_b determine the motors' torques. The count is therefore the
+same for all choices of passive joints.
 
 Source: Gautier, Numerical calculation of the base inertial parameters of robots, Journal of Robotic Systems 8 (1991).
 """
@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.dynamics.closed_loops import ANGULAR, loop_drift, loop_error, loop_jacobian
 from psdmc.dynamics.frames import Frame, frames_of
@@ -42,8 +41,8 @@ CLOSED, STILL = 1e-11, 1e-8
 """rad or m: error of closed loops, and a Newton step after which only rounding is left of it."""
 
 DEPENDENT, REGULAR = 1e-7, 2e-2
-"""Share of a row of the loops' Jacobian that the rows before it do not explain. Below the first, the row is redundant. Between
-both, the position is near a dead point, where rounding grows."""
+"""Share of a row of the loops' Jacobian that the rows before it do not explain. Below the first, the row is redundant.
+Between both, the position is near a dead point, where rounding grows."""
 
 WALK, STRIDE, CORRECTIONS = 24, 0.25, 4
 """Steps from the closed position to the random ones; rad or m of a step; at most so many Newton steps close the
@@ -70,8 +69,8 @@ class LoopBaseParameters:
 
     matrix           (k, l) combinations, SI units; the columns `kept` are those of the identity
     kept             k ascending indices of base parameters that lead the combinations
-    singular_values  (l,) of the sampled regressor, in decreasing order and relative to the first one; the regressor's columns
-                     have length one
+    singular_values  (l,) of the sampled regressor, in decreasing order and relative to the first one; the columns of the
+                     regressor have length one
     """
 
     matrix: Array
@@ -163,20 +162,19 @@ def _sampled(robot: Mechanism, representative: Array) -> tuple[Array, Array]:
     rng = np.random.default_rng(SEED)
     q = _closed_positions(robot, frames, rng, count)
     qd, qdd = (limit * rng.uniform(-1.0, 1.0, (nv, count)) for limit in RANGES[1:])
-    rows = _jacobian(robot, frames, q)
-    qd = _allowed(robot.loops, rows, np.zeros(rows.shape[::2]), qd).motion
+    blocked = _jacobian(robot, frames, q)
+    qd = _allowed(robot.loops, blocked, np.zeros(blocked.shape[::2]), qd).motion
     drift = _over(loop_drift(frames, robot.loops, list(q), list(qd)), count)
-    allowed = _allowed(robot.loops, rows, drift, qdd)
+    allowed = _allowed(robot.loops, blocked, drift, qdd)
     wanted = np.flatnonzero(representative.any(axis=1))
     tree = recursive.link_regressor(robot, wanted.tolist(), [q.T, qd.T, allowed.motion.T])
     closed = tree.transpose(1, 2, 0).copy()  # rate, parameter, state
     for direction in allowed.basis:
         share = np.add.reduce(direction[:, None] * closed)
         closed -= direction[:, None] * share
-    given = representative[wanted]
-    return tuple(
-        np.asarray(times(part.reshape(-1, len(wanted)), given)) for part in (closed.transpose(2, 0, 1), tree)
-    )  # type: ignore[return-value]
+    both = (closed.transpose(2, 0, 1), tree)
+    rows, whole = (times(part.reshape(-1, len(wanted)), representative[wanted]) for part in both)
+    return rows, whole
 
 
 # Positions that close the loops. Arrays have the states along their last axis.
@@ -250,7 +248,8 @@ def _newton(robot: Mechanism, frames: Sequence[Frame], q: Array) -> tuple[Array,
 
 def _open(robot: Mechanism, frames: Sequence[Frame], q: Array) -> Array:
     errors = _over(loop_error(frames, robot.loops, list(q)), q.shape[1])
-    return np.abs(errors).max(axis=0, initial=0.0)
+    found: Array = np.abs(errors).max(axis=0, initial=0.0)
+    return found
 
 
 def _start(robot: Mechanism, frames: Sequence[Frame], rng: np.random.Generator) -> tuple[Array, float]:

@@ -74,8 +74,8 @@ def derived(text: str, tmp_path: Path) -> DynamicsModel:
 
 
 def pinocchios_rows(tree: LoopTree, spread: float = 0.6, count: int = 120) -> np.ndarray:
-    """The rows N^T Y at closed random states, with Pinocchio's regressor Y of the tree in base parameters, and an orthonormal
-    basis N of the motion that Pinocchio's Jacobian of the loops allows."""
+    """The rows N^T Y at closed random states, with Pinocchio's regressor Y of the tree in base parameters, and an
+    orthonormal basis N of the motion that Pinocchio's Jacobian of the loops allows."""
     read = with_passive_joints(tree.model, tree.loaded)
     robot = reference(read, snapped=False)
     rng, nv = np.random.default_rng(11), tree.model.nv
