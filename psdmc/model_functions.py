@@ -106,10 +106,12 @@ def evaluated(
     }
     if recipe.lack_of_loops(model.mechanism) or (recipe.needs is not None and theta_b is None):
         _admit(model, recipe.name)
-    if by_rows:
-        found = _values_by_rows(model, recipe, given, axes.sizes)
-    else:
-        found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
+    # A singular state gives an error or NaN, and no warnings of NumPy beside it.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if by_rows:
+            found = _values_by_rows(model, recipe, given, axes.sizes)
+        else:
+            found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
     if signature.raises:
         _refuse_indefinite(signature, axes, lead, found[PIVOTS], given)
     outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]

@@ -44,6 +44,7 @@ DECISIONS = {
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
+    "model/loop_base_parameters.py": "singular values, printed on the console",
     "derivation/closed_loops.py": "a refusal, and a choice after rounding",
     "recipes/contacts.py": "Pinocchio's side of a comparison",
     "functions/passive_motion.py": "Pinocchio's side of a comparison",

@@ -50,7 +50,7 @@ from psdmc.links.link_terms import PhysicalOptions, require_cvxpy
 from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
-from psdmc.robot.derivable import require_axes
+from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.limits import shown
 
 
@@ -107,6 +107,7 @@ def calibrate(
     Raises InputError if a file is missing or a log cannot be used.
     """
     require_axes(model.mechanism, "calibration")
+    require_no_loops(model.mechanism, "calibration")
     options, naming = options or CalibrateOptions(), naming or LogNaming()
     if options.physical:
         require_cvxpy()

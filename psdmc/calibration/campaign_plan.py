@@ -47,6 +47,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import linear_friction
 from psdmc.progress import Progress
 from psdmc.progress import Step as Share
+from psdmc.robot.derivable import require_no_loops
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism
 
@@ -169,6 +170,7 @@ def plan_campaign(
             f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
             "derive the model with such joints held: --lock JOINT=0",
         )
+    require_no_loops(model.mechanism, "a campaign")
     began = cpu_seconds() if began is None else began
     chain = bounded(model.mechanism, options.limits)
     for name in options.formats:

@@ -26,7 +26,7 @@ from psdmc.model.calibrated import LINEAR, Prediction, Remark
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import ROBOT_FILES, model_of
 from psdmc.progress import Progress, silent
-from psdmc.robot.derivable import require_axes
+from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Limits, Mechanism, Placement
 
@@ -61,6 +61,7 @@ def compare(
     progress("reading models")
     first = model_of(a)
     require_axes(first.mechanism, "comparison")
+    require_no_loops(first.mechanism, "comparison")
     if first.mechanism.has_followers:
         raise InputError("psdmc compares models without joints that follow others", "lock those that do")
     second = _like(first, b)

@@ -41,7 +41,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Ground
 from psdmc.model.payload import carrying_frame, load_map
 from psdmc.progress import Progress, silent
-from psdmc.robot.derivable import require_axes
+from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.inertia import six_of, standard_parameters
 
 SURE = 3.0
@@ -74,6 +74,7 @@ def identify_payload(
     Raises InputError if psdmc cannot use a log, if no joint moves in the logs, or if the model's theta_b is unknown.
     """
     require_axes(model.mechanism, "payload identification")
+    require_no_loops(model.mechanism, "payload identification")
     if model.mechanism.has_followers:
         raise InputError("payload identification is of joints that follow no other", "lock those that do")
     require_cvxpy()

@@ -133,6 +133,7 @@ def derive(
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
+    from psdmc.cli.show import print_loop_base_parameters
     from psdmc.cli.tables import print_note
     from psdmc.robot.lock import parsed as parsed_lock
 
@@ -169,6 +170,7 @@ def derive(
     print(f"{target}: {model.n} joints{own}, {sizes}, largest torque error {model.certificate.max():.1e}")
     for note in model.mechanism.notes:
         print_note(note)
+    print_loop_base_parameters(model)
     say_next("check", target)
 
 

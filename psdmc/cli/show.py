@@ -47,6 +47,7 @@ def print_model(model: DynamicsModel) -> None:
     for line in _unknowns(model):
         print_line(line)
     print()
+    print_loop_base_parameters(model, combinations=True)
     print_line(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
     for note in found.notes:
         print_note(note)
@@ -133,6 +134,42 @@ def _unknowns(model: DynamicsModel) -> list[str]:
     rows = zip(model.mechanism.joints, model.mechanism.parameters, strict=True)
     links = [joint.link_name for joint, row in rows if any(map(math.isnan, row))]
     return [f"{count} of {model.l} base parameters contain unknown parameters of {listed(links)}"]
+
+
+def print_loop_base_parameters(model: DynamicsModel, combinations: bool = False) -> None:
+    """Print how many base parameters can be identified from the motors' torques of a mechanism with closed loops.
+
+    combinations  True: print also the combinations of several base parameters that can be identified
+    """
+    if not model.loops:
+        return
+    try:
+        found = model.loop_base_parameters
+    except InputError as error:
+        print_note(f"{error.message}; psdmc cannot count the base parameters that can be identified")
+        return
+    print_line(str(found))
+    if not combinations:
+        return
+    several = [
+        (str(k), text) for k, text in zip(found.kept, found.combinations(), strict=True) if " " in text
+    ]
+    if several:
+        alone = found.count - len(several)
+        print_line(f"{alone} of them can be identified alone, and {len(several)} in these combinations:")
+        print_table(Table(("theta_b", "combination"), several, prose=True, breaks=TERMS))
+    print()
+
+
+def _loop_base_parameters_json(model: DynamicsModel) -> dict[str, Any] | None:
+    """The kept base parameters and the combinations; None for a robot without loops, or if no closed position is found."""
+    if not model.loops:
+        return None
+    try:
+        found = model.loop_base_parameters
+    except InputError:
+        return None
+    return {"count": found.count, "kept": list(found.kept), "combinations": list(found.combinations())}
 
 
 def _snapping(model: DynamicsModel) -> list[str]:
@@ -308,6 +345,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
         "monomials": None if found.sizes is None else found.sizes._asdict(),
         "entries_of_P": found.entries,
         "base_parameters": model.base_parameters.plain(),
+        "loop_base_parameters": _loop_base_parameters_json(model),
         "largest_torque_error": max(found.certificate),
         "snap_torque_change": None if values is None else [_finite(float(value)) for value in values],
         "notes": list(found.notes),

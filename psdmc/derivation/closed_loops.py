@@ -66,13 +66,29 @@ def require_closable(robot: Mechanism) -> Array:
         raise InputError(
             f"'{robot.name}': loop '{owners[worst].name}' cannot be assembled: in {STARTS} tries, the smallest gap along "
             f"{ROW_NAMES[rows[worst]]} is {abs(errors[least, worst] / scales[worst]):.2g}",
-            "correct the frames of the loop, or close fewer rows",
+            _fewer_rows(robot, owners[worst], q, owners),
         )
     q = q[found]
     _refuse_redundant(robot, q, scales)
     for loop in robot.loops:
         _refuse_one_rotation(robot, loop, q)
     return np.asarray(q)
+
+
+def _fewer_rows(robot: Mechanism, loop: Loop, q: Array, owners: Sequence[Loop]) -> str:
+    """What to change in a loop that cannot be assembled: its rows that no joint moves in, and a weld in place of a pin."""
+    sizes = np.nanmax(np.abs(_jacobian(robot, q)), axis=(0, 2))[[each is loop for each in owners]]
+    still = [
+        ROW_NAMES[row]
+        for row, size in zip(loop.rows, sizes, strict=True)
+        if size <= DEPENDENT * np.max(sizes)
+    ]
+    hint = "correct the frames of the loop, or close fewer rows"
+    if still:
+        hint += f": without {', '.join(still)}, which joints prevent already"
+    if {3, 4, 5} <= {*loop.rows}:
+        hint += "; its rows rx, ry and rz weld the frames, and a pin leaves out the one about its axis"
+    return hint
 
 
 def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:

@@ -17,6 +17,7 @@ from psdmc.model import bodies, equations, evaluate, glance, payload, recursive,
 from psdmc.model.answers import Answers
 from psdmc.model.calibrated import Calibrated
 from psdmc.model.expansion import Expansion
+from psdmc.model.loop_base_parameters import LoopBaseParameters, loop_base_parameters
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import times
@@ -157,6 +158,17 @@ class DynamicsModel(Answers):
             name: tuple(ROW_NAMES[row] for row in rows)
             for name, rows in ((loop.name, loop.rows) for loop in self.mechanism.loops)
         }
+
+    @property
+    def loop_base_parameters(self) -> LoopBaseParameters:
+        """Return the combinations of base parameters that the motors' torques identify, for a mechanism with closed loops.
+
+        The result has the attributes `count`, `matrix` and `kept`. If the base floats, its force and moment count, too.
+        psdmc finds the count by the numerical rank of a regressor at random states, in a few seconds. Keep the result.
+
+        Raises InputError if no closed position of the loops is found.
+        """
+        return loop_base_parameters(self.mechanism, self.representative)
 
     @property
     def n(self) -> int:

@@ -37,16 +37,22 @@ def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> A
     representative  (11n, l)  matrix from base parameters to standard parameters
     """
     wanted = np.flatnonzero(representative.any(axis=1)).tolist()
+    full = link_regressor(chain, wanted, arrays)
+    # BLAS: nothing of this is written, and long chains have millions of products.
+    result: Array = full @ representative[wanted]
+    return result
+
+
+def link_regressor(chain: Mechanism, wanted: Sequence[int], arrays: list[Array]) -> Array:
+    """Compute the columns `wanted` of the regressor (states, n, wanted) of the links' standard parameters (11n,), at q, qd,
+    qdd (states, n)."""
     q, qd, qdd = (list(array.T) for array in arrays)
     placements = [joint.link_frame for joint in chain.joints]
     rows = standard_regressor(
         frames_of(chain), placements, frozenset(wanted), q, qd, qdd, base_acceleration(chain)
     )
     count = len(arrays[0])
-    full = np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
-    # BLAS: nothing of this is written, and long chains have millions of products.
-    result: Array = full @ representative[wanted]
-    return result
+    return np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
 
 
 def _columns(values: Sequence[Scalar], count: int) -> Array:

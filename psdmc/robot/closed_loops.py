@@ -141,8 +141,10 @@ def _rows(value: object) -> tuple[int, ...]:
     said = f"found {shown(value)}, expected 3 (a point), 6 (all motion) or a list of {', '.join(ROW_NAMES)}"
     if not isinstance(value, list | tuple) or not value:
         raise ValueError(said)
-    if any(row not in ROW_NAMES for row in value) or len({*value}) < len(value):
+    if any(row not in ROW_NAMES for row in value):
         raise ValueError(said)
+    if len({*value}) < len(value):
+        raise ValueError(f"found {shown(value)}, which names a row twice")
     return tuple(sorted(ROW_NAMES.index(row) for row in value))
 
 

@@ -1,4 +1,4 @@
-"""Checks whether psdmc can derive a model of a robot, and whether each joint has one coordinate."""
+"""Checks whether psdmc can derive a model of a robot, whether each joint has one coordinate, and whether it has loops."""
 
 from __future__ import annotations
 
@@ -31,4 +31,18 @@ def require_axes(chain: Mechanism, what: str) -> None:
             f"{shown(chain.name)}: {what} is of joints of one coordinate each, and joint {shown(wide.name)}"
             f" {wide.type.verb}",
             "derive the model without a floating base" if chain.has_free_root else AXES,
+        )
+
+
+def require_no_loops(chain: Mechanism, what: str) -> None:
+    """Raise InputError if the mechanism has closed loops, because its motors then also carry the forces of these loops.
+
+    what  name of the operation that needs torques without such forces, such as "calibration"
+    """
+    if chain.loops:
+        raise InputError(
+            f"{shown(chain.name)}: {what} is of robots without closed loops: torques of its motors contain forces of loop "
+            f"{shown(chain.loops[0].name)}",
+            "fit model.loop_base_parameters to the logs yourself (docs/how-to/loops.md), or leave out follows = [] in a "
+            "parallelogram",
         )

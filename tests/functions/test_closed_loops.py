@@ -339,6 +339,14 @@ def test_what_cannot_be_assembled_or_holds_no_angle_is_refused(tmp_path: Path) -
         InputError, match="loop 'pin' cannot be assembled: in 256 tries, the smallest gap along x"
     ):
         four_bar(tmp_path, first=far)
+    with pytest.raises(InputError, match="cannot be assembled") as weld:
+        four_bar(tmp_path, rows=6)
+    assert weld.value.hint == (
+        "correct the frames of the loop, or close fewer rows: without y, rx, rz, which joints prevent already; its rows rx, "
+        "ry and rz weld the frames, and a pin leaves out the one about its axis"
+    )
+    with pytest.raises(InputError, match=r"rows: found \['x', 'x'\], which names a row twice"):
+        four_bar(tmp_path, rows=["x", "x"])
     with pytest.raises(InputError, match="both frames are on one body"):
         four_bar(tmp_path, first="coupler")
     with pytest.raises(InputError, match=r"loop 'pin': rows: found \['up'\], expected 3"):

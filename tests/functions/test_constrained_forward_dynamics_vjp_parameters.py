@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from against_pinocchio import INTERPRETED, bench, program_matches_pinocchio
+from contact_trees import OneByOne
+from loop_trees import four_bar_legs
+
+from psdmc.functions import RECIPES, SIGNATURES
+from psdmc.robot.reference import reference
+from psdmc.verification.check import with_passive_joints
 
 NAME = "constrained_forward_dynamics_vjp_parameters"
 
@@ -13,3 +20,34 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
     """tests/frameworks compares with differences along a direction of theta_b."""
     program_matches_pinocchio(NAME, robot)
     assert bench(robot).long_kernels[NAME].theta is False
+
+
+@pytest.mark.parametrize(
+    "made", [lambda model: model, pytest.param(OneByOne, marks=pytest.mark.slow)], ids=["NumPy", "C"]
+)
+def test_loops_and_contacts_together_have_the_slopes_of_pinocchios_dense_systems(made) -> None:
+    """Differences of Pinocchio's accelerations and forces between two robots whose bodies differ."""
+    own = four_bar_legs()
+    model, given = own.model, {name: array[:4] for name, array in own.given.items()}
+    given["active"] = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])
+    rng = np.random.default_rng(3)
+    cotangents = [rng.normal(size=(4, size)) for size in (model.nv, given["cotangent_forces"].shape[1])]
+    change, step = rng.normal(size=model.l) * np.abs(model.theta_b), 1e-3
+    read = with_passive_joints(model, own.loaded)
+
+    def weighted_by_pinocchio(h: float) -> np.ndarray:
+        x = model.mechanism.parameters.reshape(-1) + h * (model.representative @ change)
+        robot = reference(read, snapped=False, parameters=x.reshape(len(model.mechanism), -1))
+        found = RECIPES["constrained_forward_dynamics"].pinocchio(robot, given)
+        pairs = zip(cotangents, (found["qdd"], found["forces"]), strict=True)
+        return np.sum([(weights * values).sum(axis=1) for weights, values in pairs], axis=0)
+
+    first, second = (
+        (weighted_by_pinocchio(h) - weighted_by_pinocchio(-h)) / (2.0 * h) for h in (step, 2.0 * step)
+    )
+    expected = (4.0 * first - second) / 3.0
+    inputs = given | dict(zip(("cotangent_qdd", "cotangent_forces"), cotangents, strict=True))
+    states = [inputs[each.name] for each in SIGNATURES[NAME].inputs]
+    gradient = getattr(made(model), NAME)(*states).grad_theta_b
+    scale = np.abs(gradient * change).sum(axis=1)
+    assert (np.abs(gradient @ change - expected) < 1e-7 * scale).all()

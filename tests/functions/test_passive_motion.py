@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -40,3 +41,12 @@ def test_a_dead_point_of_passive_joints_names_the_row(tmp_path: Path) -> None:
             with pytest.raises(InputError, match=rf"{name}: pin\.[xz]: the passive joints do not follow"):
                 getattr(each, name)(q, np.ones(3), np.ones(3))
             assert np.isnan(getattr(each, name)(np.nan * q, np.ones(3), np.ones(3))[0]).all()
+
+
+def test_a_dead_point_warns_of_no_division(tmp_path: Path) -> None:
+    """Bars that are all in one line: the row along them is zero, and so is its pivot."""
+    model = four_bar(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InputError, match="passive joints do not follow from the others here"):
+            model.passive_motion(np.zeros(3), np.ones(3), np.zeros(3))
