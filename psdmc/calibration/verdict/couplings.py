@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -79,6 +80,27 @@ class ProposedCoupling:
     after: tuple[float, ...]
 
     @property
+    def values(self) -> dict[str, Any]:
+        """Return the proposal as plain numbers and texts, for a verdict's doubt, the report and the JSON."""
+        n = len(self.joints)
+        entries = [
+            {
+                "motor": self.joints[i],
+                "joint": self.joints[j],
+                "ratio": float(self.matrix[j, i]),
+                "std": float(self.std[j, i]),
+            }
+            for j in range(n)
+            for i in range(n)
+            if self.std[j, i] > 0.0
+        ]
+        quality = [
+            {"joint": name, "before": before, "after": after}
+            for name, before, after in zip(self.joints, self.before, self.after, strict=True)
+        ]
+        return {"items": entries, "r2": quality, "positions_of_motors": self.of_motors, "toml": self.toml}
+
+    @property
     def toml(self) -> str:
         """Return the lines of a log description that describe the coupling."""
         names = ", ".join('"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"' for name in self.joints)
@@ -106,10 +128,18 @@ def proposed_coupling(evidence: Evidence) -> ProposedCoupling | None:
     plain = samples.fitted({}, False)
     if plain.sums.freedom <= 0:
         return None
-    found, spread = max(
-        (_entries(samples, replace(plain, of_motors=kind)) for kind in (False, True)),
-        key=lambda one: plain.likelier(one[0]),
-    )
+    tried = [
+        _entries(samples, replace(plain, of_motors=kind), towards)
+        for kind in (False, True)
+        for towards in (1, -1)
+    ]
+    tried.sort(key=lambda one: plain.likelier(one[0]), reverse=True)
+    proposed = (_proposed(samples, plain, found, spread) for found, spread in tried)
+    return next((one for one in proposed if one is not None), None)
+
+
+def _proposed(samples: _Samples, plain: _Coupled, found: _Coupled, spread: Array) -> ProposedCoupling | None:
+    """The proposal of these entries; None where the coupled joints' torques are not predicted far better with them."""
     if not found.entries:
         return None
     places = sorted({k for entry in found.entries for k in entry})
@@ -117,12 +147,12 @@ def proposed_coupling(evidence: Evidence) -> ProposedCoupling | None:
     left = (1.0 - after) / np.maximum(1.0 - before, 1e-12)
     if not np.all(after > FOLLOWED) or left.max() > WORSE or left.min() > 1.0 - EXPLAINS:
         return None
+    n, values = samples.n, dict(zip(found.entries, spread.tolist(), strict=True))
     own = np.ix_(places, places)
-    std = _matrix(evidence.n, dict(zip(found.entries, spread.tolist(), strict=True))) - np.eye(evidence.n)
     return ProposedCoupling(
-        tuple(evidence.model.v_names[k] for k in places),
-        _matrix(evidence.n, found.entries)[own],
-        std[own],
+        tuple(samples.evidence.model.v_names[k] for k in places),
+        _matrix(n, found.entries)[own],
+        (_matrix(n, values) - np.eye(n))[own],
         found.of_motors,
         tuple(before.tolist()),
         tuple(after.tolist()),
@@ -188,7 +218,8 @@ class _Samples:
         """Return the change of the motors' torques (N, n, entries) per unit of each entry, at the fitted values."""
         values = found.sums.values((), found.fit.weights)
         slopes = [
-            (self.design(found.entries | {place: value + DIFFERENCE}, found.of_motors) - found.design) @ values
+            (self.design(found.entries | {place: value + DIFFERENCE}, found.of_motors) - found.design)
+            @ values
             for place, value in found.entries.items()
         ]
         return np.stack(slopes, axis=2) / DIFFERENCE
@@ -232,11 +263,16 @@ class _Samples:
         return np.array([quality(self.torque[first:, k], predicted[:, k]).r2 for k in range(self.n)])
 
 
-def _entries(samples: _Samples, found: _Coupled) -> tuple[_Coupled, Array]:
-    """The fit with all entries that are significant and explain enough, and their standard deviations."""
+def _entries(samples: _Samples, found: _Coupled, towards: int) -> tuple[_Coupled, Array]:
+    """The fit with all entries that are significant and explain enough, and their standard deviations.
+
+    towards  1: motors also move later joints, 2, 3 ... after theirs; -1: earlier ones. C is then triangular, and has an
+             inverse.
+    """
     spread = np.zeros(0)
     for _ in range(MOST_ENTRIES):
-        pairs = _pairs(samples.n, found.entries)
+        near = [(i + towards * k, i) for i in range(samples.n) for k in range(1, REACH + 1)]
+        pairs = [place for place in near if 0 <= place[0] < samples.n and place not in found.entries]
         starts = _first_values(samples, found, pairs) if pairs else []
         tried = [samples.exact(found.entries | start, found.of_motors) for start in starts]
         if not tried:
@@ -250,17 +286,7 @@ def _entries(samples: _Samples, found: _Coupled) -> tuple[_Coupled, Array]:
     return found, spread
 
 
-def _pairs(n: int, entries: Entries) -> list[tuple[int, int]]:
-    """Entries (j, i) of neighbours that may be added: motor i may move joint j unless motor j moves joint i already, by
-    itself or through others. The matrix then always has an inverse."""
-    moves = np.linalg.matrix_power(np.abs(_matrix(n, entries)), n)
-    near = [(j, i) for j in range(n) for i in range(n) if 0 < abs(j - i) <= REACH]
-    return [(j, i) for j, i in near if (j, i) not in entries and not moves[i, j] > 0.0]
-
-
-def _first_values(
-    samples: _Samples, found: _Coupled, pairs: Sequence[tuple[int, int]]
-) -> list[Entries]:
+def _first_values(samples: _Samples, found: _Coupled, pairs: Sequence[tuple[int, int]]) -> list[Entries]:
     """The entries that explain most at first, with their first values: coefficients of measured torques of the joints.
 
     Beside it, friction of either joint is allowed in the column of the other.
