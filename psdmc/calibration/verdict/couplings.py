@@ -16,13 +16,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from psdmc.calibration.identify.motor_model import Coupling
 from psdmc.calibration.identify.residuals import quality, widening
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import SIGN_SPEED, Evidence
-from psdmc.calibration.verdict.gains import CLUSTERS, RANK_TOLERANCE
+from psdmc.calibration.verdict.gains import RANK_TOLERANCE
 from psdmc.calibration.verdict.log_errors import Fit, Sums
 
 ROWS = 1500
@@ -47,10 +46,11 @@ LARGEST = 3.0
 """Of an entry: gears of a wrist have about the same ratio, and entries between 0.01 and 1."""
 LEAST = 0.01
 """Smallest entry that is named."""
-CHANCE = 1e-4
-"""Probability that one of all entries is named although no motor drives two joints."""
-EXPLAINS = 0.3
-"""Share of what is left of a joint's torque that an entry explains at least: a log error explains less by chance."""
+SURE = 10.0
+"""Standard deviations that an entry has at least: the ratio of a real gear is found to a percent or so, a ratio that
+stands for another fault of the log is not."""
+EXPLAINS = 0.5
+"""Share of what is left of a joint's torque that an entry explains at least."""
 FOLLOWED = 0.8
 """R^2 of all coupled columns with the proposal, on samples that were not fitted: else the log has another fault."""
 WORSE = 1.1
@@ -69,6 +69,7 @@ class ProposedCoupling:
     joints         names of the joints, in the order of the model
     matrix, std    (m, m) C and the standard deviations of its entries; zero for entries that are given
     of_motors      whether the positions of the log belong to the motors, as its efforts do
+    explains       largest share of what is left of a joint's torque that the coupling explains
     before, after  (m,) R^2 of the joints' columns without and with the coupling, on samples that were not fitted
     """
 
@@ -76,6 +77,7 @@ class ProposedCoupling:
     matrix: Array
     std: Array
     of_motors: bool
+    explains: float
     before: tuple[float, ...]
     after: tuple[float, ...]
 
@@ -98,7 +100,13 @@ class ProposedCoupling:
             {"joint": name, "before": before, "after": after}
             for name, before, after in zip(self.joints, self.before, self.after, strict=True)
         ]
-        return {"items": entries, "r2": quality, "positions_of_motors": self.of_motors, "toml": self.toml}
+        return {
+            "items": entries,
+            "r2": quality,
+            "explains": self.explains,
+            "positions_of_motors": self.of_motors,
+            "toml": self.toml,
+        }
 
     @property
     def toml(self) -> str:
@@ -154,6 +162,7 @@ def _proposed(samples: _Samples, plain: _Coupled, found: _Coupled, spread: Array
         _matrix(n, found.entries)[own],
         (_matrix(n, values) - np.eye(n))[own],
         found.of_motors,
+        plain.explained(found.fit),
         tuple(before.tolist()),
         tuple(after.tolist()),
     )
@@ -279,8 +288,7 @@ def _entries(samples: _Samples, found: _Coupled, towards: int) -> tuple[_Coupled
             break
         best = max(tried, key=found.likelier)
         std, value = samples.std(best), list(best.entries.values())[-1]
-        sure = float(stats.t.isf(0.5 * CHANCE / len(pairs), CLUSTERS - 1))
-        if not abs(value) > max(LEAST, sure * std[-1]) or not found.explained(best.fit) > EXPLAINS:
+        if not abs(value) > max(LEAST, SURE * std[-1]) or not found.explained(best.fit) > EXPLAINS:
             break
         found, spread = best, std
     return found, spread

@@ -60,7 +60,9 @@ def with_verdict_on_logs(
     evidence = evidence_of(model, regressor, motions, motors, options, coupling_of(matrix), springs)
     demand = Demand("linear fit", _fitted(record, "All"), record.facts["rank"])
     proposed = proposed_coupling(evidence)
-    if proposed is not None:
+    if proposed is not None and all(
+        each.explains < proposed.explains for each in log_errors(evidence, record.model)
+    ):
         record = replace(record, facts={**record.facts, PROPOSED_COUPLING: proposed.values})
     return with_verdict(record, judge(record, evidence, [demand], limits))
 
@@ -102,10 +104,10 @@ def judge(
     likely = _suspects(found)
     if likely and not against:
         (against if fits_poorly(found) else doubted).append(Ground("contradicted"))
-    if not against:
+    proposed = record.facts.get(PROPOSED_COUPLING)
+    if not against and proposed is None:
         for ground, is_certain in hidden_errors(found):
             (against if is_certain else doubted).append(ground)
-    proposed = record.facts.get(PROPOSED_COUPLING)
     if proposed is not None:
         coupled = Ground("undescribed_coupling", proposed)
         likely, doubted = ((coupled, *likely), doubted) if against else (likely, [coupled, *doubted])
