@@ -40,7 +40,7 @@ LONGEST = 0.5
 """Step of an entry at most."""
 DIFFERENCE = 1e-4
 """Step of the differences that give the slope by an entry."""
-WORTH_TRYING = 0.1
+WORTH_TRYING = 0.2
 """Share of what is left of a joint's torque that an entry explains at first, to be made exact."""
 LARGEST = 3.0
 """Of an entry: gears of a wrist have about the same ratio, and entries between 0.01 and 1."""
