@@ -40,7 +40,7 @@ LONGEST = 0.5
 """Step of an entry at most."""
 DIFFERENCE = 1e-4
 """Step of the differences that give the slope by an entry."""
-WORTH_TRYING = 0.2
+WORTH_TRYING = 0.1
 """Share of what is left of a joint's torque that an entry explains at first, to be made exact."""
 LARGEST = 3.0
 """Of an entry: gears of a wrist have about the same ratio, and entries between 0.01 and 1."""
@@ -132,7 +132,7 @@ def proposed_coupling(evidence: Evidence) -> ProposedCoupling | None:
     there is none, or if the log description describes one."""
     if evidence.coupling is not None or evidence.n < 2 or not np.any(evidence.torque):
         return None
-    samples = _Samples(evidence.thinned(ROWS))
+    samples = _Samples(evidence)
     plain = samples.fitted({}, False)
     if plain.sums.freedom <= 0:
         return None
@@ -158,7 +158,7 @@ def _proposed(samples: _Samples, plain: _Coupled, found: _Coupled, spread: Array
     n, values = samples.n, dict(zip(found.entries, spread.tolist(), strict=True))
     own = np.ix_(places, places)
     return ProposedCoupling(
-        tuple(samples.evidence.model.v_names[k] for k in places),
+        tuple(samples.names[k] for k in places),
         _matrix(n, found.entries)[own],
         (_matrix(n, values) - np.eye(n))[own],
         found.of_motors,
@@ -198,22 +198,31 @@ class _Samples:
     """Samples that are fitted with entries of C."""
 
     def __init__(self, evidence: Evidence) -> None:
-        self.evidence, self.n, self.torque = evidence, evidence.n, evidence.torque
-        self.as_logged = evidence.columns()
+        def joined(name: str) -> Array:
+            whole = np.concatenate([getattr(log, name) for log in evidence.shifted])
+            return np.asarray(whole[:: max(1, -(-len(whole) // ROWS))])
+
+        self.n, self.names, self.regressor = evidence.n, evidence.model.v_names, evidence.regressor
+        self.q, self.qd, self.qdd, self.sign = (joined(name) for name in ("q", "qd", "qdd", "sign"))
+        self.speeds, self.kernel = joined("speeds"), evidence.shifted[0].kernel
+        now = int(np.abs(evidence.shifted[0].lags).argmin())
+        self.torque = joined("torque")[:, :, now]
+        self.as_logged = self.regressor.regressor(self.q, self.qd, self.qdd)
 
     def design(self, entries: Entries, of_motors: bool) -> Array:
         """Return the torques of the motors (N, n, l + 3 n) per unit of base parameters, and of Coulomb and viscous
         friction and offset of each motor."""
-        logged, n = self.evidence, self.n
+        n = self.n
         coupling = Coupling.of(_matrix(n, entries).tolist())
-        speed, sign, rigid = logged.qd, logged.sign.copy(), self.as_logged
+        speed, sign, rigid = self.qd, self.sign.copy(), self.as_logged
         if of_motors and entries:
-            motion = (coupling.to_joints(part) for part in (logged.q, logged.qd, logged.qdd))
-            rigid = logged.regressor.regressor(*motion)
+            motion = (coupling.to_joints(part) for part in (self.q, self.qd, self.qdd))
+            rigid = self.regressor.regressor(*motion)
         elif entries:
             speed = coupling.to_motors(speed)
             changed = np.flatnonzero(np.any(coupling.inverse != np.eye(n), axis=1))
-            sign[:, changed] = np.tanh(speed[:, changed] / SIGN_SPEED)
+            speeds = self.speeds @ coupling.inverse[changed].T
+            sign[:, changed] = np.einsum("tkm,k->tm", np.tanh(speeds / SIGN_SPEED), self.kernel)
         own = [part[:, :, None] * np.eye(n) for part in (sign, speed, np.ones_like(speed))]
         return np.concatenate([np.einsum("tjl,jk->tkl", rigid, coupling.matrix), *own], axis=2)
 
@@ -299,12 +308,12 @@ def _first_values(samples: _Samples, found: _Coupled, pairs: Sequence[tuple[int,
 
     Beside it, friction of either joint is allowed in the column of the other.
     """
-    logged, columns = samples.evidence, []
+    columns = []
     torque = Coupling.of(_matrix(samples.n, found.entries).tolist()).torque_of_joints(samples.torque)
     for j, i in pairs:
         own = np.zeros((len(torque), samples.n, 5))
-        own[:, i, :3] = np.stack([torque[:, j], logged.sign[:, j], logged.qd[:, j]], axis=1)
-        own[:, j, 3:] = np.stack([logged.sign[:, i], logged.qd[:, i]], axis=1)
+        own[:, i, :3] = np.stack([torque[:, j], samples.sign[:, j], samples.qd[:, j]], axis=1)
+        own[:, j, 3:] = np.stack([samples.sign[:, i], samples.qd[:, i]], axis=1)
         columns.append(own)
     sums = Sums(found.design, columns, samples.torque)
     fits = [sums.fitted((k,)) for k in range(len(pairs))]
