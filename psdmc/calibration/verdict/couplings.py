@@ -11,6 +11,7 @@ dependent (Liang and Zeger 1986), and one from the residuals' autocorrelation (r
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -111,12 +112,12 @@ class ProposedCoupling:
     @property
     def toml(self) -> str:
         """Return the lines of a log description that describe the coupling."""
-        names = ", ".join('"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"' for name in self.joints)
+        names = json.dumps(self.joints, ensure_ascii=False)
         rows = ", ".join(
             "[" + ", ".join(rounded(x, s) for x, s in zip(row, spread, strict=True)) + "]"
             for row, spread in zip(self.matrix.tolist(), self.std.tolist(), strict=True)
         )
-        lines = ["[[coupling]]", f"joints = [{names}]", f"matrix = [{rows}]"]
+        lines = ["[[coupling]]", f"joints = {names}", f"matrix = [{rows}]"]
         return "\n".join(lines if self.of_motors else [*lines, 'quantities = ["effort"]'])
 
 
@@ -203,11 +204,16 @@ class _Samples:
             return np.asarray(whole[:: max(1, -(-len(whole) // ROWS))])
 
         self.n, self.names, self.regressor = evidence.n, evidence.model.v_names, evidence.regressor
+        self.units = [joint.type.position_unit for joint in evidence.model.mechanism.leading_joints]
         self.q, self.qd, self.qdd, self.sign = (joined(name) for name in ("q", "qd", "qdd", "sign"))
         self.speeds, self.kernel = joined("speeds"), evidence.shifted[0].kernel
         now = int(np.abs(evidence.shifted[0].lags).argmin())
         self.torque = joined("torque")[:, :, now]
         self.as_logged = self.regressor.regressor(self.q, self.qd, self.qdd)
+
+    def alike(self, j: int, i: int) -> bool:
+        """Return whether both joints exist, and both turn or both slide."""
+        return 0 <= j < self.n and self.units[j] == self.units[i]
 
     def design(self, entries: Entries, of_motors: bool) -> Array:
         """Return the torques of the motors (N, n, l + 3 n) per unit of base parameters, and of Coulomb and viscous
@@ -290,7 +296,7 @@ def _entries(samples: _Samples, found: _Coupled, towards: int) -> tuple[_Coupled
     spread = np.zeros(0)
     for _ in range(MOST_ENTRIES):
         near = [(i + towards * k, i) for i in range(samples.n) for k in range(1, REACH + 1)]
-        pairs = [place for place in near if 0 <= place[0] < samples.n and place not in found.entries]
+        pairs = [(j, i) for j, i in near if (j, i) not in found.entries and samples.alike(j, i)]
         starts = _first_values(samples, found, pairs) if pairs else []
         tried = [samples.exact(found.entries | start, found.of_motors) for start in starts]
         if not tried:
