@@ -277,7 +277,7 @@ class _Samples:
         squares = np.stack([scaled[:, k].T @ scaled[:, k] for k in range(self.n)])
         inverse = np.linalg.pinv(squares.sum(axis=0), rcond=RANK_TOLERANCE**2, hermitian=True)
         by_noise = np.diag(inverse @ np.tensordot(level, squares, axes=1) @ inverse)[-m:] / sizes[-m:] ** 2
-        return np.sqrt(np.maximum(np.diag(covariance), by_noise))
+        return np.asarray(np.sqrt(np.maximum(np.diag(covariance), by_noise)))
 
     def held_out(self, found: _Coupled) -> Array:
         """Return R^2 (n,) of the motors' columns in the last samples, by a fit to the first."""

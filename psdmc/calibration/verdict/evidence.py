@@ -219,7 +219,8 @@ def kernel_of(options: FilterOptions) -> tuple[Array, Array]:
     impulse = np.zeros(6 * half + 1)
     impulse[3 * half] = 1.0
     kernel = LowPass.design(options, step)(impulse)[2 * half : 4 * half + 1]
-    return step * np.arange(-half, half + 1), np.asarray(kernel / kernel.sum())
+    times = step * np.arange(-half, half + 1, dtype=np.float64)
+    return times, np.asarray(kernel / kernel.sum(), dtype=np.float64)
 
 
 def _samples(
@@ -264,7 +265,7 @@ def _samples(
     share = options.cutoff / (0.5 / states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
     at_times = (np.concatenate(values) for values in zip(*moved, strict=True))
-    moved_log = Shifted(log.name, lags, *at_times, kernel=kernel)
+    moved_log = Shifted(log.name, lags, *at_times, kernel)
     return q, qd, qdd, sign, torque, np.abs(noise), moved_log
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import tomllib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -59,19 +60,27 @@ def with_tool() -> str:
     return f"{first}[joint.link]\n{TOOL}"
 
 
-def recorded(folder: Path, C: np.ndarray, of_motors: bool, seed: int = 1) -> Path:
-    """The log of a minute: torques of motors, and positions of motors or of joints; and its log.toml."""
+@cache
+def moved(robot: Path, seed: int, seconds: float) -> tuple[tuple[str, ...], list[np.ndarray]]:
+    """Names of the joints; times, positions, speeds and Pinocchio's torques of a motion."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 60.0, 0.01)
+    time = np.arange(0.0, seconds, 0.01)
     rates, starts = rng.uniform(0.5, 5.0, (HARMONICS, N)), rng.uniform(0.0, 6.0, (HARMONICS, N))
     size = np.array([0.14, 0.1, 0.12, 0.25, 0.3, 0.4])
     turning = np.einsum("t,kj->tkj", time, rates) + starts
     q, qd = size * np.sin(turning).sum(axis=1), size * (rates * np.cos(turning)).sum(axis=1)
     qdd = -size * (rates**2 * np.sin(turning)).sum(axis=1)
-    robot = load_robot(folder / "arm.toml")
-    model = reference(robot).model
+    chosen = load_robot(robot)
+    model = reference(chosen).model
     data = model.createData()
     rigid = np.array([pin.rnea(model, data, *state) for state in zip(q, qd, qdd, strict=True)])
+    return tuple(joint.name for joint in chosen.chain.joints), [time, q, qd, rigid]
+
+
+def recorded(folder: Path, C: np.ndarray, of_motors: bool, seed: int = 1, seconds: float = 60.0) -> Path:
+    """The log of a robot: torques of motors, and positions of motors or of joints; and its log.toml."""
+    names, (time, q, qd, rigid) = moved(folder / "arm.toml", seed, seconds)
+    rng = np.random.default_rng(seed)
     onto_motors = np.linalg.inv(C).T
     speed = qd @ onto_motors
     torque = rigid @ C + np.tanh(speed / 0.03) * COULOMB + VISCOUS * speed + OFFSET
@@ -79,8 +88,8 @@ def recorded(folder: Path, C: np.ndarray, of_motors: bool, seed: int = 1) -> Pat
     logged = q @ onto_motors if of_motors else q
     logged = logged + 2e-6 * rng.standard_normal(q.shape)
     columns = {"time_s": time}
-    for k, joint in enumerate(robot.chain.joints):
-        columns |= {f"position_rad.{joint.name}": logged[:, k], f"motor_torque_nm.{joint.name}": torque[:, k]}
+    for k, name in enumerate(names):
+        columns |= {f"position_rad.{name}": logged[:, k], f"motor_torque_nm.{name}": torque[:, k]}
     write_columns(columns, folder / "run.csv")
     (folder / "log.toml").write_text('[[log]]\nfile = "run.csv"\n', encoding="utf-8")
     return folder / "log.toml"
@@ -114,7 +123,9 @@ def r2(numbers: dict, joint: str) -> float:
     return numbers["quality"]["All"][joint]["held_out"]["r2"]
 
 
-@pytest.mark.parametrize(("ratio", "of_motors"), slow_but_for([(-1.0, True)], [(-1.0, True), (0.8, False)]))
+@pytest.mark.parametrize(
+    ("ratio", "of_motors"), slow_but_for([(-1.0, True)], [(-1.0, True), (0.8, False)], spread=True)
+)
 def test_the_proposed_lines_describe_the_wrist(
     folder: Path, capsys: pytest.CaptureFixture[str], ratio: float, of_motors: bool
 ):
@@ -167,14 +178,15 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DynamicsModel]:
 
 
 def mixture(arm: tuple[Path, DynamicsModel], C: np.ndarray, of_motors: bool, seed: int) -> Log:
-    recorded(arm[0], C, of_motors, seed)
+    recorded(arm[0], C, of_motors, seed, 30.0)
     return read_log(arm[0] / "run.csv")
 
 
+@pytest.mark.slow
 def test_the_standard_deviation_is_honest(arm: tuple[Path, DynamicsModel]):
     """Also with noise that lasts; and no log of motors that drive one joint each gets a proposal."""
     off = []
-    for seed in range(6):
+    for seed in range(4):
         for of_motors in (False, True):
             log = mixture(arm, mixed(c54=0.8), of_motors, seed)
             white = np.random.default_rng(seed).standard_normal(log.effort.shape)
@@ -221,7 +233,8 @@ def test_a_wrong_reduction_ratio_is_no_coupling(arm: tuple[Path, DynamicsModel],
 
 
 @pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
-def test_a_real_robot_without_coupling_gets_no_proposal():
+def test_a_real_robot_gets_a_proposal_only_if_its_log_is_mixed():
+    """Friction is moved from the joints to the motors, where psdmc takes it to be."""
     folder = pytest.importorskip("cmeel").__path__[0]
     urdf = sorted((Path(folder).parent / "cmeel.prefix").rglob("ur10_robot.urdf"))
     if not urdf:
@@ -230,8 +243,22 @@ def test_a_real_robot_without_coupling_gets_no_proposal():
     log = read_log(UR10_LOG / "exciting_trajectory.csv").ordered(model.joint_names)
 
     assert seen(log, model) is None
-    mixing = mixed(c54=0.5)
-    coupled = seen(replace(log, effort=log.effort @ mixing), model)
 
-    assert coupled is not None
-    assert coupled.matrix[1, 0] == pytest.approx(0.5, abs=3.0 * coupled.std[1, 0])
+    plain = calibrate_logs(
+        model, [log], CalibrateOptions(physical=False), ChainRegressor(model), None, lambda _: None
+    )
+    values = {(row.joint, row.name): row.value for row in plain.friction}
+    coulomb, viscous = (
+        np.array([values[joint, name] for joint in model.joint_names]) for name in ("coulomb", "viscous")
+    )
+    C = mixed(c21=-0.5)
+    onto_motors = np.linalg.inv(C).T
+    speeds = (log.velocity, log.velocity @ onto_motors)
+    of_joints, of_motors = (coulomb * np.tanh(speed / 0.03) + viscous * speed for speed in speeds)
+    torque = (log.effort - of_joints) @ C + of_motors
+    found = seen(replace(log, effort=torque, position=log.position @ onto_motors, velocity=None), model)
+
+    assert found is not None
+    assert found.joints == ("shoulder_lift_joint", "elbow_joint")
+    assert found.of_motors
+    assert abs(found.matrix[1, 0] + 0.5) < 3.0 * found.std[1, 0]
