@@ -51,7 +51,9 @@ SURE = 10.0
 """Standard deviations that an entry has at least: the ratio of a real gear is found to a percent or so, a ratio that
 stands for another fault of the log is not."""
 EXPLAINS = 0.5
-"""Share of what is left of a joint's torque that an entry explains at least."""
+"""Share of what is left of a joint's torque that an entry explains at least ..."""
+TOGETHER = 0.7
+"""... and that all entries explain: of planted faults other than couplings, one reached 0.68."""
 FOLLOWED = 0.8
 """R^2 of all coupled columns with the proposal, on samples that were not fitted: else the log has another fault."""
 WORSE = 1.1
@@ -149,7 +151,7 @@ def proposed_coupling(evidence: Evidence) -> ProposedCoupling | None:
 
 def _proposed(samples: _Samples, plain: _Coupled, found: _Coupled, spread: Array) -> ProposedCoupling | None:
     """The proposal of these entries; None where the coupled joints' torques are not predicted far better with them."""
-    if not found.entries:
+    if not found.entries or not plain.explained(found.fit) > TOGETHER:
         return None
     places = sorted({k for entry in found.entries for k in entry})
     before, after = (samples.held_out(one)[places] for one in (plain, found))

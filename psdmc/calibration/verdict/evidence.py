@@ -264,8 +264,9 @@ def _samples(
     q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
     share = options.cutoff / (0.5 / states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
-    at_times = (np.concatenate(values) for values in zip(*moved, strict=True))
-    moved_log = Shifted(log.name, lags, *at_times, kernel)
+    names = ("q", "qd", "qdd", "speed", "sign", "torque", "speeds")
+    whole = {name: np.concatenate(x) for name, x in zip(names, zip(*moved, strict=True), strict=True)}
+    moved_log = Shifted(log.name, lags, **whole, kernel=kernel)
     return q, qd, qdd, sign, torque, np.abs(noise), moved_log
 
 
