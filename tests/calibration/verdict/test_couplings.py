@@ -24,6 +24,7 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log, write_columns
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import geared
+from psdmc.calibration.verdict import judge
 from psdmc.calibration.verdict.couplings import ProposedCoupling, proposed_coupling
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
 from psdmc.cli.boundary import run
@@ -218,18 +219,26 @@ def test_a_motor_that_moves_all_later_joints(arm: tuple[Path, DynamicsModel], of
     assert np.allclose(table["matrix"], found.matrix, atol=0.1 * found.std.max())
 
 
-def test_a_wrong_reduction_ratio_is_no_coupling(arm: tuple[Path, DynamicsModel], capsys):
-    """Another fault, which its own doubt names: a coupling would explain less of the log."""
+@pytest.mark.parametrize("share", slow_but_for([None], [None, 0.999]))
+def test_an_error_of_one_joint_that_explains_more_is_named_instead(
+    arm: tuple[Path, DynamicsModel], monkeypatch: pytest.MonkeyPatch, share: float | None
+):
+    """A wrong reduction ratio, which a coupling explains less well; unless the test says that it explains all."""
     log = geared(mixture(arm, np.eye(N), of_motors=True, seed=1), 2, 1.1)
+    found = seen(log, arm[1])
+    assert found is not None
+    if share is not None:
+        monkeypatch.setattr(judge, "proposed_coupling", lambda evidence: replace(found, explains=share))
+    bare = CalibrateOptions(physical=False)
 
-    record = calibrate_logs(
-        arm[1], [log], CalibrateOptions(physical=False), ChainRegressor(arm[1]), None, lambda _: None
-    )
+    record = calibrate_logs(arm[1], [log], bare, ChainRegressor(arm[1]), None, lambda _: None)
 
     assert record.verdict is not None
-    grounds = (*record.verdict.against, *record.verdict.suspected, *record.verdict.doubted)
-    assert "log_error" in [ground.code for ground in grounds]
-    assert "proposed_coupling" not in record.facts
+    verdict = record.verdict
+    codes = {ground.code for ground in (*verdict.against, *verdict.suspected, *verdict.doubted)}
+    named = codes & {"log_error", "undescribed_coupling"}
+    assert named == ({"log_error"} if share is None else {"undescribed_coupling"})
+    assert ("proposed_coupling" in record.facts) == (share is not None)
 
 
 @pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
