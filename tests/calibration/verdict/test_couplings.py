@@ -3,6 +3,7 @@ lines are typed into log.toml as they stand, and the torque of both joints is th
 
 from __future__ import annotations
 
+import html
 import json
 import tomllib
 from dataclasses import replace
@@ -140,6 +141,8 @@ def test_the_proposed_lines_describe_the_wrist(
     assert tomllib.loads(proposed)["coupling"][0].get("quantities") == (None if of_motors else ["effort"])
     found = before["facts"]["proposed_coupling"]
     assert found["toml"] in proposed
+    page = html.unescape((folder / "out.html").read_text(encoding="utf-8"))
+    assert f"<pre>{found['toml']}</pre>" in page
     (item,) = found["items"]
     assert (item["motor"], item["joint"]) == ("J5", "J6")
     assert abs(item["ratio"] - ratio) < 3.0 * item["std"]
