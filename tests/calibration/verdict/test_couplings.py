@@ -79,13 +79,15 @@ def moved(robot: Path, seed: int, seconds: float) -> tuple[tuple[str, ...], list
     return tuple(joint.name for joint in chosen.chain.joints), [time, q, qd, rigid]
 
 
-def recorded(folder: Path, C: np.ndarray, of_motors: bool, seed: int = 1, seconds: float = 60.0) -> Path:
+def recorded(
+    folder: Path, C: np.ndarray, of_motors: bool, seed: int = 1, seconds: float = 60.0, friction: float = 1.0
+) -> Path:
     """The log of a robot: torques of motors, and positions of motors or of joints; and its log.toml."""
     names, (time, q, qd, rigid) = moved(folder / "arm.toml", seed, seconds)
     rng = np.random.default_rng(seed)
     onto_motors = np.linalg.inv(C).T
     speed = qd @ onto_motors
-    torque = rigid @ C + np.tanh(speed / 0.03) * COULOMB + VISCOUS * speed + OFFSET
+    torque = rigid @ C + friction * (np.tanh(speed / 0.03) * COULOMB + VISCOUS * speed) + OFFSET
     torque += NOISE * rng.standard_normal(torque.shape)
     logged = q @ onto_motors if of_motors else q
     logged = logged + 2e-6 * rng.standard_normal(q.shape)
@@ -181,18 +183,20 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DynamicsModel]:
     return path, derive(path / "arm.toml", expand=False)
 
 
-def mixture(arm: tuple[Path, DynamicsModel], C: np.ndarray, of_motors: bool, seed: int) -> Log:
-    recorded(arm[0], C, of_motors, seed, 30.0)
+def mixture(
+    arm: tuple[Path, DynamicsModel], C: np.ndarray, of_motors: bool, seed: int, friction: float = 1.0
+) -> Log:
+    recorded(arm[0], C, of_motors, seed, 30.0, friction)
     return read_log(arm[0] / "run.csv")
 
 
 @pytest.mark.slow
 def test_the_standard_deviation_is_honest(arm: tuple[Path, DynamicsModel]):
-    """Also with noise that lasts; and no log of motors that drive one joint each gets a proposal."""
+    """Also with much friction, and with noise that lasts; and no log of motors that drive one joint each gets a proposal."""
     off = []
     for seed in range(4):
         for of_motors in (False, True):
-            log = mixture(arm, mixed(c54=0.8), of_motors, seed)
+            log = mixture(arm, mixed(c54=0.8), of_motors, seed, friction=3.0)
             white = np.random.default_rng(seed).standard_normal(log.effort.shape)
             if seed % 2:
                 lasting = 0.3 * NOISE * signal.lfilter([1.0], [1.0, -0.97], white, axis=0)
@@ -200,6 +204,7 @@ def test_the_standard_deviation_is_honest(arm: tuple[Path, DynamicsModel]):
             found = seen(log, arm[1])
             assert found is not None
             assert (found.joints, found.of_motors) == (("J5", "J6"), of_motors)
+            assert min(found.after) > 0.9995  # 0.998 if the friction of coupled motors is not filtered
             off.append((found.matrix[1, 0] - 0.8) / found.std[1, 0])
         log = mixture(arm, np.eye(N), of_motors=True, seed=seed)
         assert seen(log, arm[1]) is None
