@@ -142,7 +142,7 @@ def calibrate(
     from psdmc.calibration.identify.essential import EssentialOptions
     from psdmc.calibration.sources import LogNaming
     from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
-    from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
+    from psdmc.cli.show_checks import print_accuracy, print_proposal, print_torque_constants, print_verdict
     from psdmc.model.calibrated import code_of
     from psdmc.model.load import load as load_model
     from psdmc.report.calibrate_commands import calibrate_command
@@ -176,6 +176,7 @@ def calibrate(
         )
     verdict = verdict_of(record)
     print_verdict(verdict)
+    print_proposal(record)
     print_accuracy(record)
     print_torque_constants(record)
     if verdict.usable or keep:

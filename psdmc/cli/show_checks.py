@@ -51,6 +51,17 @@ def print_verdict(verdict: Verdict) -> None:
         print(one_line(line))
 
 
+def print_proposal(record: Calibrated) -> None:
+    """Print the lines of a log description that describe a coupling which the calibration found; nothing if it found
+    none."""
+    from psdmc.model.calibrated import PROPOSED_COUPLING
+
+    proposed = record.facts.get(PROPOSED_COUPLING)
+    if proposed is not None:
+        print("# proposed for log.toml, not applied:")
+        print(proposed["toml"])
+
+
 def print_accuracy(record: Calibrated) -> None:
     """Print R^2 on held-out data for each joint and step of the calibration."""
     rows = []

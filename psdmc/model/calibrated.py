@@ -32,6 +32,8 @@ LOG_INFORMATION = "log_information"
 """Name of the fact that holds the share of each log in the information of each parameter."""
 FRICTION_DRIFT = "friction_drift"
 """Name of the fact that holds the change of each joint's friction over each log."""
+PROPOSED_COUPLING = "proposed_coupling"
+"""Name of the fact that holds motors which seem to drive several joints, and the lines of log.toml that say so."""
 WHOLE = "All"
 """The step whose quality is that of the whole torque."""
 

@@ -240,6 +240,17 @@ def _logs_disagree(values: Values) -> str:
     )
 
 
+def _coupling(values: Values) -> str:
+    rises = [f"{item['joint']} {item['before']:.3f} to {item['after']:.3f}" for item in values["r2"]]
+    which = "its efforts and positions" if values["positions_of_motors"] else "its efforts"
+    return (
+        "motors seem to drive several joints together, and the log does not say so: "
+        f"{_each(values, 'the motor of {motor} moves {joint} by {ratio:.3g} +- {std:.1g} of its own motion')}; if {which} "
+        f"are those of such motors, held-out R^2 rises: {', '.join(rises)}; if the robot is built so, write the proposed "
+        "[[coupling]] into a log description; psdmc has not applied it"
+    )
+
+
 def _by_step(values: Values) -> str:
     return "{samples} independent samples for {unknowns} unknowns ({step})".format(**values)
 
@@ -269,6 +280,7 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
     ),
     "late": _late,
     "log_error": _log_error,
+    "undescribed_coupling": _coupling,
     "unstated_load": lambda v: (
         f"the robot seems to carry a load of {v['mass']:.3g} +- {v['std']:.1g} kg at its tip that the file does not state: "
         f"the load explains {v['explains']:.0%} of the difference from the file; the calibrated values contain the load"

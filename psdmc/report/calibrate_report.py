@@ -9,7 +9,7 @@ from pathlib import Path
 from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.model.calibrated import WEAK, Calibrated, Verdict, code_of
+from psdmc.model.calibrated import PROPOSED_COUPLING, WEAK, Calibrated, Verdict, code_of
 from psdmc.model.calibrated_json import document
 from psdmc.report.calibrate_plots import excitation_panels, step_panels
 from psdmc.report.calibrate_tables import (
@@ -63,6 +63,7 @@ class ReportView:
     page escapes all other text.
 
     truth     true parameters, which only a virtual robot has; None for logs of a real robot
+    proposed_coupling  lines of a log description that psdmc proposes; empty if there are none
     versions  names and versions of the programs that computed the result
     """
 
@@ -70,6 +71,7 @@ class ReportView:
     summary: str
     truth: TruthView | None
     verdict: VerdictView | None
+    proposed_coupling: str
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     accuracy_table: str
@@ -110,6 +112,7 @@ def report_html(record: Calibrated, found: Excitation | None = None, truth: Trut
         summary=_summary(record),
         truth=truth,
         verdict=None if record.verdict is None else verdict_view(record.verdict),
+        proposed_coupling=record.facts.get(PROPOSED_COUPLING, {"toml": ""})["toml"],
         warnings=record.unsaid,
         notes=record.notes,
         accuracy_table=accuracy_table(record),

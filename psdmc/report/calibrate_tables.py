@@ -7,12 +7,20 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION, Calibrated, NumberRow, Quality, Verdict
+from psdmc.model.calibrated import (
+    FRICTION_DRIFT,
+    LOG_INFORMATION,
+    PROPOSED_COUPLING,
+    Calibrated,
+    NumberRow,
+    Quality,
+    Verdict,
+)
 from psdmc.model.joined_units import joined_units
 
 NOTHING = "–"
 """A cell without a number."""
-OWN_TABLES = (LOG_INFORMATION, FRICTION_DRIFT, "odd_logs")
+OWN_TABLES = (LOG_INFORMATION, FRICTION_DRIFT, PROPOSED_COUPLING, "odd_logs")
 """Facts that the table of facts leaves out."""
 USES = {"validate": "held out whole", "with_load": "with the known load"}
 """How a log is used that is not fitted."""

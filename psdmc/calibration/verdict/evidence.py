@@ -16,7 +16,7 @@ from psdmc.calibration.logs.filter import States, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.log_survey import Saturated, surveyed
-from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -30,6 +30,8 @@ REACH = 0.5
 """s, the longest delay that is looked for, either way."""
 PER_CYCLE = 16
 """Delays that are tried in a period of the filter's cut-off; between them the residual is a parabola."""
+KERNEL_CYCLES = 4
+"""Periods of the cut-off, either way, that a filtered value is computed from: the rest of the filter weighs 1 %."""
 
 
 Torque = Callable[[States, NDArray[np.intp]], Array]
@@ -52,6 +54,8 @@ class Shifted:
     q, qd, qdd   (N, n) states
     speed, sign  (N, n) speed of the motors, and its smooth sign as in Evidence
     torque       (N, n, D) torque at the time of the state plus each of the D delays
+    speeds       (N, K, n) speed of the motors at K times, evenly spaced about that of the state
+    kernel       (K,) weights that give the filtered value at the middle time from values at these times
     """
 
     log: str
@@ -62,6 +66,8 @@ class Shifted:
     speed: Array
     sign: Array
     torque: Array
+    speeds: Array
+    kernel: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,6 +213,16 @@ def delays_tried(cutoff: float) -> Array:
     return np.asarray(step * np.arange(-count, count + 1), dtype=np.float64)
 
 
+def kernel_of(options: FilterOptions) -> tuple[Array, Array]:
+    """Return K times (s) about zero, and the weights (K,) of a signal at these times in its filtered value."""
+    step, half = 1.0 / (PER_CYCLE * options.cutoff), KERNEL_CYCLES * PER_CYCLE
+    impulse = np.zeros(6 * half + 1)
+    impulse[3 * half] = 1.0
+    kernel = LowPass.design(options, step)(impulse)[2 * half : 4 * half + 1]
+    times = step * np.arange(-half, half + 1, dtype=np.float64)
+    return times, np.asarray(kernel / kernel.sum(), dtype=np.float64)
+
+
 def _samples(
     model: DynamicsModel,
     motion: Motion,
@@ -221,6 +237,7 @@ def _samples(
     log = checked(motion.log, model.mechanism, options.cutoff)
     parts, above, count = [], np.zeros(model.nv), 0
     lags, moved = delays_tried(options.cutoff), []
+    window, kernel = kernel_of(options)
     every = max(1, round(2.0 * options.cutoff * log.duration / most))
     for stretch in stretches(log, options):
         states, at = stretch.states, stretch.at
@@ -235,7 +252,11 @@ def _samples(
         some, later = _at_other_times(states, at, lags, every)
         rows = at[some]
         shifted = (motors.torque(later) - other[some, None]).transpose(0, 2, 1)
-        moved.append((states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted))
+        near = np.clip(states.time[rows, None] + window, states.time[0], states.time[-1])
+        speeds = interpolate.CubicSpline(states.time, speed)(near)
+        moved.append(
+            (states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted, speeds)
+        )
         own = slice(at[0], at[-1] + 1)
         above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
         count += at[-1] + 1 - at[0]
@@ -243,7 +264,9 @@ def _samples(
     q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
     share = options.cutoff / (0.5 / states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
-    moved_log = Shifted(log.name, lags, *(np.concatenate(values) for values in zip(*moved, strict=True)))
+    names = ("q", "qd", "qdd", "speed", "sign", "torque", "speeds")
+    whole = {name: np.concatenate(x) for name, x in zip(names, zip(*moved, strict=True), strict=True)}
+    moved_log = Shifted(log.name, lags, **whole, kernel=kernel)
     return q, qd, qdd, sign, torque, np.abs(noise), moved_log
 
 

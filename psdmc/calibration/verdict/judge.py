@@ -9,7 +9,7 @@ determine. docs/calibration.md lists the limits, and decision 0021 gives the rea
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from psdmc.calibration.identify.residuals import CORRELATED
 from psdmc.calibration.logs.log_survey import Saturated
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.verdict.couplings import proposed_coupling
 from psdmc.calibration.verdict.delivered import delivered, sprung
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
 from psdmc.calibration.verdict.findings import Demand, Findings
@@ -28,7 +29,7 @@ from psdmc.calibration.verdict.log_errors import log_errors, unstated_load
 from psdmc.calibration.verdict.record import Calibration, with_verdict
 from psdmc.calibration.verdict.suspects import suspect, unit_suspect
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
-from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION, Verdict
+from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION, PROPOSED_COUPLING, Verdict
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Delay, Ground
 
@@ -58,6 +59,11 @@ def with_verdict_on_logs(
     motions = [Motion(log) for log in logs]
     evidence = evidence_of(model, regressor, motions, motors, options, coupling_of(matrix), springs)
     demand = Demand("linear fit", _fitted(record, "All"), record.facts["rank"])
+    proposed = proposed_coupling(evidence)
+    if proposed is not None and all(
+        each.explains < proposed.explains for each in log_errors(evidence, record.model)
+    ):
+        record = replace(record, facts={**record.facts, PROPOSED_COUPLING: proposed.values})
     return with_verdict(record, judge(record, evidence, [demand], limits))
 
 
@@ -98,9 +104,13 @@ def judge(
     likely = _suspects(found)
     if likely and not against:
         (against if fits_poorly(found) else doubted).append(Ground("contradicted"))
-    if not against:
+    proposed = record.facts.get(PROPOSED_COUPLING)
+    if not against and proposed is None:
         for ground, is_certain in hidden_errors(found):
             (against if is_certain else doubted).append(ground)
+    if proposed is not None:
+        coupled = Ground("undescribed_coupling", proposed)
+        likely, doubted = ((coupled, *likely), doubted) if against else (likely, [coupled, *doubted])
     return Verdict(
         against=tuple(against),
         doubted=tuple(doubted),

@@ -97,7 +97,7 @@ def log_errors(evidence: Evidence, model: DynamicsModel) -> tuple[LogError, ...]
         return ()
     design = _design(evidence)
     tried = list(_hypotheses(evidence, model))
-    sums = _Sums(design, [columns for _, _, columns in tried], evidence.torque)
+    sums = Sums(design, [columns for _, _, columns in tried], evidence.torque)
     if sums.freedom <= 0:
         return ()
     stated = sums.fitted(())
@@ -148,13 +148,13 @@ def _refined(
     for _ in range(STEPS):
         corrected = _corrected(evidence, kind, joint, value)
         design = _design(corrected)
-        first = _Sums(design, [], corrected.torque)
+        first = Sums(design, [], corrected.torque)
         theta_b = first.values((), first.fitted(()).weights)[: model.l]
         around = replace(model, theta_b=theta_b)
         columns = next(
             columns for own, k, columns in _hypotheses(corrected, around, joint) if (own, k) == (kind, joint)
         )
-        sums = _Sums(design, [columns], corrected.torque)
+        sums = Sums(design, [columns], corrected.torque)
         change, std = _size(*sums.last(sums.fitted((0,)), (0,), design, columns, corrected.torque))
         value = value + change if kind == "zero" else (1.0 + value) * (1.0 + change) - 1.0
         if not -MOST < value < MOST:
@@ -189,7 +189,7 @@ def unstated_load(evidence: Evidence) -> UnstatedLoad | None:
     friction = design[:, :, model.l :]
     rigid = design[:, :, : model.l]
     target = evidence.torque - by_file
-    sums = _Sums(friction, [rigid @ onto, rigid], target)
+    sums = Sums(friction, [rigid @ onto, rigid], target)
     if sums.freedom <= 0:
         return None
     weights = sums.fitted((1,)).weights
@@ -274,14 +274,14 @@ def _tilts(model: DynamicsModel, motion: Sequence[Array]) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Fit:
+class Fit:
     """A weighted fit: RMS residual (n,) of each joint and the weights (n,) that gave it."""
 
     scatter: Array
     weights: Array
 
 
-class _Sums:
+class Sums:
     """Sums over N samples from which each hypothesis is fitted, for n joints.
 
     design   (N, n, p) columns of the unknowns that are always fitted
@@ -326,7 +326,7 @@ class _Sums:
         squares = self.grams[:, -1, -1] - 2.0 * b @ values + np.einsum("p,jpq,q->j", values, a, values)
         return np.asarray(np.maximum(squares, 0.0) * self.sizes[-1] ** 2)
 
-    def fitted(self, which: Sequence[int]) -> _Fit:
+    def fitted(self, which: Sequence[int]) -> Fit:
         """Return the fit of some hypotheses together with the unknowns that are always fitted."""
         floor = np.where(self.moved, SMALLEST_SHARE * self.size, 1.0)
         scatter = np.where(self.moved, self.size, 1.0)
@@ -335,18 +335,18 @@ class _Sums:
             weights = np.where(self.moved, 1.0 / scatter, 0.0)
             squares = self._squares(*self._solved(which, weights))
             scatter = np.maximum(np.sqrt(squares / self.samples), floor)
-        return _Fit(scatter, weights)
+        return Fit(scatter, weights)
 
     def left(self, which: Sequence[int], weights: Array) -> float:
         """Return the weighted sum of squared residuals of a fit with given weights."""
         return float(weights**2 @ self._squares(*self._solved(which, weights)))
 
-    def likelier(self, stated: _Fit, found: _Fit) -> float:
+    def likelier(self, stated: Fit, found: Fit) -> float:
         """Return the logarithm of the ratio of two likelihoods."""
         return float(self.samples * np.sum(np.log(stated.scatter / found.scatter)[self.moved]))
 
     def last(
-        self, fit: _Fit, which: Sequence[int], design: Array, columns: Array, torque: Array
+        self, fit: Fit, which: Sequence[int], design: Array, columns: Array, torque: Array
     ) -> tuple[Array, Array]:
         """Return values (m,) of a hypothesis's columns and their covariance, from stretches of time."""
         w = fit.weights
