@@ -37,6 +37,8 @@ TONES = 5
 """Sines of each joint's motion."""
 REACH = 2.0
 """rad either way, within the robot's limits."""
+FASTEST = 2.5
+"""rad/s, within them too."""
 SIGN_SPEED = 0.03
 """rad/s over which Coulomb friction changes sign, in the robot and in the fit."""
 COULOMB, VISCOUS, OFFSET = np.array([[9.6, 8.9, 6.2], [24.0, 29.0, 11.0], [2.0, -1.5, 0.7]])
@@ -80,7 +82,7 @@ def motion(rng: np.random.Generator) -> tuple[Array, Array, Array, Array]:
         q += size * np.sin(angle)
         qd += size * w * np.cos(angle)
         qdd -= size * w**2 * np.sin(angle)
-    less = np.minimum(1.0, REACH / np.abs(q).max(axis=0))
+    less = np.minimum(1.0, np.minimum(REACH / np.abs(q).max(axis=0), FASTEST / np.abs(qd).max(axis=0)))
     return time, less * q, less * qd, less * qdd
 
 
