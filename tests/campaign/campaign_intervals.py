@@ -4,8 +4,9 @@ python tests/campaign/campaign_intervals.py                   200 logs of each k
 python tests/campaign/campaign_intervals.py --logs 20 --cases coloured
 
 The robot is the first three joints of the virtual Denso. Each log has a motion of its own. Columns of the table: kind of
-error; number of estimates; share within 3 standard deviations; RMS of error over standard deviation, which is 1 where
-standard deviations are those of the errors; the group of parameters.
+error; group of parameters; number of estimates; share within 3 standard deviations; RMS of error over standard deviation, which is 1 where
+standard deviations are those of the errors. A parameter counts if the log determines it. Rows "identified" count only
+those of which the report says so, whose value is at least twice the standard deviation.
 """
 
 from __future__ import annotations
@@ -150,7 +151,7 @@ def pseudo_true(friction: Friction, q: Array, qd: Array) -> dict[str, Array]:
 
 
 def ratios(case: str, physical: bool, seed: int) -> dict[str, list[float]]:
-    """Error over standard deviation of everything that one log identifies, by group."""
+    """Error over standard deviation of everything that one log determines, by group."""
     noise, friction = CASES[case]
     of, rng = robot(), np.random.default_rng([seed, sorted(CASES).index(case)])
     time, q, qd, qdd = motion(rng)
@@ -163,15 +164,19 @@ def ratios(case: str, physical: bool, seed: int) -> dict[str, list[float]]:
     found = calibrate_logs(unknown, [log], options, ChainRegressor(unknown), None, lambda _: None)
     truth, near = of.model.theta_b, pseudo_true(friction, q, qd)
     assert truth is not None
-    inertial = [
-        (row.value - true) / row.std
+    base = [
+        ((row.value - true) / row.std, row.identifiable)
         for row, true in zip(found.parameters, truth, strict=True)
-        if row.identifiable
+        if np.isfinite(row.std)
     ]
     rubbing = [
-        (row.value - near[row.name][names.index(row.joint)]) / row.std for row in found.friction if row.seen
+        ((row.value - near[row.name][names.index(row.joint)]) / row.std, row.seen)
+        for row in found.friction
+        if np.isfinite(row.std)
     ]
-    return {"base parameters": inertial, "friction": rubbing}
+    groups = {"base parameters": base, "friction": rubbing}
+    every = {group: [z for z, _ in rows] for group, rows in groups.items()}
+    return every | {f"{group}, identified": [z for z, seen in rows if seen] for group, rows in groups.items()}
 
 
 def table(cases: list[str], logs: int, physical: bool, workers: int) -> Iterator[str]:
