@@ -163,13 +163,14 @@ class _Solved:
         """
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
-        sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))
+        bound = self.options.huber if self.options.method == "irls" else np.inf
+        sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)), bound)
         sandwich = self._sandwich(weighted, use)
         by_scores = self._by_scores(sandwich, sums.squares)
         white = by_scores @ np.tensordot(sandwich.level, sums.squares, axes=1) @ by_scores.T
         level = sandwich.level * widening(weighted, use) ** 2
         fit = by_scores @ np.tensordot(level, sums.squares, axes=1) @ by_scores.T
-        optimism = self._optimism(np.diag(fit), sums.scores @ by_scores.T)
+        optimism = self._optimism(np.diag(fit), sums.scores @ self._by_inner(sums.inner))
         common = max(float(np.median(optimism[self.identifiable])), 1.0) if self.identifiable.any() else 1.0
         factor = self._noise_factor(common**2 * np.diag(fit), np.diag(white))
         # a variance of c stretches has the relative standard error sqrt(2 / (c - 1))
@@ -214,6 +215,12 @@ class _Solved:
         return np.asarray(
             self.inverse @ np.linalg.solve(self.inverse.T @ slopes @ self.inverse, self.inverse.T)
         )
+
+    def _by_inner(self, inner: Array) -> Array:
+        """(l, l) change of the values per unit of the score, where errors depend on the columns: by the rows whose psi'
+        is one, A'A of them, and not by the mean of psi' (Huber and Ronchetti 2009, chapter 7)."""
+        by_seen = np.linalg.pinv(self.inverse.T @ inner @ self.inverse, hermitian=True)
+        return np.asarray(self.inverse @ by_seen @ self.inverse.T)
 
     def _noise_factor(self, widened: Array, white: Array) -> float:
         """The largest ratio of a standard deviation to that for white residuals."""
