@@ -3,10 +3,14 @@
 python tests/campaign/campaign_intervals.py                   200 logs of each kind of error, minutes
 python tests/campaign/campaign_intervals.py --logs 20 --cases coloured
 
-The robot is the first three joints of the virtual Denso. Each log has a motion of its own. Columns of the table: kind of
-error; group of parameters; number of estimates; share within 3 standard deviations; RMS of error over standard deviation, which is 1 where
-standard deviations are those of the errors. A parameter counts if the log determines it. Rows "identified" count only
-those of which the report says so, whose value is at least twice the standard deviation.
+The robot is the first three joints of the virtual Denso. Each log has a motion of its own. The columns of the table:
+
+- kind of error
+- group of parameters: all that the log determines, or only those that the report calls identified. The value of these is at
+  least twice the standard deviation
+- number of estimates
+- share of estimates within three standard deviations of the true value
+- RMS of error over standard deviation, which is 1 where standard deviations are those of the errors
 """
 
 from __future__ import annotations
@@ -66,7 +70,9 @@ def robot() -> Robot:
         folder = Path(name)
         (folder / "robot.toml").write_text(_first(EXAMPLES / "robots" / "denso_wall.toml", JOINTS))
         plant = _first(EXAMPLES / "plants" / "denso_virtual.toml", JOINTS)
-        of = f'robot = "{folder / "robot.toml"}"\n'  # and no harness, which holds joints that this robot lacks
+        of = (
+            f'robot = "{folder / "robot.toml"}"\n'  # and no harness, which holds joints that this robot lacks
+        )
         (folder / "plant.toml").write_text(of + plant[plant.index("[[joint]]") :])
         chain = load_robot(folder / "robot.toml", drive_inertia=True).chain
         return Robot(derive_model(chain), load_virtual_robot(folder / "plant.toml", ideal_sensors=True))
