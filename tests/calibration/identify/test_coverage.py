@@ -104,9 +104,7 @@ def test_an_unknown_that_wavers_gets_a_standard_deviation_of_its_own(method: Met
         found = estimate(*wavering(rng), FitOptions(method=method))
         z.append((found.values - [2.0, -1.0, 0.5]) / found.std)
 
-    assert np.all(
-        np.mean(np.abs(z) < 3.0, axis=0) >= 0.98
-    )  # of 200 with one seed, 0.99 +- 0.007
+    assert np.all(np.mean(np.abs(z) < 3.0, axis=0) >= 0.98)  # of 200 with one seed, 0.99 +- 0.007
     assert np.all(np.sqrt(np.mean(np.square(z), axis=0)) < 1.2)
     assert np.all(np.sqrt(np.mean(np.square(z), axis=0)) > 0.75)
 
