@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize planted-faults
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-intervals test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize planted-faults
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -52,6 +52,10 @@ CAMPAIGN ?= --robots 10000
 campaign: $(READY) ## compare 10,000 random chains, 1,000 trees and 300 robots with contacts and loops with Pinocchio and MuJoCo, some hours; CAMPAIGN='--robots 500 --trees 50 --contacts 20' for less
 	@mkdir -p $(GENERATED)
 	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --journal $(GENERATED)/campaign.jsonl --json $(GENERATED)/campaign.json
+
+INTERVALS ?= --logs 200
+test-intervals: $(READY) ## count how often three standard deviations hold the truth, 200 simulated logs of each kind of error, 20 minutes; INTERVALS='--logs 20' for less
+	$(RUN)/python tests/campaign/campaign_intervals.py $(INTERVALS)
 
 test-processes: $(READY) ## kill every command 50 times at random moments, and check the files
 	PSDMC_KILLS=50 $(RUN)/python -m pytest -q -rs tests/end_to_end/test_killed.py tests/end_to_end/test_full_disk.py

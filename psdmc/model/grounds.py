@@ -190,7 +190,7 @@ def _lacking(values: Values) -> str:
         for item in values["items"]
     ]
     factor = values["factor"]
-    by = "" if math.isnan(factor) else f", by a factor of up to {factor:.1f}"
+    by = "" if math.isnan(factor) else f", by a factor of about {factor:.1f}"
     return (
         f"the model lacks an effect at joint(s) {listed(named)}: the residual is no sensor noise, "
         f"and standard deviations are widened for it{by}"

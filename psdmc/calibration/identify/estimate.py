@@ -99,7 +99,8 @@ class Estimate:
     sigma             (n,)      residual RMS per joint, in the unit of the target
     weights           (N, n)    of the last round, one over unit; zero for rows that were not used
     correlation       (n,)      of the residual from sample to sample: near zero for noise
-    noise_factor      largest factor by which correlated residuals increased a standard deviation; near one for noise
+    noise_factor      largest factor by which correlated residuals increased a standard deviation; near one for noise.
+                      A further increase, which an unknown gets alone, does not count
     """
 
     values: Array

@@ -163,18 +163,24 @@ class _Solved:
         """
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
-        sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))
+        bound = self.options.huber if self.options.method == "irls" else np.inf
+        sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)), bound)
         sandwich = self._sandwich(weighted, use)
         by_scores = self._by_scores(sandwich, sums.squares)
         white = by_scores @ np.tensordot(sandwich.level, sums.squares, axes=1) @ by_scores.T
         level = sandwich.level * widening(weighted, use) ** 2
         fit = by_scores @ np.tensordot(level, sums.squares, axes=1) @ by_scores.T
-        fit *= max(self._optimism(np.diag(fit), sums.scores @ by_scores.T), 1.0) ** 2
+        optimism = self._optimism(np.diag(fit), sums.scores @ self._by_inner(sums.inner))
+        common = max(float(np.median(optimism[self.identifiable])), 1.0) if self.identifiable.any() else 1.0
+        factor = self._noise_factor(common**2 * np.diag(fit), np.diag(white))
+        # a variance of c stretches has the relative standard error sqrt(2 / (c - 1))
+        beyond = 1.0 + 2.0 * np.sqrt(2.0 / max(len(sums.scores) - 1, 1))
+        own = np.where(optimism**2 > beyond * common**2, optimism, common)
+        fit *= np.outer(own, own)
         considered, total = np.zeros((l, 0)), fit
         if covariance is not None and sums.consider.shape[1]:
             considered = -self.inverse @ (self.inverse.T @ sums.consider)
             total = fit + considered @ covariance @ considered.T
-        factor = self._noise_factor(np.diag(fit), np.diag(white))
         unit = np.sqrt(sandwich.unit) or 1.0
         by_prior = self.unseen.T / self.scale / self.options.seen
         return Estimate(
@@ -210,6 +216,12 @@ class _Solved:
             self.inverse @ np.linalg.solve(self.inverse.T @ slopes @ self.inverse, self.inverse.T)
         )
 
+    def _by_inner(self, inner: Array) -> Array:
+        """(l, l) change of the values per unit of the score, where errors depend on the columns: by the rows whose psi'
+        is one, A'A of them, and not by the mean of psi' (Huber and Ronchetti 2009, chapter 7)."""
+        by_seen = np.linalg.pinv(self.inverse.T @ inner @ self.inverse, hermitian=True)
+        return np.asarray(self.inverse @ by_seen @ self.inverse.T)
+
     def _noise_factor(self, widened: Array, white: Array) -> float:
         """The largest ratio of a standard deviation to that for white residuals."""
         seen = np.flatnonzero((white > 0) & self.identifiable)
@@ -220,15 +232,13 @@ class _Solved:
         clusters = min(self.options.clusters, count // 4)
         return clusters if clusters >= FEWEST_CLUSTERS and self.rank else 0
 
-    def _optimism(self, widened: Array, moved: Array) -> float:
-        """Cluster-robust over widened standard deviation, median over parameters (Liang and Zeger 1986): clusters are
-        stretches of time. moved (c, l) is what each stretch's score does to the values."""
+    def _optimism(self, widened: Array, moved: Array) -> Array:
+        """(l,) cluster-robust over widened standard deviation (Liang and Zeger 1986): clusters are stretches of time.
+        One where it is unknown. moved (c, l) is what each stretch's score does to the values."""
         count = len(moved)
-        seen = np.flatnonzero((widened > 0) & self.identifiable)
-        if not count or not len(seen):
-            return 1.0
-        robust = np.sum(moved**2, axis=0) * count / (count - 1)
-        return float(np.sqrt(np.median(robust[seen] / widened[seen])))
+        robust = np.sum(moved**2, axis=0) * count / max(count - 1, 1)
+        known = (widened > 0) & self.identifiable & (count > 0)
+        return np.asarray(np.sqrt(np.divide(robust, widened, out=np.ones(len(widened)), where=known)))
 
 
 FEWEST_CLUSTERS = 5

@@ -89,36 +89,43 @@ class Collected:
     weighted columns of l unknowns.
 
     squares   (n, l, l) A'A of the rows of each of n joints
+    inner     (l, l)    A'A of the rows whose weighted residual is within a bound
     scores    (c, l)    A' times the weighted residual, for each of c periods of time
     consider  (l, k)    A' times the weighted columns of k results of earlier steps (Consider)
     """
 
     squares: Array
+    inner: Array
     scores: Array
     consider: Array
 
 
-def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Collected:
+def collected(rows: Rows, weights: Array, weighted: Array, clusters: int, bound: float = np.inf) -> Collected:
     """Return the sums over all rows of a least-squares problem from which standard deviations are computed.
 
     weights   (N samples, n joints) factors of the rows
     weighted  (N, n) residual times weights
     clusters  number of periods of time for which `scores` are summed; 0: none
+    bound     size of `weighted` up to which a row counts in `inner`
     """
     count, n = weighted.shape
     squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
+    inner = np.zeros((0, 0))
     for block, own in with_rows(rows):
         flat = block.columns * weights[own][:, :, None]
         if not squares.shape[1]:
             l, k = flat.shape[2], 0 if block.consider is None else block.consider.shape[2]
             squares, scores, consider = np.zeros((n, l, l)), np.zeros((clusters, l)), np.zeros((l, k))
+            inner = np.zeros((l, l))
         squares += np.stack([flat[:, j].T @ flat[:, j] for j in range(n)])
+        within = flat[np.abs(weighted[own]) <= bound]
+        inner += within.T @ within
         if clusters:
             stretch = np.arange(own.start, own.stop) * clusters // count
             np.add.at(scores, stretch, np.einsum("tnl,tn->tl", flat, weighted[own]))
         if block.consider is not None:
             consider += np.einsum("tnl,tnk->lk", flat, block.consider * weights[own][:, :, None])
-    return Collected(squares, scores, consider)
+    return Collected(squares, inner, scores, consider)
 
 
 def with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:

@@ -121,7 +121,7 @@ def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tup
     where = ", ".join(f"{name} ({rho:.2f})" for name, rho in found) or "all joints together"
     text = (
         f"{step}: the residual is no noise but correlated from sample to sample, joint(s) {where}: the model lacks an "
-        f"effect there; standard deviations are widened for it, by a factor of up to {solved.noise_factor:.1f}"
+        f"effect there; standard deviations are widened for it, by a factor of about {solved.noise_factor:.1f}"
     )
     return (Remark(text, "residual"),)
 

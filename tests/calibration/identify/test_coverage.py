@@ -88,6 +88,44 @@ def test_standard_deviations_are_those_of_the_errors(method: Method, errors: Err
     assert np.mean(np.abs(spread) < 3.0) > 0.9973
 
 
+def wavering(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of three unknowns, and targets with noise. The first unknown wavers slowly about its true value, as a
+    friction that the law lacks makes it. Its column is white: so the residual is, but not what it does to this unknown."""
+    columns = rng.standard_normal((1200, 1, 3))
+    slow = signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(1400))[200:]
+    error = 0.5 * slow[:, None] * columns[:, :, 0] + 0.5 * rng.standard_normal((1200, 1))
+    return columns, columns @ [2.0, -1.0, 0.5] + error
+
+
+@pytest.mark.parametrize("method", ["wls", "irls"])
+def test_an_unknown_that_wavers_gets_a_standard_deviation_of_its_own(method: Method):
+    rng, z = np.random.default_rng(8), []
+    for _ in range(200):
+        found = estimate(*wavering(rng), FitOptions(method=method))
+        z.append((found.values - [2.0, -1.0, 0.5]) / found.std)
+
+    assert np.all(np.mean(np.abs(z) < 3.0, axis=0) >= 0.98)  # of 200 with one seed, 0.99 +- 0.007
+    assert np.all(np.sqrt(np.mean(np.square(z), axis=0)) < 1.2)
+    assert np.all(np.sqrt(np.mean(np.square(z), axis=0)) > 0.75)
+
+
+def test_its_standard_deviation_is_liang_and_zeger_s():
+    """Their equation (1986), retyped: (X'X)^-1 (sum over clusters of X_c' r_c r_c' X_c) (X'X)^-1 c / (c - 1)."""
+    columns, target = wavering(np.random.default_rng(8))
+    found = estimate(columns, target, FitOptions(method="ols"))
+
+    rows, c = columns[:, 0], 30
+    values, *_ = np.linalg.lstsq(rows, target[:, 0], rcond=None)
+    scores = (rows * (target[:, 0] - rows @ values)[:, None]).reshape(c, -1, 3).sum(axis=1)
+    bread = np.linalg.inv(rows.T @ rows)
+    robust = np.sqrt(np.diag(bread @ scores.T @ scores @ bread) * c / (c - 1))
+    plain = np.sqrt(np.diag(bread) * np.sum((target[:, 0] - rows @ values) ** 2) / (len(rows) - 3))
+
+    assert robust[0] > 1.5 * plain[0]
+    assert found.std[0] == pytest.approx(robust[0], rel=1e-6)
+    assert np.all(found.std >= plain * (1 - 1e-9))
+
+
 def plant_torque(arm, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
     """By Pinocchio, of the plant's own reader."""
     model = load_virtual_robot(arm.plant).model
