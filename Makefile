@@ -53,7 +53,7 @@ campaign: $(READY) ## compare 10,000 random chains, 1,000 trees and 300 robots w
 	@mkdir -p $(GENERATED)
 	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --journal $(GENERATED)/campaign.jsonl --json $(GENERATED)/campaign.json
 
-INTERVALS ?= --logs 200
+INTERVALS ?= --workers 2
 test-intervals: $(READY) ## count how often three standard deviations hold the truth, 200 simulated logs of each kind of error, 20 minutes; INTERVALS='--logs 20' for less
 	$(RUN)/python tests/campaign/campaign_intervals.py $(INTERVALS)
 
