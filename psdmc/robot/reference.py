@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ DIFFERENCE = 0.02
 """rad or m: its step. The ninth derivative leaves 1e-16, rounding 1e-14."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Reference:
     """The dynamics of one Pinocchio model for arrays of states: q, qd, qdd, tau (..., n) with n joints, and wrenches
     (..., frames, 6), SI.
@@ -269,10 +270,14 @@ class Reference:
 
         return self.each(loaded, *states, np.reshape(wrenches, (*wrenches.shape[:-2], -1)))
 
+    @cached_property
+    def _data(self) -> pinocchio.Data:
+        return self.model.createData()
+
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
         """Return the values of a Pinocchio function of (model, data, state ...) at every state. The leading axes of the
         states broadcast as in NumPy."""
-        data = self.model.createData()
+        data = self._data
         rows = [np.asarray(state, dtype=float) for state in states]
         lead = np.broadcast_shapes(*(row.shape[:-1] for row in rows))
         flat = [np.broadcast_to(row, (*lead, row.shape[-1])).reshape(-1, row.shape[-1]) for row in rows]

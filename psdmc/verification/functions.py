@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -33,11 +34,13 @@ FEW, SLOW = (
         "with_wrenches_",
         "constrained_forward_dynamics_",
         "impulse_",
+        "tangent_map",
     ),
 )
 """States of functions with such words in their names: second derivatives, whose expected values are differences of
-Pinocchio's derivatives; derivatives of Runge-Kutta steps, which call those of forward dynamics four times; and derivatives
-under wrenches and with contacts, which share the recursion of those without."""
+Pinocchio's derivatives; derivatives of Runge-Kutta steps, which call those of forward dynamics four times; derivatives
+under wrenches and with contacts, which share the recursion of those without; and maps of which Pinocchio gives a column
+at a time."""
 
 MOST_RATES = 24
 """Joint rates up to which second derivatives are compared: each rate takes 2 to 8 calls of Pinocchio's derivatives."""
@@ -54,21 +57,29 @@ ROUNDED = 1e-4
 
 
 class _Remembering(RobotOnArrays):
-    """A robot that computes derivatives of torques once for the same states, as most functions need them."""
+    """A robot that computes mass matrices and derivatives of torques once for the same states, as most functions need
+    them."""
 
     @cached_property
-    def _known(self) -> dict[tuple[bytes, ...], tuple[Array, Array, Array]]:
+    def _known(self) -> dict[tuple[bytes, ...], Any]:
         return {}
 
     def torque_derivatives(
         self, q: Array, qd: Array, qdd: Array, external: Mapping[int, Wrench] = NO_WRENCHES
     ) -> tuple[Array, Array, Array]:
-        if external is not NO_WRENCHES:
-            return super().torque_derivatives(q, qd, qdd, external)
-        key = tuple(array.tobytes() for array in (q, qd, qdd))
+        loads = (np.append(link, np.ravel(wrench)) for link, wrench in sorted(external.items()))
+        key = tuple(array.tobytes() for array in (q, qd, qdd, *loads))
         if key not in self._known:
-            self._known[key] = super().torque_derivatives(q, qd, qdd)
-        return self._known[key]
+            self._known[key] = super().torque_derivatives(q, qd, qdd, external)
+        found: tuple[Array, Array, Array] = self._known[key]
+        return found
+
+    def mass_matrix(self, q: Array) -> Array:
+        key = (q.tobytes(),)
+        if key not in self._known:
+            self._known[key] = super().mass_matrix(q)
+        found: Array = self._known[key]
+        return found
 
 
 def function_errors(

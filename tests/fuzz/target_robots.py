@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from limits import CHECK_SECONDS, limited_time
 from mutate_options import robot_and_options
 from oracle import torque_error
 from oracle_mjcf import mujoco_error
@@ -68,7 +69,9 @@ def _robot(data: bytes, file: Path, source_format: SourceFormat, deep: bool, opt
 def _derived(loaded: LoadedRobot, source_format: SourceFormat) -> None:
     """The model passes its own check; without snapping its torques are Pinocchio's."""
     model = _model(loaded)
-    failed = [f"{row.name}: {row.error:.2g}" for row in check_model(model) if not row.passed]
+    with limited_time(CHECK_SECONDS):
+        rows = check_model(model)
+    failed = [f"{row.name}: {row.error:.2g}" for row in rows if not row.passed]
     if failed:
         raise BrokenRule("CheckFails", "psdmc/verification/check.py", "; ".join(failed))
     if loaded.snap_report:
