@@ -35,7 +35,6 @@ from psdmc.toolchain.call_arguments import (
     has_rows,
     indefinite,
     parameters,
-    scalar_inputs,
     signature_of,
     states,
     with_rows,
@@ -129,10 +128,10 @@ def _refuse_indefinite(
     """InputError for the first state, of finite inputs, in which a matrix is not positive definite that has an error."""
     arrays = [given[quantity.name] for quantity in signature.inputs]
     lost = ~(pivots > 0.0) & finite_states(signature, arrays)[:, None]
+    arrays = [array.reshape((*lead, *array.shape[1:])) for array in arrays]
     for row in np.flatnonzero(lost.any(axis=1)).tolist():
-        state = [int(k) for k in np.unravel_index(row, lead)] if lead else []
-        scalars = scalar_inputs(signature, arrays, (row,))
-        error = indefinite(signature, axes, int(np.argmax(lost[row])), scalars, state)
+        state = tuple(int(k) for k in np.unravel_index(row, lead)) if lead else ()
+        error = indefinite(signature, axes, int(np.argmax(lost[row])), arrays, state)
         if error:
             raise error
 

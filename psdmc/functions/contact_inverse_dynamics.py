@@ -53,7 +53,7 @@ MASK = SymmetricMatrix(
     number="the number, from 0, of the first contact whose active is neither 0 nor 1, or of the first contact if mu is "
     "negative",
     failure="an entry of active is neither 0 nor 1\nmu is negative",
-    error="contact {contacts!r}: active is not 0 or 1, or mu = {mu:g} is negative",
+    error="contact {contacts!r}: active or mu is not allowed",
     hint="give active 0 or 1 for each contact, and mu = 0 or more",
 )
 

@@ -120,7 +120,8 @@ class Quantity:
              Along l it is that of the base parameter. Along 6, and the rows of a contact, it is m for the first three,
              then 1
     default  the value of all entries if Python's callers leave the input out
-    whole    whether tests draw whole numbers only
+    whole    whether only `least` and `largest` are allowed, such as 0 and 1
+    lowest   the smallest value that is allowed, or None
     by_q     whether entries are derivatives by q
     """
 
@@ -133,6 +134,7 @@ class Quantity:
     least: float | None = None
     default: float | None = None
     whole: bool = False
+    lowest: float | None = None
     by_q: bool = False
 
     def __post_init__(self) -> None:
@@ -163,6 +165,15 @@ class Quantity:
             return self.largest * shares
         drawn = self.least + (self.largest - self.least) * (0.5 + 0.5 * shares)
         return (drawn + 0.5) // 1 if self.whole else drawn
+
+    def fault(self, values: Sequence[float]) -> tuple[int, str] | None:
+        """Return the index of the first value that is not allowed, and words for what is expected; None if all are."""
+        for k, value in enumerate(values):
+            if self.whole and value not in (self.least, self.largest):
+                return k, f"{self.least:g} or {self.largest:g}"
+            if self.lowest is not None and not value >= self.lowest:
+                return k, f"{self.lowest:g} or more"
+        return None
 
     @property
     def is_matrix(self) -> bool:

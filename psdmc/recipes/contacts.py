@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.closed_loops import loop_jacobian
+from psdmc.dynamics.closed_loops import ANGULAR, loop_jacobian
 from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inverse, inverse_diagonal
@@ -51,6 +51,7 @@ MU = Quantity(
     "angular rows",
     unit="1/kg",
     default=0.0,
+    lowest=0.0,
 )
 
 CONTACTS = SymmetricMatrix(
@@ -61,9 +62,8 @@ CONTACTS = SymmetricMatrix(
     "or whose active is neither 0 nor 1",
     failure="an entry of active is neither 0 nor 1\nmu is negative\nJ M^-1 J^T + mu I of the active contacts is not "
     "positive definite, for example because mu = 0 and two active contacts prevent the same motion",
-    error="{constraints}: J M^-1 J^T + mu I of the active contacts is not positive definite at mu = {mu:g}, or "
-    "active is not 0 or 1",
-    hint="give active 0 or 1 for each contact, and mu > 0, such as 1e-6, if contacts hold more motions than the robot has",
+    error="{constraints}: J M^-1 J^T + mu I of the active contacts is not positive definite at mu = {mu:g}",
+    hint="give mu > 0, such as 1e-6, if contacts hold more motions than the robot has",
 )
 
 NOTHING = 1e-30
@@ -151,17 +151,26 @@ class Held(NamedTuple):
     def independent(self, matrix: Rows, factors: Factors, inverse: Sequence[Scalar]) -> list[Scalar]:
         """Return a sign for each contact: -1 if `matrix` is not positive definite there, or if active or mu is not
         allowed, else 1. `inverse` is the diagonal of the inverse matrix."""
-        signs, first = [], 0
+        signs, first, sizes = [], 0, self._sizes(matrix)
         for number, (untested, count) in enumerate(zip(self.allowed(), self.counts, strict=True)):
             sign = untested
             for k in range(first, first + count):
-                sign = regular(sign, factors.pivots[k], matrix[k][k], inverse[k])
+                sign = regular(sign, factors.pivots[k], sizes[k], inverse[k])
             if self.loops and number < len(self.active):
                 # Where loops have no solution, contacts that are not active are not at fault.
                 sign = Op.SELECT(self.active[number], 0.5, untested, sign)
             signs.append(sign)
             first += count
         return signs
+
+    def _sizes(self, matrix: Rows) -> list[Scalar]:
+        """For each row the sum of the diagonal entries of its contact's linear rows, or of its angular rows. Near a dead
+        point, a row of J is a small difference of large numbers, and its own entry hides the digits that this cost."""
+        kinds = [(number, axis >= ANGULAR) for number, own in enumerate(self.axes) for axis in own]
+        sums: dict[tuple[int, bool], Scalar] = {}
+        for k, kind in enumerate(kinds):
+            sums[kind] = sums[kind] + matrix[k][k] if kind in sums else matrix[k][k]
+        return [sums[kind] for kind in kinds]
 
     def signs(self, positive: Sequence[Scalar]) -> list[Scalar]:
         """Return a sign for each contact: -1 if a number of one of its rows is not positive, or if active or mu is not

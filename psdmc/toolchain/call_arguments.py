@@ -162,14 +162,14 @@ def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike
 
 
 def indefinite(
-    function: Signature, axes: RobotAxes, pivot: int, scalars: Mapping[str, float], state: Sequence[int]
+    function: Signature, axes: RobotAxes, pivot: int, arrays: Sequence[Array], state: tuple[int, ...]
 ) -> InputError | None:
     """Return the error for a state at which a pivot (divisor of a matrix factorisation) is not positive. Return None if
     the function reports this state by NaN.
 
-    pivot    number of the pivot
-    scalars  values of the function's scalar inputs at this state
-    state    index of the state in the batch
+    pivot   number of the pivot
+    arrays  all inputs, broadcast to common batch axes
+    state   index of the state in the batch
     """
     for matrix in function.factorises * function.stages:
         shape = axes.sizes.shape(matrix.axes)
@@ -178,17 +178,19 @@ def indefinite(
         pivot -= math.prod(shape)
     if not matrix.error:
         return None
+    where = f" in state {', '.join(map(str, state))}" if state else ""
+    given = {q: array[state].ravel() for q, array in zip(function.inputs, arrays, strict=True)}
+    for quantity, values in given.items():
+        if wrong := quantity.fault(values):
+            k, expected = wrong
+            whose = "".join(f" of '{axes.names[axis][k]}'" for axis in quantity.axes if axis in axes.names)
+            return InputError(
+                f"{function.name}: {quantity.name}{whose} is {values[k]:g}{where}", f"give {expected}"
+            )
     places = zip(matrix.axes, map(int, np.unravel_index(pivot, shape)), strict=True)
     names = {axis: axes.names[axis][k] for axis, k in places if axis in axes.names}
-    where = f" in state {', '.join(map(str, state))}" if state else ""
+    scalars = {quantity.name: float(values[0]) for quantity, values in given.items() if not quantity.axes}
     return InputError(f"{function.name}: {matrix.error.format(**names, **scalars)}{where}", matrix.hint)
-
-
-def scalar_inputs(function: Signature, arrays: Sequence[Array], state: tuple[int, ...]) -> dict[str, float]:
-    """Return the inputs that are single numbers, such as a time step, at one state: name -> value. `arrays` are all
-    inputs, broadcast to common batch axes."""
-    pairs = zip(function.inputs, arrays, strict=True)
-    return {quantity.name: float(array[state]) for quantity, array in pairs if not quantity.axes}
 
 
 def finite_states(function: Signature, arrays: Sequence[Array]) -> NDArray[np.bool_]:

@@ -28,7 +28,6 @@ from psdmc.toolchain.call_arguments import (
     has_rows,
     indefinite,
     parameters,
-    scalar_inputs,
     states,
     takes_results,
     with_rows,
@@ -350,7 +349,7 @@ class CompiledFunctions(RobotFacts):
             one = [np.ascontiguousarray(row[state]) for row in given] + list(rows[len(given) :])
             unused = [np.empty(tail, self._dtype) for tail in kernel.tails]
             number = kernel.single(*map(self._address, one), *map(self._address, unused))
-            error = indefinite(function, self._axes, number - 1, scalar_inputs(function, given, state), state)
+            error = indefinite(function, self._axes, number - 1, given, state)
             if error:
                 raise error
 

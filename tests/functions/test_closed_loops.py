@@ -17,7 +17,9 @@ from test_loop_error import TREES
 import psdmc
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES, SIGNATURES
+from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Needs
+from psdmc.robot.load import load_robot
 from psdmc.robot.reference import reference
 
 NAME = "constrained_forward_dynamics"
@@ -393,6 +395,28 @@ def test_a_dead_point_names_the_loop(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="constrained_rk4_step: loop 'pin': J M"):
             each.constrained_rk4_step(*state[:3], 0.01, state[3])
     assert np.isfinite(model.constrained_forward_dynamics(*state, mu=1e-6).qdd).all()
+
+
+@pytest.mark.parametrize("away", [1e-9, 1e-5])
+def test_near_a_dead_point_lost_digits_are_not_returned(tmp_path: Path, away: float) -> None:
+    """The bars are in one line but for this angle, and the pin's force along the line grows as 1 / angle. It is refused
+    where rounding decides it; at 1e-5 rad the dense system has it, with the digits that its condition number leaves."""
+    path = tmp_path / "flat.urdf"
+    path.write_text(FOUR_BAR.replace(f'xyz="{GROUND} 0 0"', 'xyz="0.3 0 0"'), encoding="utf-8")
+    model = psdmc.derive(path, loops=[PIN], expand=False)
+    state = (away * np.array([1.0, 1.0, -2.0]), np.zeros(3), np.zeros(3), np.zeros(len(model.contacts)))
+    for robot in (model, psdmc.compile(model, functions=[NAME])):
+        if away < 1e-7:
+            with pytest.raises(InputError, match=f"{NAME}: loop 'pin': J M"):
+                robot.constrained_forward_dynamics(*state)
+            continue
+        own = reference(load_robot(path, loops=[PIN]))
+        sizes = Sizes(3, 3, 3, 0, 1, 0, model.mechanism.rows_of_contacts, model.mechanism.rows_of_loops)
+        given = {q.name: np.zeros((1, *sizes.shape(q.axes))) for q in SIGNATURES[NAME].inputs}
+        expected = RECIPES[NAME].pinocchio(own, given | {"q": state[0][None]})
+        found = robot.constrained_forward_dynamics(*state)
+        assert np.abs(found.qdd - expected["qdd"]).max() < 1e-5
+        assert np.abs(found.forces - expected["forces"]).max() < 1e-5 * np.abs(found.forces).max()
 
 
 def test_functions_without_loops_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -139,9 +139,13 @@ def test_other_masks_and_negative_mu_are_refused(active: float, mu: float) -> No
     own = contact_tree(0, True)
     state = [own.given[name][0] for name in ("q", "qd", "tau")]
     mask = np.array([1.0, active, 0.0])[: own.given["active"].shape[1]]
+    said = f"mu is {mu:g}" if mu else rf"active of '\w+' is {active:g}"
     for robot in (own.robot, own.model):
-        with pytest.raises(InputError, match="active is not 0 or 1"):
+        with pytest.raises(InputError, match=rf": {said}\n"):
             robot.constrained_forward_dynamics(*state, mask, mu)
+        many = [np.stack([entry, entry]) for entry in state]
+        with pytest.raises(InputError, match=rf": {said} in state 1\n"):
+            robot.constrained_forward_dynamics(*many, np.stack([mask * 0.0, mask]), [0.0, mu])
     with pytest.raises(InputError, match=r"active has shape \(9,\)") as error:
         own.robot.constrained_forward_dynamics(*state, np.ones(9))
     assert "the contacts are foot" in str(error.value.hint)

@@ -218,17 +218,17 @@ def test_python_names_frame_mu_and_state(is_compiled: bool) -> None:
     bent = np.where(np.arange(6) == 4, 1.0, STRAIGHT)
     text = f"{NAME}: frame 'link6': J M^-1 J^T + mu I is not positive definite at mu = "
 
-    def refusal(*given: object, **named: object) -> str:
+    remedy = "give mu > 0, such as 1e-3, or a pose in which the frame can move in all six directions"
+
+    def refusal(*given: object, hint: str = remedy, **named: object) -> str:
         with pytest.raises(InputError) as caught:
             call(*given, **named)
-        assert caught.value.hint == (
-            "give mu > 0, such as 1e-3, or a pose in which the frame can move in all six directions"
-        )
+        assert caught.value.hint == hint
         return str(caught.value).splitlines()[0]
 
     assert refusal(STRAIGHT, 0.0) == f"{text}0"
     assert refusal(STRAIGHT, np.array(0.0)) == f"{text}0"
-    assert refusal(bent, -0.5) == f"{text}-0.5"
+    assert refusal(bent, -0.5, hint="give 0 or more") == f"{NAME}: mu is -0.5"
     assert refusal([[bent], [STRAIGHT]], 0.0) == f"{text}0 in state 1, 0"
     assert refusal(np.array([bent, STRAIGHT]), np.zeros(2)) == f"{text}0 in state 1"
     assert refusal(STRAIGHT, 0.0, theta_b=1.01 * np.asarray(model.theta_b)) == f"{text}0"
