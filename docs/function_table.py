@@ -67,6 +67,7 @@ UNRELEASED = frozenset(
         "impulse_derivatives",
         "impulse_jvp",
         "impulse_vjp",
+        "impulse_vjp_parameters",
         "inverse_dynamics_second_derivatives",
         "inverse_dynamics_second_derivatives_packed",
         "inverse_dynamics_with_wrenches_derivatives",

@@ -144,7 +144,7 @@ def _gradient(name: str) -> Rule:
 
 def _contacts(name: str) -> Rule:
     """Of a function with contacts. Its derivatives take the function's inputs by name, in another order. At fixed torques,
-    a change of theta_b acts as the opposite change of the torques."""
+    a change of theta_b acts as the opposite change of the torques, and in an impact as an impulse of the joints."""
     signature, backward, forward = (SIGNATURES[f"{name}{ending}"] for ending in ("", "_vjp", "_jvp"))
     names = [each.name for each in signature.inputs]
     gradients = [each.name for each in backward.outputs]
@@ -152,11 +152,14 @@ def _contacts(name: str) -> Rule:
     def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
         given = dict(zip(names, inputs, strict=True))
         given |= {f"d{each}": tangent for each, tangent in zip(names, tangents, strict=True)}
-        if dtheta is not None:
+        if dtheta is not None and "dtau" in given:
             qdd, _ = f.call(name, *inputs)
             (regressor,) = f.call("regressor", *inputs[:2], qdd)
             given["dtau"] = given["dtau"] - _times(f, regressor, dtheta)
-        return f.call(forward.name, *(given[each.name] for each in forward.inputs))[2:]
+        found = f.call(forward.name, *(given[each.name] for each in forward.inputs))[2:]
+        if dtheta is None or "dtau" in given:
+            return found
+        return tuple(x + y for x, y in zip(found, _impulse_by_theta(f, given, dtheta), strict=True))
 
     def back(f: Framework, inputs: Arrays, cotangents: Arrays, by_theta: bool) -> tuple[Arrays, Array | None]:
         given = dict(zip(names, inputs, strict=True))
@@ -169,6 +172,21 @@ def _contacts(name: str) -> Rule:
 
     constant = tuple(each for each in names if f"grad_{each}" not in gradients)
     return Rule(along, back, f"{backward.name}_parameters" in SIGNATURES, constant)
+
+
+def _impulse_by_theta(f: Framework, given: dict[str, Array], dtheta: Array) -> Arrays:
+    """The change of an impact's rates and impulses with theta_b. Its equations have the matrix of constrained forward
+    dynamics, and M (after - before) changes as torques at rest and without gravity do: see that function's `dtau`."""
+    q, before = given["q"], given["qd_before"]
+    after, _ = f.call("impulse", *(given[each.name] for each in SIGNATURES["impulse"].inputs))
+    still = 0.0 * before
+    kick, weight = (f.call("regressor", q, still, change)[0] for change in (after - before, still))
+    response = SIGNATURES["constrained_forward_dynamics_jvp"]
+    zero, of_rows = 0.0 * given["mu"], 0.0 * f.call("contact_drift", q, still)[0]
+    known = {each.name: still for each in response.inputs if each.axes == ("nv",)}
+    known |= {"q": q, "active": given["active"], "mu": given["mu"], "kp": zero, "kd": zero}
+    known |= {"error": of_rows, "derror": of_rows, "dtau": -_times(f, kick - weight, dtheta)}
+    return f.call(response.name, *(known[each.name] for each in response.inputs))[2:]
 
 
 def _blocks(name: str) -> Rule:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.scalar import ZERO, Scalar
@@ -22,7 +23,9 @@ def residuals(g: Ingredients, after: Sequence[Scalar], impulses: Sequence[Scalar
     (restitution,) = g.inputs[RESTITUTION.name]
     of = Constraints(g.frames, g.named, g.loops, g.root)
     rows = of.jacobian(q)
-    kicked = torques(g, g.still, [x - rate for x, rate in zip(after, before, strict=True)], ZERO)
+    kicked = torques(
+        replace(g, friction=None), g.still, [x - rate for x, rate in zip(after, before, strict=True)], ZERO
+    )
     seen = [x + restitution * rate for x, rate in zip(after, before, strict=True)]
     return [
         *(x - inner_product(own, impulses) for x, own in zip(kicked, zip(*rows, strict=True), strict=True)),

@@ -116,6 +116,11 @@ class ContactFunction:
         )
 
     def _gradient_trace(self, g: Ingredients) -> Outputs:
+        return self.gradient_and_adjoint(g)[0]
+
+    def gradient_and_adjoint(self, g: Ingredients) -> tuple[Outputs, list[Scalar]]:
+        """Return the gradient function's outputs, and the adjoint of the motion: the nv derivatives of the weighted sum by
+        r, the right-hand side of M x - J^T f = r."""
         found, signs, factors, _ = self.solved(g)
         motion, forces = (g.inputs[each.name] for each in self.weights)
         load, push = solved_again(factors, found, motion, [-each for each in forces], Held.of(g).rows[0])
@@ -125,7 +130,7 @@ class ContactFunction:
         rest = iter(substituted([x for part in parts for x in part], free, [*found.motion, *found.forces]))
         blocks = [list(islice(rest, len(part))) for part in inputs]
         blocks[0] = pulled_back(g.frames, inputs[0], blocks[0])
-        return self._named(g, found, signs, factors, map(gradient_by, self.by), blocks)
+        return self._named(g, found, signs, factors, map(gradient_by, self.by), blocks), load
 
     def _along_trace(self, g: Ingredients) -> Outputs:
         found, signs, factors, _ = self.solved(g)

@@ -31,7 +31,7 @@ INVERTING = {
 COUNT = 4
 BY_THETA = ("inverse_dynamics", "forward_dynamics", "mass_matrix", "kinetic_energy")
 BY_THETA += ("inverse_dynamics_with_wrenches", "forward_dynamics_with_wrenches")
-BY_THETA += ("constrained_forward_dynamics",)
+BY_THETA += ("constrained_forward_dynamics", "impulse")
 QUICK = [("hopper", name) for name in RULED if name != "rk4_step"]
 
 

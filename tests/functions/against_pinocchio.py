@@ -77,6 +77,7 @@ LONG = frozenset(
         "constrained_rk4_step",
         "impulse_derivatives",
         "impulse_vjp",
+        "impulse_vjp_parameters",
         "impulse_jvp",
         "rk4_step",
         "rk4_step_derivatives",

@@ -1,4 +1,4 @@
-"""Gradients of forward dynamics with contacts by theta_b: their product with theta_b, and those by the state."""
+"""Gradients of forward dynamics with contacts, and of impacts, by theta_b."""
 
 from __future__ import annotations
 
@@ -12,42 +12,48 @@ from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.robot.reference import reference
 from psdmc.verification.check import with_passive_joints
 
-NAME = "constrained_forward_dynamics_vjp_parameters"
+NAMES = ("constrained_forward_dynamics", "impulse")
 
 
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("robot", INTERPRETED)
-def test_its_programs_are_pinocchios(robot: str) -> None:
+def test_programs_are_pinocchios(robot: str, name: str) -> None:
     """tests/frameworks compares with differences along a direction of theta_b."""
-    program_matches_pinocchio(NAME, robot)
-    assert bench(robot).long_kernels[NAME].theta is False
+    program_matches_pinocchio(f"{name}_vjp_parameters", robot)
+    assert bench(robot).long_kernels[f"{name}_vjp_parameters"].theta is False
 
 
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
     "made", [lambda model: model, pytest.param(OneByOne, marks=pytest.mark.slow)], ids=["NumPy", "C"]
 )
-def test_loops_and_contacts_together_have_the_slopes_of_pinocchios_dense_systems(made) -> None:
-    """Differences of Pinocchio's accelerations and forces between two robots whose bodies differ."""
+def test_loops_and_contacts_together_have_the_slopes_of_pinocchios_dense_systems(made, name: str) -> None:
+    """Differences of Pinocchio's motions and forces between two robots whose bodies differ."""
     own = four_bar_legs()
     model, given = own.model, {name: array[:4] for name, array in own.given.items()}
     given["active"] = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])
     rng = np.random.default_rng(3)
-    cotangents = [rng.normal(size=(4, size)) for size in (model.nv, given["cotangent_forces"].shape[1])]
+    outputs = [output.name for output in SIGNATURES[name].outputs]
+    rows = given["cotangent_forces"].shape[1]
+    weights = {
+        f"cotangent_{each}": rng.normal(size=(4, size))
+        for each, size in zip(outputs, (model.nv, rows), strict=True)
+    }
     change, step = rng.normal(size=model.l) * np.abs(model.theta_b), 1e-3
     read = with_passive_joints(model, own.loaded)
 
     def weighted_by_pinocchio(h: float) -> np.ndarray:
         x = model.mechanism.parameters.reshape(-1) + h * (model.representative @ change)
         robot = reference(read, snapped=False, parameters=x.reshape(len(model.mechanism), -1))
-        found = RECIPES["constrained_forward_dynamics"].pinocchio(robot, given)
-        pairs = zip(cotangents, (found["qdd"], found["forces"]), strict=True)
-        return np.sum([(weights * values).sum(axis=1) for weights, values in pairs], axis=0)
+        found = RECIPES[name].pinocchio(robot, given)
+        return np.sum([(weights[f"cotangent_{each}"] * found[each]).sum(axis=1) for each in outputs], axis=0)
 
     first, second = (
         (weighted_by_pinocchio(h) - weighted_by_pinocchio(-h)) / (2.0 * h) for h in (step, 2.0 * step)
     )
     expected = (4.0 * first - second) / 3.0
-    inputs = given | dict(zip(("cotangent_qdd", "cotangent_forces"), cotangents, strict=True))
-    states = [inputs[each.name] for each in SIGNATURES[NAME].inputs]
-    gradient = getattr(made(model), NAME)(*states).grad_theta_b
+    function = f"{name}_vjp_parameters"
+    states = [(given | weights)[each.name] for each in SIGNATURES[function].inputs]
+    gradient = getattr(made(model), function)(*states).grad_theta_b
     scale = np.abs(gradient * change).sum(axis=1)
     assert (np.abs(gradient @ change - expected) < 1e-7 * scale).all()
