@@ -34,7 +34,7 @@ FEW, SLOW = (
         "with_wrenches_",
         "constrained_forward_dynamics_",
         "impulse_",
-        "tangent_map",
+        "tangent_",
     ),
 )
 """States of functions with such words in their names: second derivatives, whose expected values are differences of

@@ -25,7 +25,7 @@ import function_table
 PACKAGE = Path(psdmc.functions.__file__).parents[1]
 
 NAMES_SEVERAL = {
-    "backends/c/adapters/casadi.py": "what derivatives by the entries of q and by theta_b are made of",
+    "backends/c/adapters/casadi_externals.py": "what derivatives by the entries of q and by theta_b are made of",
     "bench/rivals/casadi_c.py": "what this rival has, and under which names",
     "bench/rivals/cppadcg_c.py": "what this rival has, and under which names",
     "bench/rivals/mujoco_c.py": "what this rival has",
