@@ -45,12 +45,14 @@ class Score:
     median    median of the relative errors of those base parameters that are not tiny
     friction  largest relative error of Coulomb and viscous friction; NaN where the true friction is another law
     torque    (n,) N m RMS, error on the held-out motion, against the true torques without noise
+    moving    as torque, of the rows in which the joint is faster than SLOW
     """
 
     base: float
     median: float
     friction: float
     torque: tuple[float, ...]
+    moving: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,29 +117,49 @@ def _to_true_basis(model: Any, truth: Truth) -> Array:
     return np.asarray(np.linalg.lstsq(true, own, rcond=None)[0])
 
 
-def predicted(estimate: Estimate, truth: Truth, q: Array, qd: Array, qdd: Array) -> Array:
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """A motion that no program saw: regressor (N, n, l) of the true robot, rates and true torques (N, n)."""
+
+    regressor: Array
+    qd: Array
+    torque: Array
+
+
+def held_out_of(truth: Truth, motion: tuple[Array, Array, Array], torque: Array) -> HeldOut:
+    """Every EVERY-th row of a motion, with the true torques of all rows."""
+    q, qd, qdd = (x[::EVERY] for x in motion)
+    return HeldOut(truth.model.regressor(q, qd, qdd), qd, torque[::EVERY])
+
+
+def predicted(estimate: Estimate, held: HeldOut) -> Array:
     """(N, n) torques of an estimate."""
-    rigid = np.array([truth.model.regressor(*s) @ estimate.theta_b for s in zip(q, qd, qdd, strict=True)])
-    sign = np.sign(qd) if estimate.sign_speed == 0.0 else np.tanh(qd / estimate.sign_speed)
-    return np.asarray(rigid + estimate.coulomb * sign + estimate.viscous * qd + estimate.offset)
+    V = estimate.sign_speed
+    sign = np.sign(held.qd) if V == 0.0 else np.tanh(held.qd / V)
+    friction = estimate.coulomb * sign + estimate.viscous * held.qd + estimate.offset
+    return np.asarray(held.regressor @ estimate.theta_b + friction)
 
 
-def score(
-    estimate: Estimate, truth: Truth, motion: tuple[Array, Array, Array], torque: Array, lugre: bool
-) -> Score:
-    """The score of an estimate; `torque` (N, n) are the true torques of the motion."""
+def score(estimate: Estimate, truth: Truth, held: HeldOut, *, lugre: bool = False) -> Score:
+    """The score of an estimate."""
     error = estimate.theta_b - truth.theta_b
     large = np.abs(truth.theta_b) > SMALL * np.abs(truth.theta_b).max()
-    wrong = predicted(estimate, truth, *motion) - torque
+    wrong = (predicted(estimate, held) - held.torque) ** 2
+    moving = np.abs(held.qd) > SLOW
     pairs = ((estimate.coulomb, COULOMB), (estimate.viscous, VISCOUS))
     friction = max(float(np.max(np.abs(found / np.array(true) - 1.0))) for found, true in pairs)
     return Score(
         float(np.linalg.norm(error) / np.linalg.norm(truth.theta_b)),
         float(np.median(np.abs(error[large] / truth.theta_b[large]))),
         float("nan") if lugre else friction,
-        tuple(float(x) for x in np.sqrt(np.mean(wrong**2, axis=0))),
+        tuple(float(x) for x in np.sqrt(np.mean(wrong, axis=0))),
+        tuple(float(x) for x in np.sqrt(np.sum(wrong * moving, axis=0) / np.sum(moving, axis=0))),
     )
 
 
+EVERY = 8
+"""Rows of a held-out motion, of which one is scored: 31 rows per second."""
+SLOW = 0.1
+"""rad/s below which a joint is near a reversal: there, the error is that of the sign of the friction."""
 SMALL = 1e-3
 """Of the largest base parameter: smaller ones are mostly zeros with rounding, whose relative errors mean nothing."""
