@@ -99,7 +99,9 @@ def estimate_of_model(path: Path, truth: Truth) -> Estimate:
     if model.l != truth.model.l:
         raise SystemExit(f"{path}: {model.l} base parameters, expected {truth.model.l}")
     found = model.calibrated
-    assert found is not None and found.prediction is not None and model.theta_b is not None
+    assert found is not None
+    assert found.prediction is not None
+    assert model.theta_b is not None
     rows = {(row.joint, row.name): row.value for row in found.friction}
     names = sorted({name for _, name in rows})
     if names != ["coulomb", "offset", "viscous"]:

@@ -78,7 +78,7 @@ def cpu_seconds() -> float:
 
 def run(program: Program, folder: Path) -> tuple[float, int, str]:
     """CPU time in s, exit status and the last line of errors of a program's commands, each with one thread."""
-    one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     before, status, said = cpu_seconds(), 0, ""
     (folder / program.out).unlink(missing_ok=True)
     for command in program.commands:
@@ -132,8 +132,12 @@ def table(case: Case, rows: Sequence[Row]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--figaroh", type=Path, help="python of the environment in which FIGAROH is installed")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--figaroh", type=Path, help="python of the environment in which FIGAROH is installed"
+    )
     parser.add_argument("--case", choices=[case.name for case in CASES])
     parser.add_argument("--folder", type=Path, default=Path("generated/side_by_side"))
     options = parser.parse_args()
