@@ -1,7 +1,6 @@
 """A re-implementation of the estimators that FloBaRoID publishes, for a comparison. It is not FloBaRoID.
 
-FloBaRoID (https://github.com/kjyv/FloBaRoID, LGPL 3.0) is no package, and needs iDynTree's Python binding. This file
-was written from its README, its tutorial and the comments and values of its configuration kuka_lwr4.yaml, and from the
+FloBaRoID (https://github.com/kjyv/FloBaRoID, LGPL 3.0) is not in the Python package index. This file was written from its README, its tutorial and the comments and values of its configuration kuka_lwr4.yaml, and from the
 papers that they name. No code of FloBaRoID was read or copied.
 
 What is as there: the median filter and the zero-phase low passes with their values; base parameters from the QR
@@ -190,11 +189,16 @@ def sdp(data: Data, base: Base) -> Array:
 
 
 def _is_body(p: Any) -> Any:
-    """The 6 x 6 matrix of Sousa and Cortesao is positive semidefinite: [[L, S(l)'], [S(l), m 1]]."""
     import cvxpy as cp
 
+    return cp.bmat(body_matrix(p)) >> 0
+
+
+def body_matrix(p: Any) -> list[list[Any]]:
+    """The 6 x 6 matrix [[L, S(l)'], [S(l), m 1]] of Sousa and Cortesao, which is positive semidefinite for bodies. L is
+    the inertia in the frame, and l is the mass times the centre of mass."""
     m, lx, ly, lz, xx, xy, yy, xz, yz, zz = (p[k] for k in range(LINK))
-    rows = [
+    return [
         [xx, xy, xz, 0, lz, -ly],
         [xy, yy, yz, -lz, 0, lx],
         [xz, yz, zz, ly, -lx, 0],
@@ -202,7 +206,6 @@ def _is_body(p: Any) -> Any:
         [lz, 0, -lx, 0, m, 0],
         [-ly, lx, 0, 0, 0, m],
     ]
-    return cp.bmat(rows) >> 0
 
 
 METHODS: Mapping[str, Callable[[Data, Base], Array]] = {"wls": wls, "essential": essential, "sdp": sdp}

@@ -98,6 +98,21 @@ def test_what_the_data_do_not_show_stays_as_in_the_file(flobaroid: ModuleType):
     np.testing.assert_allclose(found[viscous][1:], truth[viscous][1:], rtol=0, atol=0.05)
 
 
+def test_the_matrix_of_a_body_is_the_sum_over_its_points(flobaroid: ModuleType):
+    """Of a point of mass m at c: m [S(c), 1]' [S(c), 1], where S(c) v = c x v."""
+    rng = np.random.default_rng(2)
+    masses, points = rng.uniform(0.5, 2.0, 7), rng.uniform(-1.0, 1.0, (7, 3))
+    wanted, body = np.zeros((6, 6)), pin.Inertia.Zero()
+    for m, c in zip(masses, points, strict=True):
+        half = np.hstack([pin.skew(c), np.eye(3)])
+        wanted += m * half.T @ half
+        body += pin.Inertia(m, c, np.zeros((3, 3)))
+
+    found = np.array(flobaroid.body_matrix(body.toDynamicParameters()))
+
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12)
+
+
 def test_the_filters_keep_a_slow_sine_and_its_derivatives(flobaroid: ModuleType):
     time = np.arange(0.0, 10.0, 1.0 / RATE)
     w = 2.0 * np.pi * 0.5
