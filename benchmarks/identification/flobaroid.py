@@ -1,7 +1,8 @@
 """A re-implementation of the estimators that FloBaRoID publishes, for a comparison. It is not FloBaRoID.
 
-FloBaRoID (https://github.com/kjyv/FloBaRoID, LGPL 3.0) is not in the Python package index. This file was written from its README, its tutorial and the comments and values of its configuration kuka_lwr4.yaml, and from the
-papers that they name. No code of FloBaRoID was read or copied.
+FloBaRoID (https://github.com/kjyv/FloBaRoID, LGPL 3.0) is not in the Python package index. This file was written from
+its README, its tutorial and the comments and values of its configuration kuka_lwr4.yaml, and from the papers that they
+name. No code of FloBaRoID was read or copied.
 
 What is as there: the median filter and the zero-phase low passes with their values; base parameters from the QR
 decomposition of 5000 random states with the tolerance 1e-4; friction as a sign and a viscous part; weighted least
