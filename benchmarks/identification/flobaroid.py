@@ -37,6 +37,8 @@ POSITION_LOW_PASS = (8.0, 5)
 """Hz and order, of positions and torques (filterLowPass1)."""
 VELOCITY_LOW_PASS = (6.0, 5)
 """Hz and order (filterLowPass2)."""
+EDGE = 0.5
+"""s at both ends of a log that the fit leaves out, because the filters have transients there."""
 RANDOM_STATES = 5000
 TOLERANCE = 1e-4
 """Of the diagonal of R: below it, a column depends on the others (minTol)."""
@@ -73,12 +75,14 @@ def low_pass(values: Array, rate: float, setting: tuple[float, int]) -> Array:
 
 
 def states_of(time: Array, position: Array, torque: Array) -> tuple[Array, Array, Array, Array]:
-    """Filtered positions, rates, accelerations and torques."""
+    """Filtered positions, rates, accelerations and torques, without EDGE at both ends."""
     step = float(np.median(np.diff(time)))
     clean = [signal.medfilt(x, (MEDIAN, 1)) for x in (position, torque)]
     q, tau = (low_pass(x, 1 / step, POSITION_LOW_PASS) for x in clean)
     qd = low_pass(np.gradient(q, step, axis=0), 1 / step, VELOCITY_LOW_PASS)
-    return q, qd, np.gradient(qd, step, axis=0), tau
+    qdd = np.gradient(qd, step, axis=0)
+    inner = slice(round(EDGE / step), len(time) - round(EDGE / step))
+    return q[inner], qd[inner], qdd[inner], tau[inner]
 
 
 def regressor(model: Any, q: Array, qd: Array, qdd: Array) -> Array:

@@ -21,6 +21,8 @@ from figaroh.identification.base_identification import BaseIdentification
 
 CUT_OFF = 8.0
 """Hz, of FIGAROH's Butterworth filter: that of the other programs."""
+EDGE = 0.5
+"""s at both ends of a log that the fit leaves out, because the filters have transients there (FIGAROH's sample mask)."""
 BLOCKS = ("viscous", "coulomb", "drive_inertia", "offset")
 """Per joint, behind the links' parameters, in the order of FIGAROH's columns."""
 
@@ -98,6 +100,8 @@ def main() -> None:
         found = SharedRobot(pin.RobotWrapper(model), str(file))
         found.identif_config |= {"act_idxq": list(range(model.nq)), "act_idxv": list(range(model.nv))}
         found.initialize()
+        rows, edge = np.arange(found.num_samples), round(EDGE * rate)
+        found._sample_mask = (rows >= edge) & (rows < len(rows) - edge)
         found.solve(decimate=not options.every_row, plotting=False, wls=options.wls)
     values = identified(found, options.stage)
     n = model.nv

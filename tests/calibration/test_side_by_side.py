@@ -120,7 +120,9 @@ def test_the_filters_keep_a_slow_sine_and_its_derivatives(flobaroid: ModuleType)
 
     q, qd, qdd, tau = flobaroid.states_of(time, position, 3.0 * position)
 
-    inner = slice(400, -400)
+    kept, inner = slice(100, -100), slice(300, -300)
+    assert len(q) == len(time) - 200
+    position, time = position[kept], time[kept]
     np.testing.assert_allclose(q[inner], position[inner], rtol=0, atol=2e-3)
     np.testing.assert_allclose(qd[inner, 0], w * np.cos(w * time[inner]), rtol=0, atol=0.02)
     np.testing.assert_allclose(
