@@ -184,13 +184,14 @@ def sdp(data: Data, base: Base) -> Array:
     constraints = [*bodies, *masses, x[own : own + 3 * data.joints] >= 0]
     misfit = triangle[:-1, :-1] @ (base.fold @ x) - triangle[:-1, -1]
     cp.Problem(cp.Minimize(cp.sum_squares(misfit)), constraints).solve(solver=cp.CLARABEL)
-    best = base.fold @ x.value
+    first = np.asarray(x.value)
     nearest = cp.sum_squares(x[:own] - data.file[:own])
-    problem = cp.Problem(cp.Minimize(nearest), [*constraints, base.fold @ x == best])
-    problem.solve(solver=cp.CLARABEL)
-    if problem.status not in ("optimal", "optimal_inaccurate"):
-        raise SystemExit(f"second step of the constrained problem: {problem.status}")
-    return np.asarray(x.value)
+    problem = cp.Problem(cp.Minimize(nearest), [*constraints, base.fold @ x == base.fold @ first])
+    try:
+        problem.solve(solver=cp.CLARABEL)
+    except cp.SolverError:
+        return first  # best fits at a bound leave the second step no room; the base parameters are the same
+    return first if x.value is None else np.asarray(x.value)
 
 
 def _is_body(p: Any) -> Any:
