@@ -97,6 +97,7 @@ MENU = {
         "log_description",
         "calibration",
         "benchmarks",
+        "side_by_side",
         "glossary",
         "CHANGELOG",
         "SECURITY",
