@@ -241,15 +241,18 @@ def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence], scale:
 
     stated  accuracy by the index of the link; links without an entry get very large standard deviations
     scale   plausible size of each base parameter, in the unit of the parameter; entries after the first l are ignored.
-            If all link parameters in a base parameter are zero, or one of them is unknown, the base parameter gets the
-            standard deviation VAGUE times `scale`
+            A base parameter gets the standard deviation VAGUE times `scale` in three cases: all its link parameters
+            are zero, one of them is unknown, or it contains a drive inertia that the file leaves at zero
     """
     covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
     for k, link in enumerate(model.mechanism.known_parameters):
         own = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
         covariance[own, own] = _covariance(link, stated.get(k, body_confidence(link, VAGUE)))
     found = np.asarray(model.B @ covariance @ model.B.T)
-    is_open = np.diag(found) == 0.0
+    left_out = model.mechanism.known_parameters[:, DRIVE] == 0.0
+    is_open = (np.diag(found) == 0.0) | (model.B[:, DRIVE::PARAMETERS_PER_LINK][:, left_out] != 0.0).any(
+        axis=1
+    )
     is_open[list(model.unknown_base_parameters)] = True
     return found + np.diag(np.where(is_open, VAGUE * scale[: model.l], 0.0) ** 2)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bundled import bundled_model
+from bundled import bundled_model, robot_path
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.estimate import FitOptions, Prior
@@ -20,8 +20,11 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli.boundary import run
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot.inertia import standard_parameters
+from psdmc.robot.load import load_robot
+from psdmc.robot.mechanism import DRIVE
 
 
 def test_the_joined_estimate_is_the_normal_law_s() -> None:
@@ -68,6 +71,21 @@ def test_theta_s_prior_is_what_samples_of_bodies_scatter_by() -> None:
     scatter, covariance = np.cov(np.array(drawn).T), theta_covariance(model, stated, np.ones(model.l))
     size = np.sqrt(np.diag(covariance))
     assert np.abs((scatter - covariance) / np.outer(size, size)).max() < 0.05
+
+
+def test_a_drive_inertia_that_the_file_leaves_at_zero_is_unknown() -> None:
+    """A base parameter that contains it can be anything; the others keep what is stated."""
+    robot = load_robot(robot_path("two_link_full"), drive_inertia=True).mechanism
+    links = np.array(robot.parameters)
+    links[:, DRIVE] = 0.0, 0.1
+    model = derive_model(replace(robot, parameters=links), expand=False)
+    stated = {k: Confidence(0.01, 0.001, 0.01) for k in range(2)}
+    wide = np.sqrt(np.diag(theta_covariance(model, stated, np.ones(model.l))))
+    contains = model.B[:, DRIVE] != 0.0
+    assert contains.any()
+    assert not contains.all()
+    assert (wide[contains] > 5.0).all()
+    assert (wide[~contains] < 1.0).all()
 
 
 def calibrated(arm, log: Log, physical: bool = True, known: bool = True, **options: Any) -> Calibration:
