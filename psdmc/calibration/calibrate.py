@@ -18,6 +18,7 @@ from psdmc.calibration.identify.four_steps import (
 )
 from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_covariance, with_prior
+from psdmc.calibration.identify.joint_elasticity import elastic_joints, joint_elasticity
 from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
@@ -248,6 +249,7 @@ def calibrate_logs(
     loaded  further logs with a known load; torque constants are first determined from these and the other logs
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
+    elastic_joints([log.ordered(model.v_names) for log in logs], linear)
     if loaded is None:
         motors = motors_of_logs(model.v_names, logs, torque_constants)
     else:
@@ -264,6 +266,8 @@ def calibrate_logs(
     result = fit.record(found)
     if loaded is not None and by_load is not None:
         result = with_loaded_logs(result, loaded, by_load, linear)
+    soft = joint_elasticity(model.mechanism, regressor, logs, linear, motors, found.theta_b)
+    result = with_model(replace(result, elasticity=soft.rows, notes=(*result.notes, *soft.notes)))
     progress("verdict")
     return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)
 
