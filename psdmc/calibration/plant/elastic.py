@@ -45,6 +45,7 @@ class Elastic:
     held       further torques (n,) that act against the links, by their positions, such as those of a harness
     names      names of the joints, for messages
     own        (m,) indices of the elastic joints
+    upper      (m, m) the entries that Pinocchio computes of a symmetric matrix
     data       Pinocchio's memory for the model
     """
 
@@ -55,10 +56,12 @@ class Elastic:
     held: Callable[[Array], Array]
     names: tuple[str, ...]
     own: Any = field(init=False)
+    upper: Any = field(init=False)
     data: Any = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "own", np.flatnonzero(self.stiffness > 0))
+        object.__setattr__(self, "upper", np.triu(np.ones((len(self.own), len(self.own)), dtype=bool)))
         object.__setattr__(self, "data", self.model.createData())
 
     def links(self, times: Array) -> tuple[Array, Array, Array]:
@@ -77,7 +80,7 @@ class Elastic:
                 f"joint(s) {', '.join(self.names)}: their elasticity cannot be integrated: {found.message}",
                 "give the joints more joint_damping, or a joint_stiffness that carries their links",
             )
-        rows = [self._states(t, x) for t, x in zip(grid, found.y.T, strict=True)]
+        rows = [self._states(t, x)[:3] for t, x in zip(grid, found.y.T, strict=True)]
         at = np.searchsorted(grid, times)
         q, qd, qdd = (np.array(part)[at] for part in zip(*rows, strict=True))
         return q, qd, qdd
@@ -85,24 +88,24 @@ class Elastic:
     def _inertia(self, q: Array) -> Array:
         """Mass matrix of the links that hang on elastic joints."""
         whole = pin.crba(self.model, self.data, q)[self.own][:, self.own]
-        return np.asarray(np.triu(whole) + np.triu(whole, 1).T)
+        return np.where(self.upper, whole, whole.T)
 
-    def _states(self, t: float, x: Array) -> tuple[Array, Array, Array]:
-        """Positions, speeds and accelerations (n,) of the links, from deflections and their rates (2 m,)."""
+    def _states(self, t: float, x: Array) -> tuple[Array, Array, Array, Array]:
+        """Positions, speeds and accelerations (n,) of the links, from deflections and their rates (2 m,), and
+        accelerations (m,) of the deflections."""
         q, qd, qdd = self.motors(t)
         own = self.own
+        ahead = qdd[own]
         q[own] -= x[: len(own)]
         qd[own] -= x[len(own) :]
         qdd[own] = 0.0
         spring = self.stiffness[own] * x[: len(own)] + self.damping[own] * x[len(own) :]
         against = pin.rnea(self.model, self.data, q, qd, qdd) + self.held(q)
         qdd[own] = np.linalg.solve(self._inertia(q), spring - against[own])
-        return q, qd, qdd
+        return q, qd, qdd, ahead - qdd[own]
 
     def _change(self, t: float, x: Array) -> Array:
-        own = self.own
-        motors = self.motors(t)[2][own]
-        return np.concatenate([x[len(own) :], motors - self._states(t, x)[2][own]])
+        return np.concatenate([x[len(self.own) :], self._states(t, x)[3]])
 
     def _jacobian(self, t: float, x: Array) -> Array:
         """Change of the rates by the springs and dampers, which are what is fast."""
