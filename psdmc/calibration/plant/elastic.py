@@ -17,6 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 
 RELATIVE_ERROR = 1e-8
@@ -27,6 +28,8 @@ FASTEST = 1e3
 """rad/s: joints that oscillate or settle faster are integrated by an implicit method, which steps over the oscillation."""
 LONGEST_STEP = 1e-2
 """s: no reversal of a motion below 10 Hz is stepped over."""
+LARGEST_DEFLECTION = 1.0
+"""rad (m), of a resting joint."""
 POSES = 20
 """Rows of a motion at which the fastest oscillation is computed."""
 
@@ -77,7 +80,7 @@ class Elastic:
         found = solve_ivp(self._change, (0.0, grid[-1]), self._balanced(), **kept, **method)
         if not found.success:
             raise InputError(
-                f"joint(s) {', '.join(self.names)}: their elasticity cannot be integrated: {found.message}",
+                f"joint(s) {listed([self.names[k] for k in self.own])}: their elasticity cannot be integrated: {found.message}",
                 "give the joints more joint_damping, or a joint_stiffness that carries their links",
             )
         rows = [self._states(t, x)[:3] for t, x in zip(grid, found.y.T, strict=True)]
@@ -129,12 +132,16 @@ class Elastic:
             return np.asarray(turn - torque[own])
 
         found = root(left, -left(np.zeros(len(own))), tol=1e-12)
-        if not np.abs(found.fun).max() <= 1e-6 * max(np.abs(found.x).max(), 1.0):
+        bent = found.x / self.stiffness[own]
+        balanced = np.abs(found.fun).max() <= 1e-6 * max(np.abs(found.x).max(), 1.0)
+        if not balanced or np.abs(bent).max() > LARGEST_DEFLECTION:
+            names = listed([self.names[k] for k in own])
             raise InputError(
-                f"joint(s) {', '.join(self.names)}: no deflection at which their springs carry the links",
+                f"joint(s) {names}: no deflection of at most {LARGEST_DEFLECTION:g} rad (m) at which the springs carry the "
+                "links",
                 "give the joints a larger joint_stiffness",
             )
-        return np.concatenate([found.x / self.stiffness[own], np.zeros(len(own))])
+        return np.concatenate([bent, np.zeros(len(own))])
 
     def _fastest(self, times: Array) -> float:
         """The fastest oscillation or decay of the joints, rad/s."""

@@ -200,9 +200,9 @@ def _torques(
     )
     every = np.union1d(trajectory.time, times)
     q, qd, qdd = elastic.links(every)
-    at = np.searchsorted(every, times)
+    at, rows = np.searchsorted(every, times), np.searchsorted(every, trajectory.time)
     rigid = _rigid_torque(links, q[at], qd[at], qdd[at]) + rotors * motors[2]
-    return rigid, rigid + robot.held_torque(q[at]), q[np.searchsorted(every, trajectory.time)]
+    return rigid, rigid + robot.held_torque(q[at]), np.where(own, q[rows], trajectory.q)
 
 
 def _quantised(values: Array, step: float) -> Array:
