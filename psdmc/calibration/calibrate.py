@@ -218,8 +218,17 @@ def calibrate_campaign(
 
     result = _physical(plain, consistent, options, progress)
     progress("verdict")
-    step = options.campaign.inertial.filter
-    return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step, options.verdict)
+    step = options.campaign.inertial
+    linear = replace(options.linear, filter=step.filter, split=step.split, fit=step.fit, exponents=CAMPAIGN_FRICTION)
+    soft = joint_elasticity(
+        model.mechanism, regressor, [run.log for run in runs.inertial], linear, found.motors, found.inertial.theta_b
+    )
+    result = with_model(replace(result, elasticity=soft.rows, notes=(*result.notes, *soft.notes)))
+    return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step.filter, options.verdict)
+
+
+CAMPAIGN_FRICTION = (0.5, 1.0)
+"""Exponents of viscous friction that is fitted with the stiffness of elastic joints in a campaign."""
 
 
 def _physical(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -106,14 +107,26 @@ def link_by_scipy(
     return found.y[0], found.y[1]
 
 
+@cache
+def _columns(stiffness: float, damping: float, weight: float) -> tuple[Array, Array, Array, Array]:
+    """Time, link, motor and torque without noise."""
+    time = np.arange(0.0, 30.0, 0.004)
+    theta, rate, acceleration = SWING.at(time)
+    if weight:
+        q, speed = link_by_scipy(SWING, time, stiffness, damping, weight, -weight / stiffness)
+    else:  # in closed form, after the start
+        spring = stiffness + 1j * SWING.speed * damping
+        turn = spring / (spring - ABOUT_JOINT * SWING.speed**2) * SWING.size * np.exp(1j * time[:, None] * SWING.speed)
+        q, speed = turn.imag.sum(-1), (1j * SWING.speed * turn).imag.sum(-1)
+    torque = ROTOR * acceleration + friction(rate) + stiffness * (theta - q) + damping * (rate - speed)
+    return time, q, theta, torque
+
+
 def log_by_scipy(
     stiffness: float, damping: float, noise: float, seed: int, weight: float = WEIGHT, torque_noise: float = 0.05
 ) -> Log:
-    """A log of 60 s with noise of the two encoders (rad RMS) and of the torque (N m RMS)."""
-    time = np.arange(0.0, 60.0, 0.004)
-    theta, rate, acceleration = SWING.at(time)
-    q, speed = link_by_scipy(SWING, time, stiffness, damping, weight, -weight / stiffness)
-    torque = ROTOR * acceleration + friction(rate) + stiffness * (theta - q) + damping * (rate - speed)
+    """A log of 30 s with noise of the two encoders (rad RMS) and of the torque (N m RMS)."""
+    time, q, theta, torque = _columns(stiffness, damping, weight)
     rng = np.random.default_rng(seed)
     draws = rng.standard_normal((3, len(time)))
     columns = (q + noise * draws[0], theta + noise * draws[1] + 0.01, torque + torque_noise * draws[2])

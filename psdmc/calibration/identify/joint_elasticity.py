@@ -40,6 +40,8 @@ UNITS = {STIFFNESS: "Nm/rad", DAMPING: "Nms/rad", INERTIA: "kg m^2"}
 UNSEEN = Remark("not determined", "unseen")
 LARGEST_DIFFERENCE = 0.1
 """Share by which a motor's motion may differ from its link's: far more than any joint bends."""
+CONSTANT_SHARE = 1e-6
+"""Of a column's largest entry: a smaller range is that of a constant after the filter."""
 IDENTIFIED_SHARE = 0.5
 """Of a value: the largest standard deviation of an identified number."""
 
@@ -194,7 +196,8 @@ def _fitted(
     elif inertia is not None:
         torque, names = torque - inertia * columns[:, 2], names[:2]
     constant = np.ones((len(torque), 1))
-    others = friction[:, np.ptp(friction, axis=0) > 0] if friction.shape[1] else friction
+    changes = np.ptp(friction, axis=0) > CONSTANT_SHARE * np.abs(friction).max(axis=0)
+    others = friction[:, changes]
     whole = np.concatenate([columns[:, : len(names)], others, constant], axis=1)
     wrong = np.zeros_like(whole)
     wrong[:, : len(names)] = noise[:, : len(names)]
@@ -209,15 +212,18 @@ def _fitted(
 
 def _without_noise(solved: Estimate, columns: Array, noise: Array) -> tuple[Array, Array]:
     """Values without the bias towards zero by noise in the columns (Fuller 1987), and how much each value grew."""
-    weight = solved.weights[:, :1] * solved.scale
-    whole, wrong = columns * weight, noise * weight
+    seen, values, grown = solved.identifiable, solved.values.copy(), np.ones(len(solved.values))
+    weight = solved.weights[:, :1] * solved.scale[seen]
+    whole, wrong = columns[:, seen] * weight, noise[:, seen] * weight
     squares, of_noise = whole.T @ whole, wrong.T @ wrong
-    start = solved.values / solved.scale
-    if np.linalg.eigvalsh(squares - 2.0 * of_noise)[0] <= 0:
-        return solved.values, np.ones(len(start))
+    start = values[seen] / solved.scale[seen]
+    if not seen.any() or np.linalg.eigvalsh(squares - 2.0 * of_noise)[0] <= 0:
+        return values, grown
     moved = np.linalg.solve(squares - of_noise, squares @ start)
-    grown = np.divide(moved, start, out=np.ones_like(start), where=start != 0)
-    return moved * solved.scale, np.clip(np.abs(grown), 1.0, 2.0)
+    values[seen] = moved * solved.scale[seen]
+    growth = np.divide(moved, start, out=np.ones_like(start), where=start != 0)
+    grown[seen] = np.clip(np.abs(growth), 1.0, 2.0)
+    return values, grown
 
 
 def _rows(

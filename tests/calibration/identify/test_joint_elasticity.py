@@ -61,24 +61,24 @@ def test_values_lie_within_three_standard_deviations(pendulum: DynamicsModel) ->
 
 
 def test_noise_of_the_encoders_does_not_make_a_joint_softer(pendulum: DynamicsModel) -> None:
-    """Deflections are 5 mrad; the noise that passes the filter would take 2 % of the stiffness if it were left."""
-    rows = [found(pendulum, log_by_scipy(STIFFNESS, DAMPING, 1e-3, seed)).rows for seed in range(4)]
-    mean = np.mean([by_name(each)["joint_stiffness"].value for each in rows])
-    assert mean == pytest.approx(STIFFNESS, rel=0.006)
-    assert max(abs(errors(each)[0]) for each in rows) < 3.0
+    logs = [log_by_scipy(STIFFNESS, DAMPING, 3e-4, seed) for seed in range(6)]
+    rows = [found(pendulum, log, swing=ROTOR).rows[0] for log in logs]
+    assert np.mean([row.value for row in rows]) == pytest.approx(STIFFNESS, rel=2e-3)  # 3e-3 below, without correction
+    assert max(map(abs, errors(tuple(rows)))) < 3.0
 
 
 def test_a_known_drive_inertia_is_needed_where_deflections_follow_the_acceleration(
     pendulum: DynamicsModel,
 ) -> None:
     """Without gravity, the deflection is the link's inertia times the acceleration over the stiffness."""
-    log = log_by_scipy(STIFFNESS, DAMPING, NOISE, 1, weight=0.0)
+    log = log_by_scipy(50 * STIFFNESS, 50 * DAMPING, NOISE, 1, weight=0.0)
     plain, known = found(pendulum, log), found(pendulum, log, swing=ROTOR)
     assert not by_name(plain.rows)["joint_stiffness"].seen
     assert "state drive_inertia in [elasticity]" in plain.notes[0]
     assert set(by_name(known.rows)) == {"joint_stiffness", "joint_damping"}
-    assert by_name(known.rows)["joint_stiffness"].seen
-    assert max(map(abs, errors(known.rows))) < 3.0
+    row = by_name(known.rows)["joint_stiffness"]
+    assert row.seen
+    assert abs(row.value - 50 * STIFFNESS) < 3.0 * row.std
 
 
 def test_a_torque_sensor_behind_the_gear_needs_no_friction(pendulum: DynamicsModel) -> None:
@@ -140,7 +140,7 @@ def test_a_motor_s_own_turns_are_refused(pendulum: DynamicsModel, tmp_path: Path
     log = log_by_scipy(STIFFNESS, DAMPING, NOISE, 6)
     assert log.motor_position is not None
     error = described(tmp_path, pendulum, replace(log, motor_position=100 * log.motor_position), "")
-    assert "joint swing: motor_position moves 100." in error.message
+    assert "joint swing: motor_position moves 99." in error.message
 
 
 def test_columns_of_a_motor_are_named_in_the_description(pendulum: DynamicsModel, tmp_path: Path) -> None:
