@@ -17,8 +17,8 @@ from psdmc.calibration.identify.four_steps import (
     physical_steps,
 )
 from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
-from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_covariance, with_prior
 from psdmc.calibration.identify.joint_elasticity import elastic_joints, joint_elasticity
+from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_covariance, with_prior
 from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
@@ -219,12 +219,21 @@ def calibrate_campaign(
     result = _physical(plain, consistent, options, progress)
     progress("verdict")
     step = options.campaign.inertial
-    linear = replace(options.linear, filter=step.filter, split=step.split, fit=step.fit, exponents=CAMPAIGN_FRICTION)
+    linear = replace(
+        options.linear, filter=step.filter, split=step.split, fit=step.fit, exponents=CAMPAIGN_FRICTION
+    )
     soft = joint_elasticity(
-        model.mechanism, regressor, [run.log for run in runs.inertial], linear, found.motors, found.inertial.theta_b
+        model.mechanism,
+        regressor,
+        [run.log for run in runs.inertial],
+        linear,
+        found.motors,
+        found.inertial.theta_b,
     )
     result = with_model(replace(result, elasticity=soft.rows, notes=(*result.notes, *soft.notes)))
-    return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step.filter, options.verdict)
+    return with_verdict_on_campaign(
+        result, model, regressor, runs, found.motors, step.filter, options.verdict
+    )
 
 
 CAMPAIGN_FRICTION = (0.5, 1.0)

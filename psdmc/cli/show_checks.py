@@ -74,7 +74,14 @@ def print_accuracy(record: Calibrated) -> None:
 def print_elasticity(record: Calibrated) -> None:
     """Print stiffness and damping of the joints with two encoders; nothing if there are none."""
     rows = [
-        (row.joint, row.name, f"{row.value:.6g}", f"{row.std:.2g}", f"{row.std / abs(row.value):.2%}", row.unit)
+        (
+            row.joint,
+            row.name,
+            f"{row.value:.6g}",
+            f"{row.std:.2g}",
+            f"{row.std / abs(row.value):.2%}",
+            row.unit,
+        )
         if math.isfinite(row.std)
         else (row.joint, row.name, "not determined", "", "", row.unit)
         for row in record.elasticity

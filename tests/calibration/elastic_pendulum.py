@@ -52,7 +52,12 @@ UPRIGHT, LEVEL = "0.0, -9.81, 0.0", "0.0, 0.0, -9.81"
 
 
 def write_plant(
-    folder: Path, stiffness: float, damping: float, gravity: str = UPRIGHT, friction: float = 1.0, more: str = ""
+    folder: Path,
+    stiffness: float,
+    damping: float,
+    gravity: str = UPRIGHT,
+    friction: float = 1.0,
+    more: str = "",
 ) -> Path:
     """Write the pendulum and its plant; `friction` multiplies the friction."""
     (folder / "pendulum.toml").write_text(ROBOT.format(gravity=gravity), encoding="utf-8")
@@ -116,14 +121,24 @@ def _columns(stiffness: float, damping: float, weight: float) -> tuple[Array, Ar
         q, speed = link_by_scipy(SWING, time, stiffness, damping, weight, -weight / stiffness)
     else:  # in closed form, after the start
         spring = stiffness + 1j * SWING.speed * damping
-        turn = spring / (spring - ABOUT_JOINT * SWING.speed**2) * SWING.size * np.exp(1j * time[:, None] * SWING.speed)
+        turn = (
+            spring
+            / (spring - ABOUT_JOINT * SWING.speed**2)
+            * SWING.size
+            * np.exp(1j * time[:, None] * SWING.speed)
+        )
         q, speed = turn.imag.sum(-1), (1j * SWING.speed * turn).imag.sum(-1)
     torque = ROTOR * acceleration + friction(rate) + stiffness * (theta - q) + damping * (rate - speed)
     return time, q, theta, torque
 
 
 def log_by_scipy(
-    stiffness: float, damping: float, noise: float, seed: int, weight: float = WEIGHT, torque_noise: float = 0.05
+    stiffness: float,
+    damping: float,
+    noise: float,
+    seed: int,
+    weight: float = WEIGHT,
+    torque_noise: float = 0.05,
 ) -> Log:
     """A log of 30 s with noise of the two encoders (rad RMS) and of the torque (N m RMS)."""
     time, q, theta, torque = _columns(stiffness, damping, weight)

@@ -21,7 +21,9 @@ def _read(value: object, reading: Reading) -> ElasticityOptions:
         reading.faults.append(f"elasticity: joints: found {', '.join(odd)}, expected names of joints")
         return ElasticityOptions(True)
     given = table.content.get("drive_inertia", {})
-    inner = TomlTable(given, "elasticity: drive_inertia", tuple(given) if isinstance(given, dict) else (), reading.faults)
+    inner = TomlTable(
+        given, "elasticity: drive_inertia", tuple(given) if isinstance(given, dict) else (), reading.faults
+    )
     inertias = {name: inner.number(name, 0.0, LARGEST_INERTIA) for name in inner.content}
     require_joints([*(str(name) for name in names), *inertias], "elasticity", reading)
     return ElasticityOptions(True, tuple(str(name) for name in names), inertias)

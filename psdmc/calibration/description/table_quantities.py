@@ -1,5 +1,5 @@
-"""The tables `[position]`, `[velocity]`, `[effort]` and `[motor_position]` of a log description: unit, sign, gear ratio and delay of a
-quantity. They apply to all joints; the entry of a joint may replace a value for this joint."""
+"""The tables `[position]`, `[velocity]`, `[effort]` and `[motor_position]` of a log description: unit, sign, gear ratio
+and delay of a quantity. They apply to all joints; the entry of a joint may replace a value for this joint."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def elastic_joints(logs: Sequence[AnyLog], options: LinearOptions) -> NDArray[np
         raise InputError(
             f"{options.tables_from}: [elasticity] asks for the stiffness of joint(s) {listed(lacking)}: {one} has one "
             "position of each, expected two",
-            "name the motor's encoder as motor_position, beside position, the link's; or leave out [elasticity]",
+            "name the motor's encoder as motor_position, and the link's as position; or leave out [elasticity]",
         )
     if wanted.joints:
         both &= np.array([name in wanted.joints for name in names])
@@ -126,7 +126,9 @@ def joint_elasticity(
     rows: list[NumberRow] = []
     for k in np.flatnonzero(moving):
         joint = chain.leading_joints[k]
-        found = _fitted(whole, int(k), kept[0].quantity, options, options.elasticity.drive_inertia.get(joint.name))
+        found = _fitted(
+            whole, int(k), kept[0].quantity, options, options.elasticity.drive_inertia.get(joint.name)
+        )
         rows += _rows(joint, *found, float(motors.relative_std[k]))
     return Elasticity(tuple(rows), _notes(chain, both & ~moving, rows))
 
@@ -254,4 +256,3 @@ def _notes(chain: Mechanism, resting: NDArray[np.bool_], rows: Sequence[NumberRo
             "follow the motor's acceleration; state drive_inertia in [elasticity], or record larger torques"
         )
     return tuple(notes)
-

@@ -96,9 +96,7 @@ class Log(Timed):
         Raises InputError with all joints that the log lacks.
         """
         columns = places_of(self.name, self.joint_names, joint_names)
-        return replace(
-            self, joint_names=joint_names, **self._changed(lambda values: values[:, columns])
-        )
+        return replace(self, joint_names=joint_names, **self._changed(lambda values: values[:, columns]))
 
     def _changed(self, change: Callable[[Array], Array]) -> dict[str, Array]:
         """All columns that the log has after a change, by name."""

@@ -1,8 +1,9 @@
 """Reads log files, as a whole or in pieces, and writes them. All tables have the same column names; bags have none.
 
 The columns are `time_s`, then for each joint `position_rad.<joint>` (`position_m.` if it slides), optionally
-`velocity_rad_s.<joint>` (`velocity_m_s.`) and `motor_position_rad.<joint>` (`motor_position_m.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if
-it slides). `effort_nm.` is read as motor torque, and the log's notes say so.
+`velocity_rad_s.<joint>` (`velocity_m_s.`) and `motor_position_rad.<joint>` (`motor_position_m.`), and one of
+`current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if it slides). `effort_nm.` is read as motor torque, and the
+log's notes say so.
 """
 
 from __future__ import annotations
@@ -212,7 +213,9 @@ def layout_of(name: str, columns: Sequence[str]) -> Layout:
     lacking = [joint for joint in joints if joint not in velocities]
     if velocities and lacking:
         notes = (*notes, f"{name}: no velocity of joint(s) {listed(lacking)}: velocities are not used")
-    motors = {joint: column for joint, column in _joints(name, columns, MOTOR_POSITIONS).items() if joint in joints}
+    motors = {
+        joint: column for joint, column in _joints(name, columns, MOTOR_POSITIONS).items() if joint in joints
+    }
     _require_units(name, joints, ({} if lacking else velocities, motors), effort_names)
     return Layout(
         name=name,

@@ -79,8 +79,9 @@ class Elastic:
         method = {"method": "Radau", "jac": self._jacobian} if fast else {"method": "DOP853"}
         found = solve_ivp(self._change, (0.0, grid[-1]), self._balanced(), **kept, **method)
         if not found.success:
+            names = listed([self.names[k] for k in self.own])
             raise InputError(
-                f"joint(s) {listed([self.names[k] for k in self.own])}: their elasticity cannot be integrated: {found.message}",
+                f"joint(s) {names}: their elasticity cannot be integrated: {found.message}",
                 "give the joints more joint_damping, or a joint_stiffness that carries their links",
             )
         rows = [self._states(t, x)[:3] for t, x in zip(grid, found.y.T, strict=True)]

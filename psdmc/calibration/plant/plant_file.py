@@ -259,7 +259,9 @@ def _truth(value: object, where: str, terms: Sequence[Term], faults: list[str]) 
     name = table.text("name")
     table.where = f"joint {quoted(name)}" if name else where
     if table.has("joint_damping") and not table.has("joint_stiffness"):
-        faults.append(f"{table.where}: joint_damping: found without joint_stiffness, expected both or neither")
+        faults.append(
+            f"{table.where}: joint_damping: found without joint_stiffness, expected both or neither"
+        )
     return JointTruth(
         name=name,
         torque_constant=table.number("torque_constant", SMALLEST, LARGEST),

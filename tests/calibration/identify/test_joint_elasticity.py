@@ -52,7 +52,9 @@ def errors(rows: tuple[NumberRow, ...]) -> list[float]:
 
 
 def test_values_lie_within_three_standard_deviations(pendulum: DynamicsModel) -> None:
-    whole = np.array([errors(found(pendulum, log_by_scipy(STIFFNESS, DAMPING, NOISE, s)).rows) for s in range(6)])
+    whole = np.array(
+        [errors(found(pendulum, log_by_scipy(STIFFNESS, DAMPING, NOISE, s)).rows) for s in range(6)]
+    )
     assert np.abs(whole).max() < 3.0
     assert np.sqrt(np.mean(whole**2)) > 0.2
     row = by_name(found(pendulum, log_by_scipy(STIFFNESS, DAMPING, NOISE, 9)).rows)["joint_stiffness"]
@@ -63,7 +65,9 @@ def test_values_lie_within_three_standard_deviations(pendulum: DynamicsModel) ->
 def test_noise_of_the_encoders_does_not_make_a_joint_softer(pendulum: DynamicsModel) -> None:
     logs = [log_by_scipy(STIFFNESS, DAMPING, 3e-4, seed) for seed in range(6)]
     rows = [found(pendulum, log, swing=ROTOR).rows[0] for log in logs]
-    assert np.mean([row.value for row in rows]) == pytest.approx(STIFFNESS, rel=2e-3)  # 3e-3 below, without correction
+    assert np.mean([row.value for row in rows]) == pytest.approx(
+        STIFFNESS, rel=2e-3
+    )  # 3e-3 below, without correction
     assert max(map(abs, errors(tuple(rows)))) < 3.0
 
 
@@ -97,7 +101,9 @@ def test_a_log_on_disk_gives_what_a_log_in_memory_gives(pendulum: DynamicsModel,
     write_log(log, tmp_path / "run.csv")
     stored, whole = open_log(tmp_path / "run.csv", held=10_000), read_log(tmp_path / "run.csv")
     assert isinstance(stored, StoredLog)
-    assert found(pendulum, stored).rows[0].value == pytest.approx(found(pendulum, whole).rows[0].value, rel=1e-9)
+    assert found(pendulum, stored).rows[0].value == pytest.approx(
+        found(pendulum, whole).rows[0].value, rel=1e-9
+    )
 
 
 def test_the_result_is_kept_in_the_model_s_file(pendulum: DynamicsModel, tmp_path: Path) -> None:

@@ -168,7 +168,10 @@ def test_an_elastic_joint_on_a_rigid_one_moves_by_the_textbook_s_equations(tmp_p
     (tmp_path / "two.toml").write_text(TWO, encoding="utf-8")
     (tmp_path / "plant.toml").write_text(TWO_PLANT, encoding="utf-8")
     robot = load_virtual_robot(tmp_path / "plant.toml")
-    moves = Sines(np.array([0.7, 0.2]), np.array([2.0, 5.0])), Sines(np.array([0.5, 0.3]), np.array([3.0, 6.5]))
+    moves = (
+        Sines(np.array([0.7, 0.2]), np.array([2.0, 5.0])),
+        Sines(np.array([0.5, 0.3]), np.array([3.0, 6.5])),
+    )
     parts = [np.stack(both, axis=1) for both in zip(*(move.at(TIME) for move in moves), strict=True)]
     log = simulate(robot, Trajectory(("upper", "lower"), TIME, *parts))
     m1, m2, l1, c1, c2, i1, i2, g = 2.0, 1.5, 0.4, 0.2, 0.2, 0.05, 0.03, 9.81
@@ -209,7 +212,11 @@ def test_a_robot_with_one_encoder_logs_that_side(tmp_path: Path, word: str, move
     ("old", "new", "said"),
     [
         ("joint_stiffness = 800.0", "", "joint 'swing': joint_damping: found without joint_stiffness"),
-        ("joint_stiffness = 800.0", "joint_stiffness = -1", "joint_stiffness: found -1, expected a number from"),
+        (
+            "joint_stiffness = 800.0",
+            "joint_stiffness = -1",
+            "joint_stiffness: found -1, expected a number from",
+        ),
         ('"both"', '"two"', "sensors: encoders: found 'two', expected one of both, motor, link"),
     ],
 )
