@@ -83,7 +83,7 @@ def _with_two_encoders(log: AnyLog) -> NDArray[np.bool_]:
             "expected 1",
             "divide it by the gear ratio: gear_ratio and sign of motor_position in a log description",
         )
-    return both
+    return np.asarray(both)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,7 +191,8 @@ def _fitted(
     """Names, values, standard deviations and whether each is determined, for the unknowns that are reported."""
     columns, noise = samples.columns[:, k], samples.noise[:, k]
     columns = columns - columns.mean(axis=0) * [1.0, 0.0, 0.0]  # encoders have their own zeros
-    torque, names = samples.torque[:, k], (STIFFNESS, DAMPING, INERTIA)
+    torque = samples.torque[:, k]
+    names: tuple[str, ...] = (STIFFNESS, DAMPING, INERTIA)
     friction = samples.friction[:, k]
     if quantity == "joint_torque":
         names, friction = names[:2], friction[:, :0]

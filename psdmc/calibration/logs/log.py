@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,7 @@ class Log(Timed):
         columns = places_of(self.name, self.joint_names, joint_names)
         return replace(self, joint_names=joint_names, **self._changed(lambda values: values[:, columns]))
 
-    def _changed(self, change: Callable[[Array], Array]) -> dict[str, Array]:
+    def _changed(self, change: Callable[[Array], Array]) -> dict[str, Any]:
         """All columns that the log has after a change, by name."""
         parts = {name: getattr(self, name) for name in ("position", "velocity", "effort", "motor_position")}
         return {name: change(values) for name, values in parts.items() if values is not None}

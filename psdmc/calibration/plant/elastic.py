@@ -92,7 +92,7 @@ class Elastic:
     def _inertia(self, q: Array) -> Array:
         """Mass matrix of the links that hang on elastic joints."""
         whole = pin.crba(self.model, self.data, q)[self.own][:, self.own]
-        return np.where(self.upper, whole, whole.T)
+        return np.asarray(np.where(self.upper, whole, whole.T))
 
     def _states(self, t: float, x: Array) -> tuple[Array, Array, Array, Array]:
         """Positions, speeds and accelerations (n,) of the links, from deflections and their rates (2 m,), and
