@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from psdmc.calibration.identify.estimate import Estimate, Prior
 from psdmc.calibration.identify.least_squares import estimate
@@ -101,10 +102,12 @@ def joint_elasticity(
     options: LinearOptions,
     motors: Motors,
     theta_b: Array,
+    delay: float = 0.0,
 ) -> Elasticity:
     """Return stiffness, damping and drive inertia of each joint with two encoders, from the rows that a fit uses.
 
     theta_b  (l,) base parameters, from which loads of joints follow, for friction that depends on them
+    delay    s; the effort in a row belongs to a motion this much later
     """
     kept = [log.ordered(chain.v_names) for log in logs if log.use == "fit"]
     both = elastic_joints(kept, options)
@@ -119,7 +122,7 @@ def joint_elasticity(
         steps = [stretches(each, options.filter, options.check, options.stretch) for each in (log, of_motors)]
         for link, motor in zip(*steps, strict=True):
             moving &= ~link.states.still & ~motor.states.still
-            own.append(_samples(model, link, motor, options, motors, theta_b))
+            own.append(_samples(model, link, motor, options, (motors, delay), theta_b))
         samples = _Samples.of(own)
         parts.append(samples.at(~held_out_of(log, len(samples.torque), options.split)))
     whole = _Samples.of(parts)
@@ -158,7 +161,12 @@ class _Samples:
 
 
 def _samples(
-    model: Regressor, link: Stretch, motor: Stretch, options: LinearOptions, motors: Motors, theta_b: Array
+    model: Regressor,
+    link: Stretch,
+    motor: Stretch,
+    options: LinearOptions,
+    efforts: tuple[Motors, float],
+    theta_b: Array,
 ) -> _Samples:
     """The samples of a part of a log. What is linear in the positions is filtered once, as the torque is."""
     here, there, at = link.states, motor.states, link.at
@@ -182,7 +190,9 @@ def _samples(
         friction = more if friction is None else np.concatenate([friction, more], axis=2)
     if friction is None:
         friction = np.zeros((len(at), len(shape), 0))
-    return _Samples(columns[at], noise[at], friction, motors.torque(here.effort)[at])
+    motors, delay = efforts
+    effort = here.effort[at] if delay == 0 else CubicSpline(here.time, here.effort)(here.time[at] - delay)
+    return _Samples(columns[at], noise[at], friction, motors.torque(effort))
 
 
 def _fitted(

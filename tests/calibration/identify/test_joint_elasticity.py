@@ -34,11 +34,11 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> DynamicsModel:
     return derive_model(load_robot(folder / "pendulum.toml", drive_inertia=True).chain)
 
 
-def found(model: DynamicsModel, log: Log | StoredLog, **known: float) -> Elasticity:
+def found(model: DynamicsModel, log: Log | StoredLog, delay: float = 0.0, **known: float) -> Elasticity:
     options = LinearOptions(elasticity=ElasticityOptions(drive_inertia=known))
     assert model.theta_b is not None
     return joint_elasticity(
-        model.mechanism, ChainRegressor(model), [log], options, Motors.torques(1), model.theta_b
+        model.mechanism, ChainRegressor(model), [log], options, Motors.torques(1), model.theta_b, delay
     )
 
 
@@ -83,6 +83,18 @@ def test_a_known_drive_inertia_is_needed_where_deflections_follow_the_accelerati
     row = by_name(known.rows)["joint_stiffness"]
     assert row.seen
     assert abs(row.value - 50 * STIFFNESS) < 3.0 * row.std
+
+
+def test_a_known_delay_is_not_taken_for_damping(pendulum: DynamicsModel) -> None:
+    log = log_by_scipy(STIFFNESS, DAMPING, NOISE, 1)
+    assert log.motor_position is not None
+    early = replace(
+        log.rows(0, len(log) - 2),
+        effort=log.effort[2:],  # 8 ms
+    )
+    wrong, right = found(pendulum, early, swing=ROTOR), found(pendulum, early, 0.008, swing=ROTOR)
+    assert max(map(abs, errors(right.rows))) < 3.0
+    assert by_name(wrong.rows)["joint_damping"].value == pytest.approx(DAMPING + 0.008 * STIFFNESS, rel=0.3)
 
 
 def test_a_torque_sensor_behind_the_gear_needs_no_friction(pendulum: DynamicsModel) -> None:
