@@ -229,7 +229,7 @@ def calibrate_campaign(
         linear,
         found.motors,
         found.inertial.theta_b,
-        found.friction.delay,
+        found.friction,
     )
     result = with_model(replace(result, elasticity=soft.rows, notes=(*result.notes, *soft.notes)))
     return with_verdict_on_campaign(

@@ -18,12 +18,21 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from psdmc.calibration.identify.estimate import Estimate, Prior
+from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_columns, motion_of
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.logs.filter import Stretch, central_differences, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.identify.state_friction import friction_torque
+from psdmc.calibration.logs.filter import (
+    States,
+    Stretch,
+    central_differences,
+    held_out_of,
+    smoothed_rows,
+    stretches,
+)
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
@@ -102,19 +111,19 @@ def joint_elasticity(
     options: LinearOptions,
     motors: Motors,
     theta_b: Array,
-    delay: float = 0.0,
+    known: FrictionResult | None = None,
 ) -> Elasticity:
     """Return stiffness, damping and drive inertia of each joint with two encoders, from the rows that a fit uses.
 
     theta_b  (l,) base parameters, from which loads of joints follow, for friction that depends on them
-    delay    s; the effort in a row belongs to a motion this much later
+    known    delay and friction that a campaign's friction runs gave; the fit then finds only what they left
     """
     kept = [log.ordered(chain.v_names) for log in logs if log.use == "fit"]
     both = elastic_joints(kept, options)
     if not both.any():
         return Elasticity()
     kept = [checked(log, chain, options.filter.cutoff, options.check) for log in kept]
-    moving, parts = both.copy(), []
+    moving, parts, efforts = both.copy(), [], _Efforts(motors, chain.v_names, known)
     for log in kept:
         of_motors = log.of_motors
         assert of_motors is not None
@@ -122,7 +131,7 @@ def joint_elasticity(
         steps = [stretches(each, options.filter, options.check, options.stretch) for each in (log, of_motors)]
         for link, motor in zip(*steps, strict=True):
             moving &= ~link.states.still & ~motor.states.still
-            own.append(_samples(model, link, motor, options, (motors, delay), theta_b))
+            own.append(_samples(model, link, motor, options, efforts, theta_b))
         samples = _Samples.of(own)
         parts.append(samples.at(~held_out_of(log, len(samples.torque), options.split)))
     whole = _Samples.of(parts)
@@ -160,12 +169,33 @@ class _Samples:
         return _Samples(self.columns[rows], self.noise[rows], self.friction[rows], self.torque[rows])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Efforts:
+    """What turns a log's efforts into torques: motors, and what friction runs of the named joints gave."""
+
+    motors: Motors
+    names: tuple[str, ...]
+    known: FrictionResult | None
+
+    def torque(self, states: States, speed: Array, at: NDArray[np.intp]) -> Array:
+        """Torques at some rows, without known delay and friction at the motors' speeds (N, n)."""
+        torque = self.motors.torque(states.effort)
+        if self.known is None:
+            return torque[at]
+        found = np.asarray(CubicSpline(states.time, torque)(states.time[at] - self.known.delay))
+        for k, name in enumerate(self.names):
+            if name in self.known.joints:
+                rubbed = friction_torque(self.known.joints[name].friction, speed[:, k], states.period)
+                found[:, k] -= states.low_pass(rubbed)[at]
+        return found
+
+
 def _samples(
     model: Regressor,
     link: Stretch,
     motor: Stretch,
     options: LinearOptions,
-    efforts: tuple[Motors, float],
+    efforts: _Efforts,
     theta_b: Array,
 ) -> _Samples:
     """The samples of a part of a log. What is linear in the positions is filtered once, as the torque is."""
@@ -190,9 +220,7 @@ def _samples(
         friction = more if friction is None else np.concatenate([friction, more], axis=2)
     if friction is None:
         friction = np.zeros((len(at), len(shape), 0))
-    motors, delay = efforts
-    effort = here.effort[at] if delay == 0 else CubicSpline(here.time, here.effort)(here.time[at] - delay)
-    return _Samples(columns[at], noise[at], friction, motors.torque(effort))
+    return _Samples(columns[at], noise[at], friction, efforts.torque(here, there.qd, at))
 
 
 def _fitted(

@@ -10,6 +10,8 @@ import pytest
 from elastic_pendulum import ROTOR, Log, log_by_scipy, write_plant
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
+from psdmc.calibration.identify.friction import FrictionResult
+from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.joint_elasticity import Elasticity, joint_elasticity
 from psdmc.calibration.identify.linear_options import ElasticityOptions, LinearOptions
 from psdmc.calibration.identify.motor_model import Motors
@@ -34,11 +36,27 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> DynamicsModel:
     return derive_model(load_robot(folder / "pendulum.toml", drive_inertia=True).chain)
 
 
+def known_delay(delay: float) -> FrictionResult | None:
+    """What friction runs give that found a delay and no friction."""
+    zero = np.array([0.0, 0.0, 1e-2, 0.0, 1.0, 1e5, 0.0])
+    return (
+        FrictionResult({"swing": JointFriction("swing", zero, np.zeros((7, 7)), (), 0.0, 0.0, delay)}, ())
+        if delay
+        else None
+    )
+
+
 def found(model: DynamicsModel, log: Log | StoredLog, delay: float = 0.0, **known: float) -> Elasticity:
     options = LinearOptions(elasticity=ElasticityOptions(drive_inertia=known))
     assert model.theta_b is not None
     return joint_elasticity(
-        model.mechanism, ChainRegressor(model), [log], options, Motors.torques(1), model.theta_b, delay
+        model.mechanism,
+        ChainRegressor(model),
+        [log],
+        options,
+        Motors.torques(1),
+        model.theta_b,
+        known_delay(delay),
     )
 
 
