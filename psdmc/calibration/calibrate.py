@@ -17,6 +17,7 @@ from psdmc.calibration.identify.four_steps import (
     physical_steps,
 )
 from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
+from psdmc.calibration.identify.joint_elasticity import elastic_joints, joint_elasticity
 from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_covariance, with_prior
 from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
@@ -217,8 +218,27 @@ def calibrate_campaign(
 
     result = _physical(plain, consistent, options, progress)
     progress("verdict")
-    step = options.campaign.inertial.filter
-    return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step, options.verdict)
+    step = options.campaign.inertial
+    linear = replace(
+        options.linear, filter=step.filter, split=step.split, fit=step.fit, exponents=CAMPAIGN_FRICTION
+    )
+    soft = joint_elasticity(
+        model.mechanism,
+        regressor,
+        [run.log for run in runs.inertial],
+        linear,
+        found.motors,
+        found.inertial.theta_b,
+        found.friction,
+    )
+    result = with_model(replace(result, elasticity=soft.rows, notes=(*result.notes, *soft.notes)))
+    return with_verdict_on_campaign(
+        result, model, regressor, runs, found.motors, step.filter, options.verdict
+    )
+
+
+CAMPAIGN_FRICTION = (0.5, 1.0)
+"""Exponents of viscous friction that is fitted with the stiffness of elastic joints in a campaign."""
 
 
 def _physical(
@@ -248,6 +268,7 @@ def calibrate_logs(
     loaded  further logs with a known load; torque constants are first determined from these and the other logs
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
+    elastic_joints([log.ordered(model.v_names) for log in logs], linear)
     if loaded is None:
         motors = motors_of_logs(model.v_names, logs, torque_constants)
     else:
@@ -264,6 +285,8 @@ def calibrate_logs(
     result = fit.record(found)
     if loaded is not None and by_load is not None:
         result = with_loaded_logs(result, loaded, by_load, linear)
+    soft = joint_elasticity(model.mechanism, regressor, logs, linear, motors, found.theta_b)
+    result = with_model(replace(result, elasticity=soft.rows, notes=(*result.notes, *soft.notes)))
     progress("verdict")
     return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)
 

@@ -14,7 +14,7 @@ from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, is_folde
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.motions.trajectory import read_trajectory, trajectory_joints
-from psdmc.calibration.plant import plant_file, virtual_robot
+from psdmc.calibration.plant import elastic, plant_file, virtual_robot
 from psdmc.calibration.plant.plant_file import plant_texts
 from psdmc.calibration.plant.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
 from psdmc.errors import InputError
@@ -162,7 +162,7 @@ def _key(job: _Job) -> str:
     assert job.run.trajectory is not None
     digest = hashlib.sha256()
     variant = (job.options.ideal_sensors, job.options.harness, job.seed, job.run.load)
-    code = [Path(str(module.__file__)).read_bytes() for module in (virtual_robot, plant_file)]
+    code = [Path(str(module.__file__)).read_bytes() for module in (virtual_robot, plant_file, elastic)]
     for part in (repr(variant).encode("utf-8"), *plant_texts(job.plant), *code):
         digest.update(part + b"\0")
     digest.update(read_file(job.run.trajectory, LARGEST_FILE, SHORTER))

@@ -142,7 +142,13 @@ def calibrate(
     from psdmc.calibration.identify.essential import EssentialOptions
     from psdmc.calibration.sources import LogNaming
     from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
-    from psdmc.cli.show_checks import print_accuracy, print_proposal, print_torque_constants, print_verdict
+    from psdmc.cli.show_checks import (
+        print_accuracy,
+        print_elasticity,
+        print_proposal,
+        print_torque_constants,
+        print_verdict,
+    )
     from psdmc.model.calibrated import code_of
     from psdmc.model.load import load as load_model
     from psdmc.report.calibrate_commands import calibrate_command
@@ -179,6 +185,7 @@ def calibrate(
     print_proposal(record)
     print_accuracy(record)
     print_torque_constants(record)
+    print_elasticity(record)
     if verdict.usable or keep:
         print(f"{output}: calibrated model")
     else:

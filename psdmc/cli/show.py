@@ -271,8 +271,8 @@ def _verdict(verdict: Verdict | None) -> list[str]:
 
 
 def _calibrated_joints(found: Calibrated) -> Table:
-    """R^2 and RMSE of the whole torque, torque constant and friction, joint by joint."""
-    constants = [*found.motors, *found.friction]
+    """R^2 and RMSE of the whole torque, torque constant, friction and elasticity, joint by joint."""
+    constants = [*found.motors, *found.friction, *found.elasticity]
     units = joined_units((row.name, row.unit) for row in constants)
     by_joint = {(row.joint, row.name): row for row in constants}
     quality = {step.step: step.joints for step in found.steps}.get(WHOLE, {})

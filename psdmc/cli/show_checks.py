@@ -71,6 +71,25 @@ def print_accuracy(record: Calibrated) -> None:
     print_table(Table(("joint", *(f"{step.step} R^2" for step in record.steps)), rows))
 
 
+def print_elasticity(record: Calibrated) -> None:
+    """Print stiffness and damping of the joints with two encoders; nothing if there are none."""
+    rows = [
+        (
+            row.joint,
+            row.name,
+            f"{row.value:.6g}",
+            f"{row.std:.2g}",
+            f"{row.std / abs(row.value):.2%}",
+            row.unit,
+        )
+        if math.isfinite(row.std)
+        else (row.joint, row.name, "not determined", "", "", row.unit)
+        for row in record.elasticity
+    ]
+    if rows:
+        print_table(Table(("joint", "elasticity", "value", "standard deviation", "of it", "unit"), rows))
+
+
 def print_torque_constants(record: Calibrated) -> None:
     """Print the torque constants that the calibration found, with standard deviations; nothing if it found none."""
     found = [row for row in record.motors if row.seen]

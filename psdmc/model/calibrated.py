@@ -370,6 +370,7 @@ class Calibrated:
     springs     values of springs, with the spring's name in place of a joint's
     covariance  (l, l) of the base parameters; in directions that the data do not show, that of the prior; None: not
                 kept
+    elasticity  of joints with two encoders: stiffness and damping between motor and link, and drive inertia
     logs, load  the logs of the calibration, and the known load
     versions    of the programs that made the result
     """
@@ -391,6 +392,7 @@ class Calibrated:
     logs: tuple[LogUsed, ...] = ()
     load: LoadUsed | None = None
     versions: Mapping[str, str] = field(default_factory=dict)
+    elasticity: tuple[NumberRow, ...] = ()
 
     def __post_init__(self) -> None:
         if self.covariance is not None:

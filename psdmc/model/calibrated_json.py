@@ -76,6 +76,7 @@ def as_json(found: Calibrated) -> dict[str, Any]:
         "load": None if found.load is None else asdict(found.load),
         "versions": found.versions,
         "facts": found.facts,
+        **({"elasticity": [_row(row) for row in found.elasticity]} if found.elasticity else {}),
     }
     return {name: plain(value) for name, value in content.items()}
 
@@ -156,8 +157,8 @@ def document(found: Calibrated) -> dict[str, Any]:
     )
     for row, given in zip(kept["base_parameters"], found.parameters, strict=True):
         row |= {"visibility": str(given.visibility), "relative": plain(given.relative)}
-    for name in ("motors", "friction", "springs"):
-        for row in kept[name]:
+    for name in ("motors", "friction", "springs", "elasticity"):
+        for row in kept.get(name, ()):
             row["visibility"] = row["visibility"]["text"]
             if not row["parameters"]:
                 row.pop("parameters")
@@ -209,6 +210,7 @@ def from_json(value: object) -> Calibrated:
         motors=_rows(content, "motors", _number),
         friction=friction,
         springs=_rows(content, "springs", _number),
+        elasticity=_rows(content, "elasticity", _number) if "elasticity" in content else (),
         steps=tuple(_step(name, rows) for name, rows in _record(content, "quality").items()),
         warnings=tuple(_remark_of(each) for each in _list(content, "warnings")),
         notes=tuple(_texts(content, "notes")),

@@ -95,8 +95,8 @@ def parameter_table(record: Calibrated) -> str:
 
 
 def joint_table(record: Calibrated) -> str:
-    """Return the table of torque constants and friction of each joint (table 2 of Denso-2022)."""
-    own = (*record.motors, *record.friction)
+    """Return the table of torque constants, friction and elasticity of each joint (table 2 of Denso-2022)."""
+    own = (*record.motors, *record.friction, *record.elasticity)
     units = joined_units((row.name, row.unit) for row in own)
     by_key = {(row.joint, row.name): row for row in own}
     head = ["Joint", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in units.items())]

@@ -224,7 +224,7 @@ def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
     ]
     joints = [
         [escaped(row.joint), escaped(row.name.replace("_", " ")), _seen(row), unit(row.unit)]
-        for row in (*known.motors, *known.friction, *known.springs)
+        for row in (*known.motors, *known.friction, *known.elasticity, *known.springs)
     ]
     accuracy = [
         [

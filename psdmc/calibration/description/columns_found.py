@@ -9,13 +9,20 @@ from typing import Literal
 
 from psdmc.calibration.description.description import LogDescription
 from psdmc.calibration.description.table_joints import JOINTS, JointEntry
-from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY, Entry, refused
+from psdmc.calibration.description.table_quantities import (
+    EFFORT,
+    MOTOR_POSITION,
+    POSITION,
+    VELOCITY,
+    Entry,
+    refused,
+)
 from psdmc.calibration.description.units import TICKS, UNITS, Says
 from psdmc.calibration.logs.log import Quantity
 from psdmc.calibration.logs.log_format import Columns
 from psdmc.calibration.logs.wording import listed, quoted
 
-What = Literal["position", "velocity", "effort"]
+What = Literal["position", "velocity", "effort", "motor_position"]
 
 USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
     "position": {
@@ -37,6 +44,10 @@ USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
         "effort_nm": ("Nm", "motor_torque"),
         "effort_n": ("N", "motor_torque"),
         "effort": ("", "motor_torque"),
+    },
+    "motor_position": {
+        "motor_position_rad": ("rad", "motor_torque"),
+        "motor_position_m": ("m", "motor_torque"),
     },
 }
 """Columns that need no naming, PREFIX.<joint>: their units (none: SI), and for effort what they hold."""
@@ -66,12 +77,16 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class JointColumns:
-    """The columns of one joint; velocity is None if the log has none."""
+    """The columns of one joint; velocity and motor are None if the log has none.
+
+    motor  position of the motor, in a log whose `position` is that of the link
+    """
 
     name: str
     position: Found
     velocity: Found | None
     effort: Found
+    motor: Found | None = None
 
 
 def joint_columns(
@@ -87,7 +102,9 @@ def joint_columns(
         velocity = _found(own, "velocity", own.velocity.over(description.part(VELOCITY)), tables)
         if position is None or effort is None:
             raise _missing(own, "position" if position is None else "effort", tables)
-        found.append(JointColumns(name, position, velocity, effort))
+        second = own.motor_position.over(description.part(MOTOR_POSITION))
+        motor = _found(own, "motor_position", second, tables)
+        found.append(JointColumns(name, position, velocity, effort, motor))
     return tuple(found)
 
 

@@ -13,10 +13,11 @@ from typing import Any, TypeVar, cast
 
 from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.description.table_coupling import COUPLING
+from psdmc.calibration.description.table_elasticity import ELASTICITY
 from psdmc.calibration.description.table_fit import FIT
 from psdmc.calibration.description.table_joints import JOINTS
 from psdmc.calibration.description.table_logs import CSV_FORM, LOGS, TIME
-from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY
+from psdmc.calibration.description.table_quantities import EFFORT, MOTOR_POSITION, POSITION, VELOCITY
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_none
 
@@ -45,8 +46,10 @@ TABLES: tuple[Table[Any], ...] = (
     POSITION,
     VELOCITY,
     EFFORT,
+    MOTOR_POSITION,
     JOINTS,
     COUPLING,
+    ELASTICITY,
     FIT,
     SPRINGS,
     FRICTION,

@@ -86,6 +86,7 @@ def _described(
         sliding=layout.sliding,
         date=date,
         use=entry.use,
+        motors_at=len(joint_names) * (1 + layout.has_velocity) * layout.has_motors,
     )
     return log if si[1].on_disk else log.held()
 
@@ -96,7 +97,11 @@ def _layout(description: LogDescription, name: str, joints: Sequence[JointColumn
     efforts = [joint.effort for joint in joints]
     coupled = bool(description.part(COUPLING).effort)
     quantity = held_quantity([(joint.name, joint.effort) for joint in joints], coupled)
-    columns = (*(joint.position for joint in joints), *velocities, *efforts)
+    has_motors = any(joint.motor is not None for joint in joints)
+    if has_motors and (coupled or description.part(COUPLING).position):
+        raise refused(f"{name}: motor_position and [[coupling]] are both given, expected one of them")
+    motors = [joint.motor or joint.position for joint in joints] if has_motors else []
+    columns = (*(joint.position for joint in joints), *velocities, *motors, *efforts)
     factors = np.array([found.factor for found in columns])
     factors[-len(joints) :] *= [torque_factor(found, quantity) for found in efforts]
     notes = (
@@ -112,6 +117,7 @@ def _layout(description: LogDescription, name: str, joints: Sequence[JointColumn
         quantity,
         _sliding(joints),
         notes,
+        has_motors,
     )
 
 
@@ -121,6 +127,8 @@ def _sliding(joints: Sequence[JointColumns]) -> tuple[str, ...] | None:
         kinds = {"position": joint.position.says, "effort": joint.effort.says}
         if joint.velocity is not None:
             kinds["velocity"] = joint.velocity.says
+        if joint.motor is not None:
+            kinds["motor_position"] = joint.motor.says
         says = {what: kind for what, kind in kinds.items() if kind in ("turning", "sliding")}
         if len(set(says.values())) > 1:
             both = ", ".join(f"its {what} is of a {kind} one" for what, kind in says.items())
@@ -193,8 +201,8 @@ def _side_by_side(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """The columns that are kept of a log file, in the order position, velocity (if all joints have one), effort. Each
-    of the three has one column for each joint.
+    """The columns that are kept of a log file, in the order position, velocity (if all joints have one), motor position
+    (if a joint has one), effort. Each of these has one column for each joint.
 
     columns   the columns of the file
     factors   (columns,) SI value = factor * (number - zero)
@@ -211,6 +219,7 @@ class Layout:
     quantity: Quantity
     sliding: tuple[str, ...] | None
     notes: tuple[str, ...]
+    has_motors: bool = False
 
 
 def in_si(
@@ -247,6 +256,7 @@ def _maps(layout: Layout, coupling: CouplingEntry) -> list[Callable[[Array], Arr
     motions = [coupling.position, *([coupling.velocity] if layout.has_velocity else [])]
     maps = [_same if found is None else found.to_joints for found in map(coupling_of, motions)]
     torques = coupling_of(coupling.effort)
+    maps += [_same] * layout.has_motors
     return [*maps, _same if torques is None else torques.torque_of_joints]
 
 

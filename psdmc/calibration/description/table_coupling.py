@@ -9,13 +9,14 @@ import numpy as np
 
 from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.description.table_joints import require_joints
-from psdmc.calibration.description.units import UNITS
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, shown
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.model.calibrated import Matrix
 
 KEYS = ("joints", "matrix", "quantities")
+COUPLED = ("position", "velocity", "effort")
+"""Quantities that a log may hold for motors."""
 MOST_COUPLED = 10
 LARGEST_RATIO = 1e6
 """Of an entry of the matrix."""
@@ -68,7 +69,7 @@ def _read(value: object, reading: Reading) -> CouplingEntry:
         return CouplingEntry(groups)
     parts = {
         what: whole_matrix([group for group in groups if what in group.quantities], reading.joint_names)
-        for what in UNITS
+        for what in COUPLED
     }
     return CouplingEntry(groups, whole_matrix(groups, reading.joint_names), **parts)
 
@@ -79,11 +80,11 @@ def _group(value: object, where: str, reading: Reading) -> Group:
     require_joints(list(joints), where, reading)
     if not 2 <= len(joints) <= MOST_COUPLED and table.has("joints"):
         reading.faults.append(f"{where}: joints: found {len(joints)}, expected 2 to {MOST_COUPLED}")
-    quantities = _texts(table, "quantities") if table.has("quantities") else tuple(UNITS)
-    odd = [quoted(word) for word in quantities if word not in UNITS]
+    quantities = _texts(table, "quantities") if table.has("quantities") else COUPLED
+    odd = [quoted(word) for word in quantities if word not in COUPLED]
     if odd:
         reading.faults.append(
-            f"{where}: quantities: found {listed(odd)}, expected some of {', '.join(UNITS)}"
+            f"{where}: quantities: found {listed(odd)}, expected some of {', '.join(COUPLED)}"
         )
     return Group(joints, _matrix(table, len(joints)), quantities)
 

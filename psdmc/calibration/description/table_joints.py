@@ -27,6 +27,7 @@ class JointEntry:
     position: Entry
     velocity: Entry
     effort: Entry
+    motor_position: Entry = Entry()  # noqa: RUF009  frozen
 
 
 def _read(value: object, reading: Reading) -> tuple[JointEntry, ...]:

@@ -1,5 +1,5 @@
-"""The tables `[position]`, `[velocity]` and `[effort]` of a log description: unit, sign, gear ratio and delay of a
-quantity. They apply to all joints; the entry of a joint may replace a value for this joint."""
+"""The tables `[position]`, `[velocity]`, `[effort]` and `[motor_position]` of a log description: unit, sign, gear ratio
+and delay of a quantity. They apply to all joints; the entry of a joint may replace a value for this joint."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ OWN: Mapping[str, tuple[str, ...]] = {
     "position": (*COMMON, "offset", "ticks_per_rev"),
     "velocity": (*COMMON, "ticks_per_rev"),
     "effort": (*COMMON, "torque_constant", "quantity"),
+    "motor_position": (*COMMON, "offset", "ticks_per_rev"),
 }
 """Keys by quantity."""
 COLUMN = ("column", "table")
@@ -146,6 +147,8 @@ def _table(what: str) -> Table[Entry]:
 
 
 POSITION, VELOCITY, EFFORT = _table("position"), _table("velocity"), _table("effort")
+MOTOR_POSITION = _table("motor_position")
+"""Of a motor whose joint is elastic and has a second encoder, on the link's side: its `position`."""
 
 
 def refused(text: str) -> InputError:

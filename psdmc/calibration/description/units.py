@@ -62,5 +62,6 @@ UNITS: Mapping[str, Mapping[str, Unit]] = {
     "position": POSITION_UNITS,
     "velocity": VELOCITY_UNITS,
     "effort": EFFORT_UNITS,
+    "motor_position": POSITION_UNITS,
 }
 """By quantity."""

@@ -326,7 +326,8 @@ class JointRun:
 
 def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, options: StepOptions) -> JointRun:
     """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move."""
-    states = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
+    log = run.log.of_motors or run.log  # friction acts at the motors
+    states = filtered(checked(log, robot.chain, options.filter.cutoff), options.filter)
     _require_alone(run, robot.chain, k, states)
     gravity = (gravity_regressor(robot.regressor, states.q) @ theta_gravity)[:, k]
     if run.tool is not None:

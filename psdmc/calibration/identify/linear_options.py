@@ -21,6 +21,20 @@ from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True)
+class ElasticityOptions:
+    """What a log description says about elastic joints.
+
+    asked          whether the description asks for joint stiffnesses; then a log without two encoders is refused
+    joints         joints whose stiffness is asked for; empty: all joints with two encoders
+    drive_inertia  known drive inertias at the joint, kg m^2 (kg), by joint; the others are fitted with the stiffness
+    """
+
+    asked: bool = False
+    joints: tuple[str, ...] = ()
+    drive_inertia: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class LinearOptions:
     """Options of the linear fit of plain logs.
 
@@ -37,6 +51,7 @@ class LinearOptions:
                 priors.md)
     tables_from  name of the file with these tables, for messages
     columns     springs and further friction of a robot, made from these tables; each value is one more unknown
+    elasticity  what is asked for and known of elastic joints
     """
 
     filter: FilterOptions = field(default_factory=lambda: FilterOptions(cutoff=8.0))
@@ -52,6 +67,7 @@ class LinearOptions:
     tables: Mapping[str, Any] = field(default_factory=dict)
     tables_from: str = "description"
     columns: Columns = field(default_factory=Columns)
+    elasticity: ElasticityOptions = field(default_factory=ElasticityOptions)
 
     @property
     def terms(self) -> tuple[Term, ...]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,9 @@ class Log(Timed):
     sliding      names of joints whose position is in m, while the others are in rad; None: the log does not say
     date         date of the data if the file tells, else empty
     use          fit: the log is for the fit; validate: the whole log is held out for validation
+    motor_position  (N, n) rad; m for sliding joints: the motors' positions divided by the gear ratios, where elastic
+                 joints have encoders on both sides; `position` is then the links'. A joint with one encoder has its
+                 `position` here, too. None: no joint has two
     """
 
     name: str
@@ -73,12 +77,13 @@ class Log(Timed):
     sliding: tuple[str, ...] | None = None
     date: str = ""
     use: Use = "fit"
+    motor_position: Array | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint_names", tuple(self.joint_names))
         shape = (len(np.asarray(self.time)), len(self.joint_names))
         object.__setattr__(self, "time", _column(self.time, shape[:1], f"{self.name}: time"))
-        for what in ("position", "velocity", "effort"):
+        for what in ("position", "velocity", "effort", "motor_position"):
             values = getattr(self, what)
             if values is not None:
                 object.__setattr__(self, what, _column(values, shape, f"{self.name}: {what}"))
@@ -91,18 +96,23 @@ class Log(Timed):
         Raises InputError with all joints that the log lacks.
         """
         columns = places_of(self.name, self.joint_names, joint_names)
-        velocity = None if self.velocity is None else self.velocity[:, columns]
-        return replace(
-            self,
-            joint_names=joint_names,
-            position=self.position[:, columns],
-            velocity=velocity,
-            effort=self.effort[:, columns],
-        )
+        return replace(self, joint_names=joint_names, **self._changed(lambda values: values[:, columns]))
+
+    def _changed(self, change: Callable[[Array], Array]) -> dict[str, Any]:
+        """All columns that the log has after a change, by name."""
+        parts = {name: getattr(self, name) for name in ("position", "velocity", "effort", "motor_position")}
+        return {name: change(values) for name, values in parts.items() if values is not None}
 
     @property
     def has_velocity(self) -> bool:
         return self.velocity is not None
+
+    @property
+    def of_motors(self) -> Log | None:
+        """Return the log with the motors' positions as `position`; None if it has no motor positions."""
+        if self.motor_position is None:
+            return None
+        return replace(self, position=self.motor_position, velocity=None, motor_position=None)
 
     def rows(self, start: int, stop: int) -> Log:
         """Return the rows from `start` to `stop` as a log."""
@@ -110,14 +120,7 @@ class Log(Timed):
 
     def at(self, rows: slice | NDArray[np.bool_]) -> Log:
         """Return the rows of a slice or a mask as a log."""
-        velocity = None if self.velocity is None else self.velocity[rows]
-        return replace(
-            self,
-            time=self.time[rows],
-            position=self.position[rows],
-            velocity=velocity,
-            effort=self.effort[rows],
-        )
+        return replace(self, time=self.time[rows], **self._changed(lambda values: values[rows]))
 
     def between(self, start: float, end: float) -> Log:
         """Return the rows with start <= time < end (s) as a log."""

@@ -1,8 +1,9 @@
 """Reads log files, as a whole or in pieces, and writes them. All tables have the same column names; bags have none.
 
 The columns are `time_s`, then for each joint `position_rad.<joint>` (`position_m.` if it slides), optionally
-`velocity_rad_s.<joint>` (`velocity_m_s.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if
-it slides). `effort_nm.` is read as motor torque, and the log's notes say so.
+`velocity_rad_s.<joint>` (`velocity_m_s.`) and `motor_position_rad.<joint>` (`motor_position_m.`), and one of
+`current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if it slides). `effort_nm.` is read as motor torque, and the
+log's notes say so.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ EFFORTS: tuple[tuple[str, Quantity], ...] = (
 )
 POSITIONS = ("position_rad", "position_m")
 VELOCITIES = ("velocity_rad_s", "velocity_m_s")
+MOTOR_POSITIONS = ("motor_position_rad", "motor_position_m")
 
 _EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
     "current": ("current_a", "current_a"),
@@ -131,6 +133,7 @@ def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> Any
         notes=layout.notes,
         sliding=layout.sliding,
         date=date,
+        motors_at=len(layout.positions) + len(layout.velocities or ()) if layout.motors else 0,
     )
     return log if store.on_disk else log.held()
 
@@ -169,7 +172,10 @@ def column_names(path: Path) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The columns of a table that contain a log of n joints, and their quantities."""
+    """The columns of a table that contain a log of n joints, and their quantities.
+
+    motors  motor positions, of joints with one encoder their positions; empty: no joint has two encoders
+    """
 
     name: str
     joint_names: tuple[str, ...]
@@ -179,11 +185,12 @@ class Layout:
     quantity: Quantity
     notes: tuple[str, ...]
     sliding: tuple[str, ...] | None
+    motors: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns that are read, without time."""
-        return (*self.positions, *(self.velocities or ()), *self.efforts)
+        return (*self.positions, *(self.velocities or ()), *self.motors, *self.efforts)
 
 
 DRAFTED = "psdmc calibrate --describe MODEL.npz LOG drafts a description of columns by other names"
@@ -206,7 +213,10 @@ def layout_of(name: str, columns: Sequence[str]) -> Layout:
     lacking = [joint for joint in joints if joint not in velocities]
     if velocities and lacking:
         notes = (*notes, f"{name}: no velocity of joint(s) {listed(lacking)}: velocities are not used")
-    _require_units(name, joints, {} if lacking else velocities, effort_names)
+    motors = {
+        joint: column for joint, column in _joints(name, columns, MOTOR_POSITIONS).items() if joint in joints
+    }
+    _require_units(name, joints, ({} if lacking else velocities, motors), effort_names)
     return Layout(
         name=name,
         joint_names=tuple(joints),
@@ -216,6 +226,7 @@ def layout_of(name: str, columns: Sequence[str]) -> Layout:
         quantity=quantity,
         notes=notes,
         sliding=tuple(joint for joint, column in joints.items() if _slides(column)),
+        motors=tuple((joints | motors).values()) if motors else (),
     )
 
 
@@ -237,6 +248,7 @@ def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
         notes=found.notes,
         sliding=found.sliding,
         date=date_of(float(columns["time_s"][0]) if len(columns["time_s"]) else 0.0),
+        motor_position=stacked(found.motors) if found.motors else None,
     )
 
 
@@ -291,12 +303,12 @@ def _efforts(
 
 
 def _require_units(
-    name: str, positions: Mapping[str, str], velocities: Mapping[str, str], efforts: list[str]
+    name: str, positions: Mapping[str, str], motions: Sequence[Mapping[str, str]], efforts: list[str]
 ) -> None:
     """InputError where one column says that a joint turns and another one that it slides."""
     for (joint, position), effort in zip(positions.items(), efforts, strict=True):
         others = [effort] if effort.partition(".")[0] != "current_a" else []
-        others += [velocities[joint]] if joint in velocities else []
+        others += [motion[joint] for motion in motions if joint in motion]
         odd = [column for column in others if _slides(column) != _slides(position)]
         if odd:
             raise InputError(
@@ -317,6 +329,7 @@ def columns_of(log: Log) -> dict[str, Array]:
     parts = (
         (POSITIONS, log.position),
         (VELOCITIES, log.velocity),
+        (MOTOR_POSITIONS, log.motor_position),
         (_EFFORT_COLUMNS[log.quantity], log.effort),
     )
     for (turning, sliding), values in parts:

@@ -208,7 +208,8 @@ def _straight_rows(part: Log) -> int:
 def _note_no_numbers(bad: dict[str, NoNumber], part: Log, start: int) -> None:
     """Add a stretch's values that are no measurements; `start` is its first row."""
     columns = [("time", part.time)]
-    for what, values in (("position", part.position), ("velocity", part.velocity), ("effort", part.effort)):
+    parts = {"position": part.position, "velocity": part.velocity, "effort": part.effort}
+    for what, values in (parts | {"motor position": part.motor_position}).items():
         if values is None:
             continue
         called = f"effort ({part.quantity})" if what == "effort" else what

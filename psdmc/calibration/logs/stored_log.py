@@ -69,13 +69,16 @@ class RowStore:
 class StoredLog(Timed):
     """A log whose rows are in a RowStore in memory or on disk. It has the fields of Log, with N rows and n joints.
 
-    The method `rows` reads positions, velocities and efforts.
+    The method `rows` reads positions, velocities, motor positions and efforts.
 
     time          (N,) s, in memory
-    store         rows, each with the positions, velocities and efforts of `stored` joints
+    store         rows, each with the positions, velocities (if there are any), motor positions (if there are any) and
+                  efforts of `stored` joints
     has_velocity  False: the velocities in the store have no meaning
     places        (n,) indices of the log's n joints among the `stored` joints
     first         row of the store that is the log's first
+    motors_at     column of the store from which on motor positions are; 0: there are none
+    position_at   column of the store from which on the positions are
     """
 
     name: str
@@ -91,6 +94,15 @@ class StoredLog(Timed):
     date: str = ""
     use: Use = "fit"
     first: int = 0
+    motors_at: int = 0
+    position_at: int = 0
+
+    @property
+    def of_motors(self) -> StoredLog | None:
+        """Return the log with the motors' positions as positions; None if it has no motor positions."""
+        if not self.motors_at:
+            return None
+        return replace(self, position_at=self.motors_at, motors_at=0, has_velocity=False)
 
     def ordered(self, joint_names: tuple[str, ...]) -> StoredLog:
         """Return a copy of the log with its columns in the order of `joint_names`.
@@ -103,18 +115,20 @@ class StoredLog(Timed):
     def rows(self, start: int, stop: int) -> Log:
         """Return the rows from `start` to `stop` as a log in memory."""
         values, places = self.store.rows(self.first + start, self.first + stop), list(self.places)
-        position, velocity, effort = values[:, : self.stored], None, values[:, -self.stored :]
-        if self.has_velocity:
-            velocity = values[:, self.stored : 2 * self.stored][:, places]
+
+        def part(first: int) -> Array:
+            return values[:, first : first + self.stored][:, places]
+
         return Log(
             name=self.name,
             joint_names=self.joint_names,
             time=self.time[start:stop],
-            position=position[:, places],
-            velocity=velocity,
-            effort=effort[:, places],
+            position=part(self.position_at),
+            velocity=part(self.stored) if self.has_velocity else None,
+            effort=part(values.shape[1] - self.stored),
             quantity=self.quantity,
             sliding=self.sliding,
+            motor_position=part(self.motors_at) if self.motors_at else None,
         )
 
     def held(self) -> Log:

@@ -54,6 +54,8 @@ LARGEST_BODY = 1e6
 """kg, kg m^2 of a link or drive."""
 ROUNDED = 1e-12
 """Share of an inertia's largest entry by which a principal moment may be negative: rounding."""
+ENCODERS = ("both", "motor", "link")
+"""Sides of an elastic joint whose position a robot measures."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 """Types of a URDF's joints that a plant can move."""
 SLIDES = {"revolute": False, "prismatic": True}
@@ -69,13 +71,17 @@ class JointTruth:
     """The motor and friction of one joint: torque constant K_t (N m/A), and values of the plant's friction laws by
     name, SI.
 
-    drive_inertia  kg m^2 (kg) at the joint, for a URDF, which cannot state it; a DH table states its own
+    drive_inertia    kg m^2 (kg) at the joint, for a URDF, which cannot state it; a DH table states its own
+    joint_stiffness  N m/rad (N/m) between motor and link; 0: the joint is rigid
+    joint_damping    N m s/rad (N s/m) between motor and link
     """
 
     name: str
     torque_constant: float
     friction: Mapping[str, float]
     drive_inertia: float = 0.0
+    joint_stiffness: float = 0.0
+    joint_damping: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +92,14 @@ class Sensors:
     current_noise   A RMS, white
     current_step    A, quantisation
     effort_delay    s; the current in a row belongs to a motion this much later
+    encoders        sides of elastic joints whose positions are logged: both, motor or link
     """
 
     position_step: float = 0.0
     current_noise: float = 0.0
     current_step: float = 0.0
     effort_delay: float = 0.0
+    encoders: str = "both"
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +199,8 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
         faults.append("tip: found with a DH table, whose last link is the tip; expected with a URDF only")
     if is_table and any(joint.drive_inertia for joint in joints):
         faults.append("drive_inertia: found with a DH table, which states its own; expected with a URDF only")
+    if sensors.encoders != "both" and not any(joint.joint_stiffness for joint in joints):
+        faults.append("sensors: encoders: found without a joint_stiffness, expected an elastic joint")
     require_none(faults, str(path), HINT)
     if not is_table:
         return Plant(read_plant_urdf(where, names, tip), joints, sensors, held, terms, speed)
@@ -243,17 +253,24 @@ def _terms(table: TomlTable, folder: Path, faults: list[str]) -> tuple[Term, ...
 
 def _truth(value: object, where: str, terms: Sequence[Term], faults: list[str]) -> JointTruth:
     pairs = [pair for term in terms for pair in zip(term.names, term.law.values, strict=True)]
-    keys = ("name", "torque_constant", *(name for name, _ in pairs), "drive_inertia")
+    own = ("drive_inertia", "joint_stiffness", "joint_damping")
+    keys = ("name", "torque_constant", *(name for name, _ in pairs), *own)
     table = TomlTable(value, where, keys, faults)
     name = table.text("name")
     table.where = f"joint {quoted(name)}" if name else where
+    if table.has("joint_damping") and not table.has("joint_stiffness"):
+        faults.append(
+            f"{table.where}: joint_damping: found without joint_stiffness, expected both or neither"
+        )
     return JointTruth(
         name=name,
         torque_constant=table.number("torque_constant", SMALLEST, LARGEST),
         friction={
-            key: table.number(key, max(own.low, -LARGEST), min(own.high, LARGEST)) for key, own in pairs
+            key: table.number(key, max(value.low, -LARGEST), min(value.high, LARGEST)) for key, value in pairs
         },
         drive_inertia=table.number("drive_inertia", 0.0, LARGEST_BODY, 0.0),
+        joint_stiffness=table.number("joint_stiffness", SMALLEST, LARGEST, 0.0),
+        joint_damping=table.number("joint_damping", 0.0, LARGEST, 0.0),
     )
 
 
@@ -269,6 +286,7 @@ def _sensors(value: object, faults: list[str]) -> Sensors:
         current_noise=table.number("current_noise", 0.0, LARGEST, 0.0),
         current_step=steps[1],
         effort_delay=table.number("effort_delay", 0.0, LARGEST_DELAY, 0.0),
+        encoders=table.word("encoders", ENCODERS, "both"),
     )
 
 

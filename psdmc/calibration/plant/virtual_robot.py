@@ -1,8 +1,8 @@
 """Simulates a robot with known parameters: Pinocchio's dynamics, friction, and imperfect sensors.
 
 It has its own code for robot files and sensors. Friction torques come from the friction laws, but SciPy's stiff
-integrator integrates their states, and not the step that the calibration uses. The motion is prescribed, as by a stiff
-position controller, and the motors give the torque that it needs.
+integrator integrates their states, and not the step that the calibration uses. The motion of the motors is prescribed,
+as by a stiff position controller, and the motors give the torque that it needs. Links of elastic joints move behind.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from scipy.integrate import ODEintWarning, odeint
 from psdmc.calibration.logs.foreign_bytes import decoding
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.motions.trajectory import Trajectory
+from psdmc.calibration.plant.elastic import Elastic
 from psdmc.calibration.plant.plant_file import (
     SIGN_SPEED,
     Harness,
@@ -74,6 +75,18 @@ class VirtualRobot:
         pairs = zip(self.joint_names, kinds, strict=True)
         return tuple(name for name, kind in pairs if kind.startswith("JointModelP"))
 
+    @property
+    def stiffness(self) -> Array:
+        """Return the joint stiffnesses (n,), N m/rad (N/m). Zero means that the joint is rigid."""
+        return np.array([joint.joint_stiffness for joint in self.joints])
+
+    def held_torque(self, q: Array) -> Array:
+        """Return the torques (..., n) that hold the harness, if the robot has one, at positions q (..., n)."""
+        if self.harness is None:
+            return np.zeros_like(q)
+        held = np.array([name in self.harness.joints for name in self.joint_names])
+        return np.where(held, self.harness.torque * np.tanh(q / self.harness.angle), 0.0)
+
 
 def load_virtual_robot(
     path: str | Path, *, ideal_sensors: bool = False, harness: bool = False
@@ -96,7 +109,7 @@ def load_virtual_robot(
             model, tip = _model_of_urdf(plant.robot, plant.joints)
         else:
             model, tip = _pinocchio_model(plant.robot)
-    sensors = Sensors() if ideal_sensors else plant.sensors
+    sensors = Sensors(encoders=plant.sensors.encoders) if ideal_sensors else plant.sensors
     held = plant.harness if harness else None
     return VirtualRobot(
         plant.robot.name, model, tip, plant.joints, sensors, held, plant.terms, plant.sign_speed
@@ -143,25 +156,53 @@ def simulate(
     robot: VirtualRobot, trajectory: Trajectory, *, payload: Payload | None = None, seed: int = 0
 ) -> Log:
     """Return the log of the robot's sensors while it runs a trajectory from rest: a row per time step."""
-    shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
-    rigid = _rigid_torque(_loaded(robot, payload), *shifted)
-    tau = rigid + _friction(robot, trajectory, shifted[0], shifted[1], rigid)
-    if robot.harness is not None:
-        held = np.array([name in robot.harness.joints for name in robot.joint_names])
-        tau += np.where(held, robot.harness.torque * np.tanh(shifted[0] / robot.harness.angle), 0.0)
+    times = np.minimum(trajectory.time + robot.sensors.effort_delay, trajectory.duration)
+    motors = _at(trajectory, times)
+    rigid, tau, position = _torques(robot, trajectory, _loaded(robot, payload), motors, times)
+    tau = tau + _friction(robot, trajectory, motors[0], motors[1], rigid)
     rng = np.random.default_rng(seed)
     current = tau / np.array([joint.torque_constant for joint in robot.joints])
     current = current + robot.sensors.current_noise * rng.standard_normal(current.shape)
+    step, both = robot.sensors.position_step, robot.stiffness.any() and robot.sensors.encoders == "both"
+    logged = trajectory.q if robot.sensors.encoders == "motor" else position
     return Log(
         name=robot.name,
         joint_names=robot.joint_names,
         time=trajectory.time,
-        position=_quantised(trajectory.q, robot.sensors.position_step),
+        position=_quantised(logged, step),
         velocity=None,
         effort=_quantised(current, robot.sensors.current_step),
         quantity="current",
         sliding=trajectory.sliding,
+        motor_position=_quantised(trajectory.q, step) if both else None,
     )
+
+
+def _torques(
+    robot: VirtualRobot, trajectory: Trajectory, model: Any, motors: tuple[Array, Array, Array], times: Array
+) -> tuple[Array, Array, Array]:
+    """Torques of bodies and rotors (N, n) at `times`, these with the harness, and link positions at the rows' times."""
+    own = robot.stiffness > 0
+    if not own.any():
+        rigid = _rigid_torque(model, *motors)
+        return rigid, rigid + robot.held_torque(motors[0]), trajectory.q
+    links, rotors = model.copy(), np.where(own, model.armature, 0.0)
+    links.armature = np.where(own, 0.0, model.armature)
+    damping = np.array([joint.joint_damping for joint in robot.joints])
+    c = _quintic(trajectory.q, trajectory.qd, trajectory.qdd, trajectory.period)
+    elastic = Elastic(
+        links,
+        robot.stiffness,
+        damping,
+        _motion_function(c, trajectory.period),
+        robot.held_torque,
+        robot.joint_names,
+    )
+    every = np.union1d(trajectory.time, times)
+    q, qd, qdd = elastic.links(every)
+    at, rows = np.searchsorted(every, times), np.searchsorted(every, trajectory.time)
+    rigid = _rigid_torque(links, q[at], qd[at], qdd[at]) + rotors * motors[2]
+    return rigid, rigid + robot.held_torque(q[at]), np.where(own, q[rows], trajectory.q)
 
 
 def _quantised(values: Array, step: float) -> Array:
@@ -267,6 +308,25 @@ def _with_state(
         for t, z in zip(grid.tolist(), bend[:, 0], strict=True)
     ]
     return np.array(torque[len(grid) - len(times) :])
+
+
+def _motion_function(coefficients: Array, h: float) -> Callable[[float], tuple[Array, Array, Array]]:
+    """What _at gives at one time, quickly, from the coefficients of _quintic."""
+    pieces = np.ascontiguousarray(coefficients.transpose(1, 0, 2))
+    last = len(pieces) - 1
+
+    def motion(t: float) -> tuple[Array, Array, Array]:
+        index = min(max(int(t / h), 0), last)
+        s = t - index * h
+        powers = [
+            [1.0, s, s**2, s**3, s**4, s**5],
+            [0.0, 1.0, 2 * s, 3 * s**2, 4 * s**3, 5 * s**4],
+            [0.0, 0.0, 2.0, 6 * s, 12 * s**2, 20 * s**3],
+        ]
+        q, qd, qdd = np.array(powers) @ pieces[index]
+        return q, qd, qdd
+
+    return motion
 
 
 def _speed_function(trajectory: Trajectory, k: int) -> Callable[[float], float]:
