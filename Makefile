@@ -163,7 +163,7 @@ LEGS ?=
 bench-legged: $(READY) ## time derivatives and matrices of seven legged robots, on an idle machine; LEGS='hyq go1' for some
 	$(RUN)/python -m psdmc.bench.legged $(LEGS) --json $(GENERATED)/bench-legged.json
 
-bench-contacts: $(READY) ## time dynamics with contacts of four legged robots beside Pinocchio, on an idle machine; LEGS='hyq' for some
+bench-contacts: $(READY) ## time dynamics with contacts of four legged robots, and of a palletiser, beside Pinocchio, on an idle machine; LEGS='hyq' for some
 	$(RUN)/python benchmarks/contacts.py $(LEGS)
 
 LEARNING := .venv-learning
