@@ -54,6 +54,9 @@ from psdmc.progress import Progress
 from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.limits import shown
 
+CAMPAIGN_FRICTION = (0.5, 1.0)
+"""Exponents of viscous friction that is fitted with the stiffness of elastic joints in a campaign."""
+
 
 @dataclass(frozen=True, slots=True)
 class CalibrateOptions:
@@ -235,10 +238,6 @@ def calibrate_campaign(
     return with_verdict_on_campaign(
         result, model, regressor, runs, found.motors, step.filter, options.verdict
     )
-
-
-CAMPAIGN_FRICTION = (0.5, 1.0)
-"""Exponents of viscous friction that is fitted with the stiffness of elastic joints in a campaign."""
 
 
 def _physical(

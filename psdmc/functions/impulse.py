@@ -42,6 +42,7 @@ RESTITUTION = Quantity(
     "-restitution times that before",
     unit="1",
     default=0.0,
+    allowed=(0.0, 1.0),
 )
 IMPULSES = Quantity(
     "impulses",
@@ -59,11 +60,7 @@ OF_LOOPS = (
     "about the axes of the loop's first frame"
 )
 
-TOUCHING = replace(
-    CONTACTS,
-    failure=f"restitution is not from 0 to 1\n{CONTACTS.failure}",
-    error=f"{CONTACTS.error}, or restitution = {{restitution:g}} is not from 0 to 1",
-)
+TOUCHING = replace(CONTACTS, failure=f"restitution is not from 0 to 1\n{CONTACTS.failure}")
 
 
 def trace(g: Ingredients) -> Outputs:

@@ -121,7 +121,7 @@ class Quantity:
              then 1
     default  the value of all entries if Python's callers leave the input out
     whole    whether only `least` and `largest` are allowed, such as 0 and 1
-    lowest   the smallest value that is allowed, or None
+    allowed  the smallest and the largest value that are allowed; None: all are
     by_q     whether entries are derivatives by q
     """
 
@@ -134,7 +134,7 @@ class Quantity:
     least: float | None = None
     default: float | None = None
     whole: bool = False
-    lowest: float | None = None
+    allowed: tuple[float, float] | None = None
     by_q: bool = False
 
     def __post_init__(self) -> None:
@@ -171,8 +171,9 @@ class Quantity:
         for k, value in enumerate(values):
             if self.whole and value not in (self.least, self.largest):
                 return k, f"{self.least:g} or {self.largest:g}"
-            if self.lowest is not None and not value >= self.lowest:
-                return k, f"{self.lowest:g} or more"
+            if self.allowed is not None and not self.allowed[0] <= value <= self.allowed[1]:
+                low, high = self.allowed
+                return k, f"{low:g} to {high:g}" if high < math.inf else f"{low:g} or more"
         return None
 
     @property

@@ -51,7 +51,7 @@ MU = Quantity(
     "angular rows",
     unit="1/kg",
     default=0.0,
-    lowest=0.0,
+    allowed=(0.0, np.inf),
 )
 
 CONTACTS = SymmetricMatrix(

@@ -26,8 +26,6 @@ from psdmc.verification.functions import function_errors
 
 STATES = 200
 SEED = 14_630
-PLACES = 50
-"""States at which placements are compared, one at a time: each has the same fixed transforms between links."""
 TORQUE_LIMIT = 1e-10
 """Largest relative error that passes: a hundred times what rounding leaves, a million times less than any mistake."""
 
@@ -179,11 +177,11 @@ def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
     """Rows for the placements of links and tip and for gravity, within the angles that snapping reports."""
     chain = model.mechanism
-    q = Following.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0][:PLACES])
+    q = Following.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0])
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
     above = (*chain.parents, chain.tip_body)
-    errors = placement_errors(np.array([_poses_at(chain, row) for row in q]), expected, above)
+    errors = placement_errors(_poses(chain, q), expected, above)
     lever = max(1.0, written.path_length / reach_of(expected, above))
     beyond = errors - ANGLES_ACTED_ON * lever * angles[:-1]
     gravity = gravity_error(chain.gravity, written.gravity_vector) - ANGLES_ACTED_ON * angles[-1]
@@ -271,14 +269,16 @@ def _in_the_one_above(poses: Array, above: Sequence[int]) -> Array:
     return np.linalg.inv(np.concatenate([poses, base], axis=1)[:, list(above)]) @ poses
 
 
-def _poses_at(chain: Mechanism, q: Array) -> list[Array]:
-    frames: list[Placement] = []
-    values = np.split(q, np.cumsum([kind.nq for kind in chain.types])[:-1])
+def _poses(chain: Mechanism, q: Array) -> Array:
+    """(k, n + 1, 4, 4) poses of the links and of the tip in the base frame, at k states."""
+    frames: list[Array] = []
+    values = np.split(q, np.cumsum([kind.nq for kind in chain.types])[:-1], axis=1)
     for joint, parent, value in zip(chain.joints, chain.parents, values, strict=True):
-        before = Placement.identity() if parent == BASE else frames[parent]
-        frames.append(before @ joint.placement @ joint.type.transform(value.tolist()))
-    links = [_matrix(frame @ joint.link_frame) for frame, joint in zip(frames, chain.joints, strict=True)]
-    return [*links, _matrix(frames[chain.tip_body] @ chain.tip)]
+        moved = np.array([_matrix(joint.type.transform(row)) for row in value.tolist()])
+        placed = _matrix(joint.placement) @ moved
+        frames.append(placed if parent == BASE else frames[parent] @ placed)
+    links = [frame @ _matrix(joint.link_frame) for frame, joint in zip(frames, chain.joints, strict=True)]
+    return np.stack([*links, frames[chain.tip_body] @ _matrix(chain.tip)], axis=1)
 
 
 def _matrix(place: Placement) -> Array:

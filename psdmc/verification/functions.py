@@ -34,13 +34,11 @@ FEW, SLOW = (
         "with_wrenches_",
         "constrained_forward_dynamics_",
         "impulse_",
-        "tangent_",
     ),
 )
 """States of functions with such words in their names: second derivatives, whose expected values are differences of
-Pinocchio's derivatives; derivatives of Runge-Kutta steps, which call those of forward dynamics four times; derivatives
-under wrenches and with contacts, which share the recursion of those without; and maps of which Pinocchio gives a column
-at a time."""
+Pinocchio's derivatives; derivatives of Runge-Kutta steps, which call those of forward dynamics four times; and derivatives
+under wrenches and with contacts, which share the recursion of those without."""
 
 MOST_RATES = 24
 """Joint rates up to which second derivatives are compared: each rate takes 2 to 8 calls of Pinocchio's derivatives."""

@@ -43,5 +43,5 @@ def test_restitution_is_from_0_to_1(restitution: float) -> None:
     own = contact_tree(0, floating=True)
     state = [own.given[name][0] for name in ("q", "qd_before", "active")]
     for robot in (own.robot, own.model):
-        with pytest.raises(InputError, match=rf"restitution = {restitution:g} is not from 0 to 1"):
+        with pytest.raises(InputError, match=rf": restitution is {restitution:g}\nhint: give 0 to 1$"):
             robot.impulse(*state, restitution)

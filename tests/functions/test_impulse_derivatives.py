@@ -55,5 +55,5 @@ def test_restitution_is_from_0_to_1() -> None:
     own = contact_tree(0, floating=True)
     state = [own.given[name][0] for name in ("q", "qd_before", "active")]
     for robot in (own.robot, own.model):
-        with pytest.raises(InputError, match=r"restitution = 1\.5 is not from 0 to 1"):
+        with pytest.raises(InputError, match=r": restitution is 1\.5\nhint: give 0 to 1$"):
             robot.impulse_derivatives(*state, 1.5)
