@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import numpy
@@ -38,6 +40,40 @@ def test_every_lower_bound_is_tested():
     asked = {name: padded(version) for name, version in bounds().items() if name not in UNTESTED}
     tested = {name: padded(version) for name, version in lowest().items()}
     assert tested == asked
+
+
+def imported_at_once(file: Path) -> set[str]:
+    """The packages that a test file cannot be collected without."""
+    body = ast.parse(file.read_text(encoding="utf-8")).body
+    plain = {alias.name for one in body if isinstance(one, ast.Import) for alias in one.names}
+    return {
+        name.split(".")[0]
+        for name in plain | {one.module or "" for one in body if isinstance(one, ast.ImportFrom)}
+    }
+
+
+def test_fast_tests_are_collected_without_the_other_extras():
+    """`make test-lowest` installs the packages below only: a fast test asks for any other by `pytest.importorskip`."""
+    make = (ROOT / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
+    fast, files = (re.search(rf"^{name} *:?= *(.*)$", make, re.M)[1] for name in ("FAST", "LOWEST_TESTS"))  # type: ignore[index]
+    named = [ROOT / path for path in f"{fast} {files}".split() if not path.startswith("$")]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "optional-dependencies"
+    ]
+    there, asked = (
+        {re.split(r"[^\w.-]", one)[0] for name in names for one in extras[name]}
+        for names in ({"calibrate"}, extras)
+    )
+    installed = {*re.search(r"--editable '\.\[calibrate\]' (.*)", make)[1].split(), *there}  # type: ignore[index]
+    other = {
+        name
+        for name, owners in packages_distributions().items()
+        if {*owners} & asked and not {*owners} & installed
+    }
+    tests = [file for path in named for file in ([path] if path.is_file() else path.rglob("*.py"))]
+
+    assert len(tests) > 50
+    assert {file.name: found for file in tests if (found := imported_at_once(file) & other)} == {}
 
 
 def test_a_wheel_holds_every_folder():

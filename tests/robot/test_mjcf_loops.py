@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
 import psdmc
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot
+
+mujoco = pytest.importorskip("mujoco")
 
 HARD = 'solref="-1e7 -1e4" solimp="0.99999 0.99999 0.001 0.5 2"'
 ARM = """<body name="{n}1" pos="{x} 0 0.1" quat="0.9 0.1 -0.2 0.3"><joint axis="0 0 1" name="{n}a"/>
