@@ -16,7 +16,7 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_rows import KeptRows
 from psdmc.calibration.identify.motor_model import Coupling, Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, each_stretch, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.friction.law import At, Term
@@ -120,9 +120,12 @@ def linear_problem(
     torques, outs, remarks, times = [], [], [], []
     for log in logs:
         count = 0
-        for stretch in stretches(log, options.filter, options.check, options.stretch):
+        parts = stretches(log, options.filter, options.check, options.stretch)
+        for stretch, columns in each_stretch(
+            parts, lambda part: _columns(model, part.states, part.at, options, carried)
+        ):
             states, at = stretch.states, stretch.at
-            rows.append(*_columns(model, states, at, options, carried))
+            rows.append(*columns)
             torques.append(motors.torque(states.effort)[at])
             times.append(states.time[at])
             if not count:
@@ -192,8 +195,11 @@ def _filtered_columns(
     smoothed = smoothed_rows(states, at, whole)
     rigid, extra = np.split(smoothed, [smoothed.shape[2] - len(options.columns)], axis=2)
     speed = motion[1] if coupling is None else coupling.to_motors(motion[1])
-    own = friction_columns(options.terms, speed, options.sign_speed)
-    rubbed = np.stack([states.low_pass(column)[at] for column in own], axis=-1)
+
+    def own(rows: slice) -> Array:
+        return np.stack(friction_columns(options.terms, speed[rows], options.sign_speed), axis=-1)
+
+    rubbed = smoothed_rows(states, at, own)
     n, f = rubbed.shape[1:]
     onto_joints = np.eye(n) if coupling is None else coupling.inverse
     spread = np.einsum("tkf,kj->tjkf", rubbed, onto_joints).reshape(len(at), n, n * f)

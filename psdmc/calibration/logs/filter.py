@@ -3,8 +3,11 @@ and the split for validation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +107,11 @@ class Stretch:
     at: NDArray[np.intp]
 
 
+Result = TypeVar("Result")
+AT_ONCE = 2
+"""Parts of a log that are computed at once. NumPy and compiled functions let other threads run; each part needs memory."""
+
+
 def stretches(
     log: AnyLog, options: FilterOptions, check: CheckOptions | None = None, rows: int = STRETCH_ROWS
 ) -> Iterator[Stretch]:
@@ -122,6 +130,21 @@ def stretches(
         if len(wanted):
             first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
             yield Stretch(_states(log, grid, low_pass, found, options, first, last), wanted - first)
+
+
+def each_stretch(
+    parts: Iterable[Stretch], work: Callable[[Stretch], Result]
+) -> Iterator[tuple[Stretch, Result]]:
+    """Yield each part of a log with what `work` computes from it, in order; two parts are computed at once."""
+    waiting: deque[tuple[Stretch, Future[Result]]] = deque()
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for part in parts:
+            waiting.append((part, pool.submit(work, part)))
+            if len(waiting) > AT_ONCE:
+                first, result = waiting.popleft()
+                yield first, result.result()
+        for first, result in waiting:
+            yield first, result.result()
 
 
 def _states(
@@ -226,39 +249,66 @@ def _independent(options: FilterOptions, period: float) -> int:
 
 
 BLOCK_ROWS = 16384
-"""Rows filtered at once."""
+"""Rows whose values are computed at once."""
+GROUP_ROWS = 32
+"""Wanted rows whose weighted sums are one product of matrices: half of a larger product would be zeros."""
 
 
 def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
     """Return values at some rows of a log after low-pass filtering over time, for quantities computed from the log's
     states.
 
-    at      indices of the wanted rows; the result has one row for each
+    at      indices of the wanted rows, in order; the result has one row for each
     values  function from a slice of the log's rows to the quantity (rows, ...) at these rows
 
     The values are computed block by block, so that a long log need not fit into memory. The result equals that of
-    filtering all rows at once, up to effects of rows more than MEMORY_CYCLES cut-off periods away.
+    filtering all rows at once, up to effects of rows more than MEMORY_CYCLES cut-off periods away. Far from the log's
+    ends, only the wanted rows are computed, as weighted sums of the values around them.
     """
     count = len(states.time)
     margin = memory(states.cutoff, states.period)
+    weights = states.low_pass.weights(margin)
     parts = []
     for start in range(0, count, BLOCK_ROWS):
         wanted = at[(at >= start) & (at < start + BLOCK_ROWS)]
         if not len(wanted):
             continue
         first, last = max(start - margin, 0), min(start + BLOCK_ROWS + margin, count)
-        parts.append(_by_column(states.low_pass, values(slice(first, last)), wanted - first))
+        block = values(slice(first, last))
+        early, late = np.searchsorted(wanted, [margin, count - margin])
+        if early >= late:
+            parts.append(_by_column(states.low_pass, block, wanted - first))
+            continue
+        parts.append(_by_column(states.low_pass, block[: 2 * margin], wanted[:early] - first))
+        parts.append(_weighted(weights, block, wanted[early:late] - first))
+        end = max(len(block) - 2 * margin, 0)
+        parts.append(_by_column(states.low_pass, block[end:], wanted[late:] - first - end))
     return np.concatenate(parts)
 
 
 def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Array:
     """The filtered values, column by column: the filter's copies of one column are small, those of all columns are not."""
+    if not len(rows):
+        return np.zeros((0, *values.shape[1:]))
     flat = values.reshape(len(values), -1)
     columns = np.ascontiguousarray(flat.T)
     smooth = np.stack(
         [low_pass(column)[rows] if column.any() else np.zeros(len(rows)) for column in columns], axis=-1
     )
     return smooth.reshape(len(rows), *values.shape[1:])
+
+
+def _weighted(weights: Array, values: Array, rows: NDArray[np.intp]) -> Array:
+    """The filtered values at rows whose neighbours, as many as there are weights, are all there."""
+    reach, smooth = len(weights) // 2, np.empty((len(rows), *values.shape[1:]))
+    for k in range(0, len(rows), GROUP_ROWS):
+        group = rows[k : k + GROUP_ROWS]
+        first, last = group[0] - reach, group[-1] + reach + 1
+        matrix = np.zeros((len(group), last - first))
+        for row, own in zip(matrix, group - group[0], strict=True):
+            row[own : own + len(weights)] = weights
+        smooth[k : k + GROUP_ROWS] = np.tensordot(matrix, values[first:last], 1)
+    return smooth
 
 
 def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:

@@ -74,6 +74,12 @@ class LowPass:
         filtered, _ = signal.sosfilt(self.sections, values, axis=0, zi=settled)
         return np.asarray(filtered)
 
+    def weights(self, reach: int) -> Array:
+        """Return the weights (2 reach + 1,) of the values around a row in the filtered value of that row."""
+        impulse = np.zeros(4 * reach + 1)
+        impulse[2 * reach] = 1.0
+        return np.asarray(self(impulse)[reach : 3 * reach + 1])
+
 
 MEMORY_CYCLES = 30.0
 """Cut-off periods after which a sample's effect on the filter is rounding: its slowest pole decays by exp(-2 pi sin(pi

@@ -30,7 +30,7 @@ from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
 from psdmc.calibration.identify.steps import Robot, StepOptions, judged, step_of
-from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, Stretch, each_stretch, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.stored_log import AnyLog
@@ -43,6 +43,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
 from psdmc.model.store import save
 from psdmc.progress import silent
+from psdmc.reproducible import in_any_order
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -243,15 +244,16 @@ def predicted_rows(
     """
     step, motors, parts = found.step, motors or found.motors, []
     friction = None if found.prediction.is_linear else _with_state(found)
-    for stretch in stretches(
-        checked(log, found.model.mechanism, step.filter.cutoff, check), step.filter, check
-    ):
-        states, at = stretch.states, stretch.at
+
+    def predicted(part: Stretch) -> Array:
         if friction is None:
-            predicted = smoothed_rows(states, at, lambda rows, of=states: _torque(found, of, rows))  # type: ignore[misc]
-        else:
-            predicted = _torque_with_state(found, friction, states, at)
-        parts.append((states.time[at], states.qd[at], motors.torque(states.effort)[at], predicted))
+            return smoothed_rows(part.states, part.at, lambda rows: _torque(found, part.states, rows))
+        return _torque_with_state(found, friction, part.states, part.at)
+
+    log = checked(log, found.model.mechanism, step.filter.cutoff, check)
+    for stretch, torque in each_stretch(stretches(log, step.filter, check), predicted):
+        states, at = stretch.states, stretch.at
+        parts.append((states.time[at], states.qd[at], motors.torque(states.effort)[at], torque))
     return PredictedRows(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
@@ -263,7 +265,8 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
 def linear_torque(found: Delivered, q: Array, qd: Array, qdd: Array) -> Array:
     """Return the motor torque (N, n) of a calibrated file whose friction is linear in its values: rigid bodies,
     friction, springs."""
-    rigid = recursive.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
+    with in_any_order():
+        rigid = recursive.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
     law = found.prediction
     coupling = coupling_of(law.coupling)
     speed = qd if coupling is None else coupling.to_motors(qd)
