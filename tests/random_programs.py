@@ -18,7 +18,7 @@ _SIZES = {"tau": 3}
 def random_program(seed: int, length: int = 60, of: Collection[Op] = tuple(Op)) -> Program:
     """Loads, a few constants, then operations that prefer recent values; three outputs of shared parts.
 
-    of  operations that may occur
+    of  operations that may occur beside sums, products, negation, sine and cosine, which always may
     """
     choose = random.Random(seed)
     body = [Instr(Op.LOAD, slot=Slot(vector, i)) for vector in ("q", "qd") for i in range(3)]

@@ -98,6 +98,18 @@ def simulate_campaign(
     return len(stale)
 
 
+def torque_constants_for(plant: str | Path, campaign: str | Path) -> list[str]:
+    """Return `JOINT=NUMBER`, N m/A, for each joint of the virtual robot if the campaign cannot find the numbers: it has no
+    runs with a load. The list is empty otherwise."""
+    if any(run.step == "motor" for run in listed_runs(campaign)):
+        return []
+    robot = load_virtual_robot(plant)
+    return [
+        f"{name}={joint.torque_constant:g}"
+        for name, joint in zip(robot.joint_names, robot.joints, strict=True)
+    ]
+
+
 def _require_runs(runs: Sequence[ListedRun], root: Path, campaign: str) -> None:
     """InputError where a run has no motion, or its log would be written outside the campaign or over another's."""
     missing = [run.name for run in runs if run.trajectory is None]

@@ -186,13 +186,17 @@ def simulate(
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
-    from psdmc.calibration.simulate_campaign import SimulateOptions
+    from psdmc.calibration.simulate_campaign import SimulateOptions, torque_constants_for
     from psdmc.report.calibrate_commands import simulate_command
 
     with steps() as progress:
         count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
     print(f"{campaign}: {count} runs simulated, the others were up to date")
-    say_next_line(f"psdmc calibrate MODEL.npz {quoted(campaign)} -o calibrated.npz --report calibrated.html")
+    words = torque_constants_for(plant, campaign)
+    given = f" --torque-constants {quoted(','.join(words))}" if words else ""
+    say_next_line(
+        f"psdmc calibrate MODEL.npz {quoted(campaign)}{given} -o calibrated.npz --report calibrated.html"
+    )
 
 
 # Values of joints on the command line: JOINT=NUMBER and JOINT=LOW:HIGH, and a load.

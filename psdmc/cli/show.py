@@ -20,7 +20,6 @@ from psdmc.model.glance import limit_text, numbers_text, range_text
 from psdmc.model.joined_units import joined_units
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
-from psdmc.robot.coordinates import leaders
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.limits import listed
 from psdmc.robot.mechanism import POINT, Joint, Mechanism
@@ -434,7 +433,7 @@ def _plain(value: Any) -> Any:
 
 def print_mechanism(found: Mechanism) -> None:
     """Print a robot file's joints with links, parents and followed joints, and whether psdmc can derive it."""
-    count, own = len(found), len(leaders(found.coordinates))
+    count, own = len(found), found.nv
     shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
     print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")
     print()

@@ -128,7 +128,7 @@ class Law:
     number   the number that a user gives, such as an exponent, if any
     word     whether the option --friction accepts the law, which every joint has then
     key      whether the section [friction] accepts the law
-    instead  name of a term that every joint has; a joint with this law lacks this term, unless [friction] asks for it
+    instead  "offset": a joint with this law has no constant offset, unless [friction] asks for it; "": it may have one
     line     function of (p, number, top speed) that returns three things: the constant torque and the damping nearest
              to the law, and in words what they leave out. None: a robot file cannot hold any part of the law
     state    how the internal state changes, if the law has one; then the law is not linear in its values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from bundled import bundled_model
 from quick_campaign import QUICK
 
-from psdmc.calibration.simulate_campaign import SimulateOptions
+from psdmc.calibration.simulate_campaign import SimulateOptions, torque_constants_for
 from psdmc.errors import InputError
 from psdmc.model.load import load
 from psdmc.model.store import save
@@ -51,6 +52,19 @@ def test_from_a_model_without_parameters_to_one_with_them(arm, tmp_path: Path):
         "two_link_actuators.h",
     ]
     assert len(record.friction) == 14
+
+
+def test_torque_constants_are_asked_for_if_no_run_has_a_load(arm, tmp_path: Path):
+    """`psdmc simulate` prints them in its next line, so that the line works as it is printed."""
+    save(arm.unknown, tmp_path / "unknown.npz")
+    for name, one_log in (("steps", False), ("log", True)):
+        excite_command(tmp_path / "unknown.npz", tmp_path / name, replace(QUICK, repeats=1, one_log=one_log))
+
+    assert torque_constants_for(arm.plant, tmp_path / "steps") == []
+    true = tomllib.loads(arm.plant.read_text(encoding="utf-8"))["joint"]
+    asked = torque_constants_for(arm.plant, tmp_path / "log")
+    assert [float(each.split("=")[1]) for each in asked] == [joint["torque_constant"] for joint in true]
+    assert [each.split("=")[0] for each in asked] == list(arm.unknown.joint_names)
 
 
 def test_actuators_keep_out_of_folders_of_others(arm, tmp_path: Path):

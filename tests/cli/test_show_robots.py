@@ -55,6 +55,16 @@ def test_a_chain_is_shown_as_one() -> None:
     assert "not derived" not in run.stdout
 
 
+def test_a_planar_joint_has_three_coordinates(tmp_path: Path) -> None:
+    slider = tmp_path / "slider.urdf"
+    slider.write_text(
+        HAND.replace('type="continuous">', 'type="planar"><axis xyz="0 0 1"/>'), encoding="utf-8"
+    )
+    run = psdmc("show", slider)
+    assert run.returncode == 0, run.stderr
+    assert "of 3 joints with 4 coordinates" in run.stdout
+
+
 def test_what_needs_a_model_is_refused_of_a_robot(hand: Path) -> None:
     run = psdmc("show", hand, "--cost")
     assert run.returncode == 2

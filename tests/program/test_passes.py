@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from random_programs import SEEDS, random_program
 
 from psdmc.errors import InternalError
 from psdmc.program import pipeline
@@ -38,6 +39,11 @@ def test_a_pass_keeps_outputs_bit_for_bit(apply: pipeline.Pass, some_program: Pr
 
     np.testing.assert_array_equal(outputs(after), outputs(some_program))
     assert [slot for slot, _ in after.outputs] == [slot for slot, _ in some_program.outputs]
+
+
+@pytest.mark.parametrize("apply", EXACT, ids=lambda apply: apply.__name__)
+def test_the_random_programs_have_what_a_pass_changes(apply: pipeline.Pass):
+    assert sum(apply(program) != program for program in map(random_program, SEEDS)) >= 5
 
 
 @pytest.mark.parametrize("apply", EXACT, ids=lambda apply: apply.__name__)

@@ -13,6 +13,7 @@ import psdmc
 from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
+from psdmc.calibration.logs.formats import WRITTEN
 from psdmc.calibration.logs.formats.ros2_bag import FORMAT as ROS2_BAG
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log, write_columns
@@ -89,7 +90,7 @@ matrix = [[0.5, 0.5], [0.5, -0.5]]
 """
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+@pytest.mark.parametrize("suffix", WRITTEN)
 def test_what_does_not_fit_into_memory_is_the_same(
     tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
 ):

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.logs.bag_sizes import MAGIC
+from psdmc.calibration.logs.formats import WRITTEN
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import log_from_columns, read_log, write_log
 from psdmc.errors import InputError
 
-SUFFIXES = (".csv", ".npz", ".parquet", ".db3", ".mcap", ".bag")
+SUFFIXES = (*WRITTEN, ".db3", ".mcap", ".bag")
 COLUMNS = {
     "time_s": np.arange(4.0),
     "position_rad.a": np.arange(4.0),
@@ -64,7 +65,7 @@ def test_empty_missing_and_unreadable_files_are_refused(tmp_path: Path, suffix: 
     assert "cannot be read" in refused(Path(f"a\0b{suffix}"))
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet", ".mcap"])
+@pytest.mark.parametrize("suffix", [*WRITTEN, ".mcap"])
 def test_a_pipe_is_not_waited_for(tmp_path: Path, suffix: str):
     os.mkfifo(tmp_path / f"pipe{suffix}")
 
@@ -297,6 +298,6 @@ def test_names_in_any_script_survive_every_format(tmp_path: Path, log: Log):
     from dataclasses import replace
 
     odd = replace(log.between(0.0, 0.1), joint_names=("плечо", 'el,"bow";'))
-    for suffix in (".csv", ".npz", ".parquet"):
+    for suffix in WRITTEN:
         write_log(odd, tmp_path / f"run{suffix}")
         assert read_log(tmp_path / f"run{suffix}").joint_names == odd.joint_names

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from psdmc.calibration.logs.formats import WRITTEN
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import columns_of, log_from_columns, read_log, write_log
 from psdmc.errors import InputError
@@ -20,7 +21,7 @@ COLUMNS = {
 }
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+@pytest.mark.parametrize("suffix", WRITTEN)
 def test_every_format_gives_back_the_same_numbers(tmp_path: Path, log: Log, suffix: str):
     write_log(log, tmp_path / f"run{suffix}")
 

@@ -12,7 +12,7 @@ from calibration.conftest import smooth_log
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import even_grid, filtered, independent_rows, stretches
-from psdmc.calibration.logs.formats import npz, parquet, text
+from psdmc.calibration.logs.formats import WRITTEN, npz, parquet, text
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
@@ -42,7 +42,7 @@ def in_pieces(log: Log, folder: Path, suffix: str, monkeypatch: pytest.MonkeyPat
     return found
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz"])
+@pytest.mark.parametrize("suffix", WRITTEN)
 def test_a_table_in_pieces_holds_what_the_table_holds(
     long_log: Log, tmp_path: Path, suffix: str, monkeypatch
 ):
