@@ -30,6 +30,7 @@ from scipy.stats import qmc
 
 from psdmc import compiler
 from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at, write_whole
+from psdmc.cluster import at_once, connected
 from psdmc.errors import InputError, ToolchainError
 from psdmc.functions import BY_ROWS, RECIPES, SIGNATURES
 from psdmc.lower.kernels import wanted
@@ -60,9 +61,6 @@ KEY = b"psdmc"
 
 PART_BYTES, PART_STATES = 1 << 26, 1 << 18
 """Largest part, unless its size is chosen. It is in memory as numbers, as a table and as a file."""
-
-AHEAD, CONNECT = 2, "10s"
-"""Parts that each thread of a worker is given at once, and the time that a scheduler has to answer."""
 
 MOST_STATES = 10**12
 
@@ -182,19 +180,9 @@ def _here(plan: _Plan, missing: Sequence[int], progress: Progress) -> Made:
 def _on_workers(plan: _Plan, missing: Sequence[int], scheduler: str) -> Made:
     """Parts from the workers of a scheduler, in the order in which they are ready, few at a time. Dask gives the parts of a
     worker that dies to others."""
-    try:
-        from distributed import Client, KilledWorker, as_completed
-    except ImportError as error:
-        raise InputError("--scheduler needs Dask's distributed", "pip install 'psdmc[cluster]'") from error
-    try:
-        client: Any = Client(scheduler, timeout=CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        reason = str(error).splitlines()[0]
-        raise ToolchainError(
-            f"--scheduler {scheduler}: does not answer: {reason}",
-            "start one: dask scheduler, then dask worker",
-        ) from error
-    with client:
+    with connected(scheduler) as client:
+        from distributed import as_completed
+
         filed, text = zlib.compress(file_bytes(plan.model)), json.dumps(plan.manifest)
         running: Any = as_completed([], loop=client.loop)  # type: ignore[no-untyped-call]
         left = iter(missing)
@@ -203,16 +191,10 @@ def _on_workers(plan: _Plan, missing: Sequence[int], scheduler: str) -> Made:
             for part in islice(left, count):
                 running.add(client.submit(_of_worker, filed, plan.what, text, part, pure=False))
 
-        submit(AHEAD * max(1, sum(client.nthreads().values())))
-        try:
-            for future in running:
-                yield future.result()
-                submit(1)
-        except KilledWorker as error:
-            raise ToolchainError(
-                f"--scheduler {scheduler}: several workers died: {error}",
-                "look into their logs, then type it again",
-            ) from error
+        submit(at_once(client))
+        for future in running:
+            yield future.result()
+            submit(1)
 
 
 def _of_worker(filed: bytes, what: Sampling, manifest: str, part: int) -> tuple[int, bytes]:

@@ -86,6 +86,7 @@ OUTSIDE = {
         "pyarrow",
         "cffi",
         "jinja2",
+        "cloudpickle",
     },
     "export": {"numpy", "mujoco"},
     "frameworks": {"numpy", "jax", "jaxlib", "torch"},
@@ -93,6 +94,7 @@ OUTSIDE = {
     "compiler": {"numpy"},
     "mujoco": {"numpy"},
     "sampling": {"numpy", "scipy", "pyarrow", "distributed"},
+    "cluster": {"distributed"},
     "cli": {"typer", "rich", "numpy"},
 }
 
@@ -121,6 +123,7 @@ SHARED = {
     "errors",
     "version",
     "atomic",
+    "cluster",
     "reading",
     "garbage",
     "processes",

@@ -105,6 +105,12 @@ def calibrate(
         list[str] | None,
         typer.Option(metavar="LOGGED=JOINT,...", help="joint names of the log and of the model"),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="let the workers of this Dask scheduler compute, such as tcp://host:8786"
+        ),
+    ] = None,
     describe: Annotated[
         bool,
         typer.Option("--describe", help="draft a description of LOG..., log.toml or -o, instead"),
@@ -129,6 +135,7 @@ def calibrate(
             "--friction": friction,
             "--warm": warm is not None,
             "--joint-map": joint_map,
+            "--scheduler": scheduler,
         }
         require_none([flag for flag, value in of_a_fit.items() if value])
         describe_logs(given, output, topic)
@@ -179,6 +186,7 @@ def calibrate(
             naming=LogNaming(topic or "", parsed_joint_map(joint_map)),
             loaded=loaded or (),
             load_on=load,
+            scheduler=scheduler,
         )
     verdict = verdict_of(record)
     print_verdict(verdict)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
 from psdmc.backends.c.names import identifier
@@ -20,6 +22,7 @@ from psdmc.calibration.campaign import (
 )
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.parts import LOST, on_cluster
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.calibration.payload_found import given_load
@@ -91,6 +94,7 @@ def calibrate_command(
     naming: LogNaming | None = None,
     loaded: Sequence[str | Path] = (),
     load_on: str | None = None,
+    scheduler: str | None = None,
 ) -> Calibration:
     """Calibrate a model or model file with a campaign or logs, and write the calibrated model and a report.
 
@@ -103,24 +107,28 @@ def calibrate_command(
     keep       whether to write the model and the C code even if the verdict is `not usable`
     validation  plain logs that are not fitted but test the fit
     naming     topic and joint names of plain logs
+    scheduler  address of a Dask scheduler, whose workers compute the parts of long logs; None: this process does
     """
     if report is not None:
         require_free_numbers(report)
     known = model_of(model)
     if actuators is not None:
         require_actuators_folder(known, actuators)
-    record = calibrate(
-        known,
-        list(sources),
-        options,
-        regressor=CompiledWhenAsked(known, progress),
-        torque_constants=torque_constants,
-        validation=validation,
-        naming=naming,
-        loaded=loaded,
-        load=None if load_on is None else given_load(load_on),
-        progress=progress,
-    )
+    with on_cluster(scheduler, progress) as workers:
+        record = calibrate(
+            known,
+            list(sources),
+            options,
+            regressor=CompiledWhenAsked(known, progress),
+            torque_constants=torque_constants,
+            validation=validation,
+            naming=naming,
+            loaded=loaded,
+            load=None if load_on is None else given_load(load_on),
+            progress=progress,
+        )
+    if workers is not None and workers.lost:
+        record = replace(record, notes=(*record.notes, LOST))
     if report is not None:
         write_report(record, report)
     if not (verdict_of(record).usable or keep):
@@ -157,6 +165,10 @@ class CompiledWhenAsked:
     def __init__(self, model: DynamicsModel, progress: Progress) -> None:
         self._model, self._progress = model, progress
         self._compiled: Regressor | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process compiles the model again, and says no steps."""
+        return CompiledWhenAsked, (self._model, silent)
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         if self._compiled is None:

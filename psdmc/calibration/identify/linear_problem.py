@@ -16,8 +16,9 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_rows import KeptRows
 from psdmc.calibration.identify.motor_model import Coupling, Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.logs.filter import States, each_stretch, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.parts import each_part
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.friction.law import At, Term
 from psdmc.progress import Step
@@ -121,7 +122,7 @@ def linear_problem(
     for log in logs:
         count = 0
         parts = stretches(log, options.filter, options.check, options.stretch)
-        for stretch, columns in each_stretch(
+        for stretch, columns in each_part(
             parts, lambda part: _columns(model, part.states, part.at, options, carried)
         ):
             states, at = stretch.states, stretch.at

@@ -3,11 +3,8 @@ and the split for validation."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,11 +104,6 @@ class Stretch:
     at: NDArray[np.intp]
 
 
-Result = TypeVar("Result")
-AT_ONCE = 2
-"""Parts of a log that are computed at once. NumPy and compiled functions let other threads run; each part needs memory."""
-
-
 def stretches(
     log: AnyLog, options: FilterOptions, check: CheckOptions | None = None, rows: int = STRETCH_ROWS
 ) -> Iterator[Stretch]:
@@ -130,21 +122,6 @@ def stretches(
         if len(wanted):
             first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
             yield Stretch(_states(log, grid, low_pass, found, options, first, last), wanted - first)
-
-
-def each_stretch(
-    parts: Iterable[Stretch], work: Callable[[Stretch], Result]
-) -> Iterator[tuple[Stretch, Result]]:
-    """Yield each part of a log with what `work` computes from it, in order; two parts are computed at once."""
-    waiting: deque[tuple[Stretch, Future[Result]]] = deque()
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        for part in parts:
-            waiting.append((part, pool.submit(work, part)))
-            if len(waiting) > AT_ONCE:
-                first, result = waiting.popleft()
-                yield first, result.result()
-        for first, result in waiting:
-            yield first, result.result()
 
 
 def _states(

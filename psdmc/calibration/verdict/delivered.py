@@ -30,9 +30,10 @@ from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
 from psdmc.calibration.identify.steps import Robot, StepOptions, judged, step_of
-from psdmc.calibration.logs.filter import States, Stretch, each_stretch, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, Stretch, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
+from psdmc.calibration.logs.parts import each_part
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
@@ -251,7 +252,7 @@ def predicted_rows(
         return _torque_with_state(found, friction, part.states, part.at)
 
     log = checked(log, found.model.mechanism, step.filter.cutoff, check)
-    for stretch, torque in each_stretch(stretches(log, step.filter, check), predicted):
+    for stretch, torque in each_part(stretches(log, step.filter, check), predicted):
         states, at = stretch.states, stretch.at
         parts.append((states.time[at], states.qd[at], motors.torque(states.effort)[at], torque))
     return PredictedRows(*(np.concatenate(values) for values in zip(*parts, strict=True)))

@@ -1,0 +1,110 @@
+"""Computes the parts of a log at once: in two threads of this process, or on the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+from psdmc.cluster import at_once, connected
+
+AT_ONCE = 2
+"""Parts in this process: NumPy and compiled functions let other threads run, and each part needs memory."""
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
+
+
+@dataclass(slots=True, eq=False)
+class Workers:
+    """The workers of a Dask cluster.
+
+    client  distributed.Client of their scheduler
+    said    function that is called with a sentence if the cluster is lost
+    lost    whether the cluster was lost; this process then computes the rest
+    """
+
+    client: Any
+    said: Callable[[str], None]
+    lost: bool = False
+
+    def submitted(self, function: Any, part: Any) -> Any:
+        """Return the future result of a part; None if the cluster is lost."""
+        if self.lost:
+            return None
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Sending large graph")  # a part has 10 MB, and is sent once
+            return self.client.submit(_applied, function, part, pure=False)
+
+    def result(self, future: Any, again: Callable[[], Any]) -> Any:
+        """Return the result of a part. If the cluster is lost, `again` computes it."""
+        if not self.lost:
+            from distributed import KilledWorker
+
+            try:
+                return future.result()
+            except (CancelledError, KilledWorker):
+                self.lost = True
+                self.said(LOST)
+        return again()
+
+
+LOST = "the Dask cluster was lost: this process computed the rest"
+
+_workers: ContextVar[Workers | None] = ContextVar("workers", default=None)
+
+
+@contextmanager
+def on_cluster(scheduler: str | None, said: Callable[[str], None]) -> Iterator[Workers | None]:
+    """Within the block, the workers of a Dask scheduler compute the parts of logs; None: this process does.
+
+    scheduler  address, such as tcp://host:8786; see psdmc.cluster.connected for its errors
+    said       function that is called with a sentence if the cluster is lost
+    """
+    if scheduler is None:
+        yield None
+        return
+    with connected(scheduler) as client:
+        workers = Workers(client, said)
+        before = _workers.set(workers)
+        try:
+            yield workers
+        finally:
+            _workers.reset(before)
+
+
+def each_part(parts: Iterable[Part], work: Callable[[Part], Result]) -> Iterator[tuple[Part, Result]]:
+    """Yield each part with what `work` computes from it, in the order of the parts. Few parts are in memory at once."""
+    workers = _workers.get()
+    if workers is None or workers.lost:
+        with ThreadPoolExecutor(AT_ONCE) as pool:
+            for part, future in _ahead(parts, lambda part: pool.submit(work, part), AT_ONCE):
+                yield part, future.result()
+        return
+    import cloudpickle
+
+    function = workers.client.submit(pickle.loads, cloudpickle.dumps(work), pure=False)
+    ahead = at_once(workers.client)
+    for part, future in _ahead(parts, lambda part: workers.submitted(function, part), ahead):
+        yield part, workers.result(future, partial(work, part))
+
+
+def _ahead(parts: Iterable[Part], submit: Callable[[Part], Any], ahead: int) -> Iterator[tuple[Part, Any]]:
+    """Parts and their future results, of which `ahead` are waited for at once."""
+    waiting: deque[tuple[Part, Any]] = deque()
+    for part in parts:
+        waiting.append((part, submit(part)))
+        if len(waiting) > ahead:
+            yield waiting.popleft()
+    yield from waiting
+
+
+def _applied(work: Callable[[Part], Result], part: Part) -> Result:
+    return work(part)
