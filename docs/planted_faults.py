@@ -202,7 +202,7 @@ def planted(robot: Robot, fault: str) -> Outcome:
     model = robot.model
     if fault == TILTED:
         model = robot.derive(tilted(model.mechanism.gravity))
-    return calibrated(model, (FAULTS | MOTOR_FAULTS)[fault](robot))
+    return calibrated(model, {**FAULTS, **MOTOR_FAULTS}[fault](robot))
 
 
 def effect(found: Outcome, log: Log, base: Outcome, good: Array) -> float:
@@ -278,11 +278,12 @@ def robots(ur10: Path | None) -> Iterator[Robot]:
         yield Robot("real UR10", model, log, 2, 2.0, lambda: denso()[1], base, list(FAULTS))
 
 
-def judged(found: Outcome, times: float, new: Mapping[str, str]) -> str:
+def judged(found: Outcome, fault: str, times: float, new: Mapping[str, str]) -> str:
     """One word for what became of a fault. It is named if psdmc says what is wrong, and not only that something is."""
     if found.refused:
         return "refused"
-    if set(new) - SYMPTOMS:
+    # only a tool is missing in the robot file; a sentence about the file names no other fault
+    if set(new) - SYMPTOMS or (fault == TOOL_FORGOTTEN and "wrong_file" in new):
         return "named"
     if times <= HARMLESS:
         return "harmless"
@@ -312,7 +313,7 @@ def tried(robot: Robot, fault: str, base: Outcome, good: Array) -> tuple[str, fl
     log = with_tool(robot) if fault == TOOL_FORGOTTEN else robot.log
     times = effect(found, log, base, good)
     new = {code: text for code, text in found.said.items() if code not in base.said}
-    return judged(found, times, new), times, next(iter(new.values()), "")
+    return judged(found, fault, times, new), times, next(iter(new.values()), "")
 
 
 def main() -> None:

@@ -295,9 +295,9 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
     ),
     "odd_gains": lambda v: f"{OVER_FILE}: {_each(v, 'joint {joint} {gain:.3g} +- {std:.1g}')}",
     "wrong_file": lambda v: (
-        f"{OVER_FILE}: {_each(v, 'joint {joint} {gain:.3g} +- {std:.1g}')}; the robot file is wrong there, and not the unit "
-        "of the log: by the parameters that joints share, the logged effort is "
-        f"{_each(v, '{scale:.2g} +- {scale_std:.1g}')} of the true one"
+        f"{OVER_FILE}: {_each(v, 'joint {joint} {gain:.3g} +- {std:.1g}')}; the robot file is wrong there, or lacks a load, "
+        "but the unit of the log is right: by the parameters that joints share, the logged effort is "
+        f"{_each(v, '{scale:.2g} +- {scale_std:.1g}')} times the true one"
     ),
     "friction_gives_power": lambda v: (
         f"friction would give power instead of taking it: {_each(v, 'joint {joint} {power:.2g} +- {std:.1g} W')}: "

@@ -45,8 +45,11 @@ def noise_only(log: Log, seed: int = 0) -> Log:
 
 
 def _changed(log: Log, columns: Sequence[str], change: Callable[[Array], Array]) -> Log:
-    parts = {name: getattr(log, name) for name in columns}
-    return replace(log, **{name: change(values) for name, values in parts.items() if values is not None})
+    for name in columns:
+        values: Array | None = getattr(log, name)
+        if values is not None:
+            log = replace(log, **{name: change(values)})  # type: ignore[arg-type]
+    return log
 
 
 def clipped(log: Log, share: float) -> Log:
