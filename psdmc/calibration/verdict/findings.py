@@ -95,17 +95,16 @@ class Findings:
     def _agreeing(self, k: int, others: Sequence[int]) -> EffortScale | None:
         """The scale of joint k's effort if it is that of the other joints' efforts, and surely not the one of its gain."""
         gain, (low, high), (least, most) = self.gains[k], self.limits.sure_gains, self.limits.gains
-        spread = self.limits.sure * gain.std
-        least = min(least, max(ABOUT * (gain.value + spread), 0.0))
-        most = max(most, (gain.value - spread) / ABOUT)
+        is_small = gain.value < 1.0
+        least = min(least, max(ABOUT * gain.value, 0.0))
+        most = max(most, gain.value / ABOUT)
         scale = effort_scale(self.evidence, k, others, least, most)
         if scale is None or not low <= scale.value <= high:
             return None
-        margin = self.limits.sure * scale.std
-        sure = scale.over_less > LIKELIER and scale.value - margin > least
-        if gain.value > 1.0:
-            sure = scale.over_more > LIKELIER and scale.value + margin < most
-        return scale if sure else None
+        spread = float(np.hypot(scale.std, ABOUT * gain.std if is_small else gain.std / ABOUT))
+        away = scale.value - least if is_small else most - scale.value
+        likelier = scale.over_less if is_small else scale.over_more
+        return scale if likelier > LIKELIER and away > self.limits.sure * spread else None
 
     @property
     def starved(self) -> bool:

@@ -55,6 +55,8 @@ LOADED = 0.9
 
 SCALES = np.geomspace(1e-4, 1e4, 25)
 """Scales of an effort that are tried, with both signs: from kN m to mN m, and what wrong constants add."""
+STEADY = 0.97
+"""Smooth sign of the speed from which a joint is far enough from a reversal to show the scale of its effort."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,7 +234,9 @@ def effort_scale(
     """
     evidence = evidence.thinned(ROWS).of_motors()
     joints = [*others, k]
-    design, torque, rigid = _design(evidence)[:, joints], evidence.torque[:, joints], evidence.model.l
+    steady = np.abs(evidence.sign[:, joints]) > STEADY  # friction near a reversal is no part of the model
+    design = _design(evidence)[:, joints] * steady[:, :, None]
+    torque, rigid = evidence.torque[:, joints] * steady, evidence.model.l
     sums = Sums(design, [], torque)
     if sums.freedom <= 0:
         return None
@@ -251,7 +255,8 @@ def effort_scale(
         both = Sums(scaled, [slope], torque)
         change, std = _size(*both.last(both.fitted((0,)), (0,), scaled, slope, torque))
         value, std = value * (1.0 + change), abs(value) * std
-    return EffortScale(value, std, best - likely[tried <= low].max(), best - likely[tried >= high].max())
+    over = [float(steady.mean() * (best - likely[side].max())) for side in (tried <= low, tried >= high)]
+    return EffortScale(value, std, *over)
 
 
 def _design(evidence: Evidence) -> Array:
