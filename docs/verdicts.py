@@ -86,8 +86,13 @@ REACH = 3.4
 """rad either way, of joints without limits or with wider ones."""
 
 
-def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[DynamicsModel, VirtualRobot]:
-    """A URDF as a virtual robot: friction a tenth of each joint's largest weight torque, noise (A) as a share of it."""
+def urdf_plant(
+    urdf: Path, constants: tuple[float, ...], noise: float, more: str = ""
+) -> tuple[DynamicsModel, VirtualRobot]:
+    """A URDF as a virtual robot: friction a tenth of each joint's largest weight torque, noise (A) as a share of it.
+
+    more  lines of each joint in the plant file
+    """
     tip = "panda_link7" if urdf.name == "panda.urdf" else None
     model = derive(urdf, drive_inertia=True, expand=False, tip=tip)
     poses = np.random.default_rng(0).uniform(-1.5, 1.5, (200, model.n))
@@ -110,7 +115,7 @@ def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[
             "stribeck_velocity = 0.03",
             f"viscous = {1.2 * rub}",
         ]
-        lines += ["viscous_exponent = 0.8", f"stiffness = {2e3 * rub}", f"damping = {2 * rub}"]
+        lines += [more, "viscous_exponent = 0.8", f"stiffness = {2e3 * rub}", f"damping = {2 * rub}"]
     with tempfile.TemporaryDirectory() as folder:
         plant = Path(folder) / "plant.toml"
         plant.write_text("\n".join(lines), encoding="utf-8")

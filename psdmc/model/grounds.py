@@ -294,6 +294,11 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
         f"{OVER_FILE}: {_each(v, 'joint {joint} {gain:.3g} +- {std:.1g}')}; expected {v['low']:g} to {v['high']:g}"
     ),
     "odd_gains": lambda v: f"{OVER_FILE}: {_each(v, 'joint {joint} {gain:.3g} +- {std:.1g}')}",
+    "wrong_file": lambda v: (
+        f"{OVER_FILE}: {_each(v, 'joint {joint} {gain:.3g} +- {std:.1g}')}; the robot file is wrong there, or lacks a load, "
+        "but the unit of the log is right: by the parameters that joints share, the logged effort is "
+        f"{_each(v, '{scale:.2g} +- {scale_std:.1g}')} times the true one"
+    ),
     "friction_gives_power": lambda v: (
         f"friction would give power instead of taking it: {_each(v, 'joint {joint} {power:.2g} +- {std:.1g} W')}: "
         "effort and motion have opposite signs there, or belong to different joints"

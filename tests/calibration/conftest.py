@@ -181,6 +181,11 @@ def log(arm: Arm) -> Log:
 @pytest.fixture(scope="session")
 def plant_log(arm: Arm) -> Log:
     """Torques of PLANT (Pinocchio, LuGre friction, sensors) through two sines a joint, 30 s at 100 Hz."""
+    return plant_log_of(arm.plant)
+
+
+def plant_log_of(plant: Path) -> Log:
+    """The same of a plant file with these joints and torque constants."""
     time = np.arange(3000) / 100.0
     q, qd, qdd = (np.zeros((len(time), 2)) for _ in range(3))
     for size, hertz, phase in ((0.9, (0.17, 0.23), (0.0, 0.7)), (0.35, (0.41, 0.57), (1.1, 0.2))):
@@ -189,6 +194,6 @@ def plant_log(arm: Arm) -> Log:
         q += size * np.sin(angle)
         qd += size * w * np.cos(angle)
         qdd -= size * w**2 * np.sin(angle)
-    motion = Trajectory(arm.model.joint_names, time, q, qd, qdd)
-    log = simulate(load_virtual_robot(arm.plant), motion)
+    motion = Trajectory(("shoulder", "elbow"), time, q, qd, qdd)
+    log = simulate(load_virtual_robot(plant), motion)
     return replace(log, name="plant", effort=log.effort * np.array([12.0, 5.0]), quantity="motor_torque")

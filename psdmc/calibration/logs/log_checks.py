@@ -255,17 +255,17 @@ def _rates(of: Looked) -> Iterator[Fault]:
 def _jumping(of: Looked) -> Iterator[Fault]:
     """Faults of positions that jump: an encoder that stood still or lost counts, or rows that are missing without a gap
     in time."""
-    joints = zip(of.chain.leading_joints, of.survey.jumps, of.survey.speed.tolist(), strict=True)
-    for joint, jump, speed in joints:
-        if jump is None:
-            continue
-        allowed = _allowed(joint.limits.speed, of.options.free_speed, of.options)
-        if abs(jump.rate) > max(of.options.jump * speed, allowed):
-            yield Fault(
-                f"joint {joint.name}: position jumps by {jump.size:.3g} {joint.type.position_unit} after "
-                f"{jump.time:.6g} s, {abs(jump.rate) / max(speed, 1e-12):.3g} times as fast as it moves otherwise",
-                "an encoder stood still, or rows are missing: give the stretches before and after as logs of their own",
-            )
+    for what, jumps in (("position", of.survey.jumps), ("motor_position", of.survey.motor_jumps)):
+        for joint, jump, speed in zip(of.chain.leading_joints, jumps, of.survey.speed.tolist(), strict=False):
+            if jump is None:
+                continue
+            allowed = _allowed(joint.limits.speed, of.options.free_speed, of.options)
+            if abs(jump.rate) > max(of.options.jump * speed, allowed):
+                yield Fault(
+                    f"joint {joint.name}: {what} jumps by {jump.size:.3g} {joint.type.position_unit} after "
+                    f"{jump.time:.6g} s, {abs(jump.rate) / max(speed, 1e-12):.3g} times as fast as it moves otherwise",
+                    "an encoder stood still, or rows are missing: give the stretches before and after as logs of their own",
+                )
 
 
 def _nothing_there(of: Looked) -> Iterator[Fault]:

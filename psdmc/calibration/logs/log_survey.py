@@ -65,6 +65,7 @@ class Survey:
     largest_effort  (n,) largest absolute effort
     saturated       efforts that stay at an extreme value while the joint moves
     jumps           the largest jump of each joint's position; None if there is none
+    motor_jumps     the same of the motors' positions; empty if the log has none
     straight        share of rows in which all positions and efforts lie on straight lines, as interpolated values do
     """
 
@@ -77,6 +78,7 @@ class Survey:
     largest_effort: Array
     saturated: tuple[Saturated, ...]
     jumps: tuple[Jump | None, ...]
+    motor_jumps: tuple[Jump | None, ...]
     straight: float
 
     @property
@@ -107,6 +109,7 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
     power, by_velocity, has_velocity = np.zeros(n), np.zeros(n), False
     largest = np.zeros(n)
     jumps: list[Jump | None] = [None] * n
+    of_motors: list[Jump | None] = []
     straight = 0
     every = -(-len(log) // MOST_SLOPES)
     slopes: list[Array] = []
@@ -129,7 +132,12 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
             efforts.append(part.effort[1:-1][(-first) % every :: every])
             own = part.rows(start - max(start - 1, 0), start - max(start - 1, 0) + STRETCH_ROWS)
             _note_no_numbers(bad, own, start)
-            jumps = [_larger(*both) for both in zip(jumps, _jumps(part, log.period), strict=True)]
+            jumps = [
+                _larger(*both) for both in zip(jumps, _jumps(part, part.position, log.period), strict=True)
+            ]
+            if part.motor_position is not None:
+                more = _jumps(part, part.motor_position, log.period)
+                of_motors = [_larger(*both) for both in zip(of_motors or [None] * n, more, strict=True)]
             straight += _straight_rows(own)
             largest = np.maximum(largest, np.abs(own.effort).max(axis=0))
         ranked = np.concatenate(slopes)
@@ -148,6 +156,7 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
                 log.joint_names, np.concatenate(efforts), ranked, np.asarray(speed), saturated_share
             ),
             tuple(jumps),
+            tuple(of_motors),
             straight / len(log),
         )
 
@@ -162,12 +171,12 @@ ALONE = 10.0
 """Ratio of a jump to the changes before and after it: a fast motion, or a single wrong sample, has similar neighbours."""
 
 
-def _jumps(part: Log, period: float) -> list[Jump | None]:
-    """The largest isolated change of each joint's position."""
+def _jumps(part: Log, positions: Array, period: float) -> list[Jump | None]:
+    """The largest isolated change of each joint's position, of its link or of its motor."""
     found: list[Jump | None] = [None] * len(part.joint_names)
     if len(part) < 4:
         return found
-    steps = np.diff(part.position, axis=0)
+    steps = np.diff(positions, axis=0)
     size = np.abs(steps)
     is_alone = size[1:-1] > ALONE * np.maximum(size[:-2], size[2:])
     lasts = np.maximum(np.diff(part.time), period)

@@ -19,7 +19,8 @@ def scaled(log: Log, factor: float | Sequence[float]) -> Log:
 
 
 def turned(log: Log, joint: int, columns: Sequence[str]) -> Log:
-    """Return the log with the sign of one joint's columns (of "position", "velocity", "effort") reversed."""
+    """Return the log with the sign of one joint's columns reversed: of "position", "velocity", "effort" or
+    "motor_position"."""
     signs = np.ones(len(log.joint_names))
     signs[joint] = -1.0
     return _changed(log, columns, lambda values: signs * values)
@@ -44,12 +45,11 @@ def noise_only(log: Log, seed: int = 0) -> Log:
 
 
 def _changed(log: Log, columns: Sequence[str], change: Callable[[Array], Array]) -> Log:
-    position = change(log.position) if "position" in columns else log.position
-    effort = change(log.effort) if "effort" in columns else log.effort
-    velocity = log.velocity
-    if velocity is not None and "velocity" in columns:
-        velocity = change(velocity)
-    return replace(log, position=position, velocity=velocity, effort=effort)
+    for name in columns:
+        values: Array | None = getattr(log, name)
+        if values is not None:
+            log = replace(log, **{name: change(values)})  # type: ignore[arg-type]
+    return log
 
 
 def clipped(log: Log, share: float) -> Log:
@@ -125,6 +125,13 @@ def geared(log: Log, joint: int, factor: float) -> Log:
     return replace(moved, effort=log.effort / factors)
 
 
+def undivided(log: Log, joint: int, ratio: float) -> Log:
+    """Return the log with one joint's motor position before it was divided by the gear ratio."""
+    factors = np.ones(len(log.joint_names))
+    factors[joint] = ratio
+    return _changed(log, ["motor_position"], lambda values: values * factors)
+
+
 def offset(log: Log, joint: int, angle: float) -> Log:
     """Return the log with one joint's position shifted by a constant, as by a wrong zero position; rad or m."""
     shift = np.zeros(len(log.joint_names))
@@ -139,16 +146,26 @@ def rough(log: Log, share: float, seed: int = 0) -> Log:
     return replace(log, effort=log.effort + noise)
 
 
-def stuck(log: Log, joint: int, start: float, seconds: float) -> Log:
-    """Return the log in which one joint's encoder stands still for some time that begins `start` s after the first row."""
+def stuck(log: Log, joint: int, start: float, seconds: float, column: str = "position") -> Log:
+    """Return the log in which one joint's encoder stands still for some time that begins `start` s after the first row.
+
+    column  "position", or "motor_position" for the encoder of the motor
+    """
     since = log.time - log.time[0]
     rows = np.flatnonzero((since >= start) & (since < start + seconds))
-    position, velocity = log.position.copy(), log.velocity
-    position[rows, joint] = position[rows[0], joint]
-    if velocity is not None:
+
+    def held(values: Array) -> Array:
+        return _with_column(
+            values,
+            joint,
+            np.where(np.isin(np.arange(len(values)), rows), values[rows[0], joint], values[:, joint]),
+        )
+
+    velocity = log.velocity
+    if velocity is not None and column == "position":
         velocity = velocity.copy()
         velocity[rows, joint] = 0.0
-    return replace(log, position=position, velocity=velocity)
+    return replace(_changed(log, [column], held), velocity=velocity)
 
 
 def backwards(log: Log, row: int, seconds: float) -> Log:

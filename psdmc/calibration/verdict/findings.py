@@ -14,12 +14,18 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.delay import delays_of
 from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.calibration.verdict.gains import friction_powers, joint_gains
+from psdmc.calibration.verdict.log_errors import EffortScale, effort_scale
 from psdmc.calibration.verdict.record import Calibration
+from psdmc.calibration.verdict.suspects import ABOUT
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.model.calibrated import JointFigures, Quality
 
 NOISE_FLOOR = 1e-4
 """Share of the torque's variation: less noise above the cut-off means a log that was smoothed, or that is no sensor's."""
+
+LIKELIER = 5.0
+"""Logarithm of the likelihood by which a scale of the effort that agrees with other joints exceeds all scales that would
+explain an unusual gain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +49,7 @@ class Findings:
     variation         (n,) standard deviation of each joint's torque
     speed             (n,) RMS speed of each joint
     fitted, held_out  RMSE and R^2 of each joint's whole torque, on fitted and on held-out samples
+    file_errors       scale of the effort of each joint whose unusual gain is an error of the robot file, by joint
     """
 
     def __init__(
@@ -58,6 +65,46 @@ class Findings:
         self.speed: Array = np.sqrt(np.mean(evidence.qd**2, axis=0))
         self.fitted = [_whole_torque(record, name, held_out=False) for name in self.names]
         self.held_out = [_whole_torque(record, name, held_out=True) for name in self.names]
+        self.file_errors = self._file_errors()
+
+    def _file_errors(self) -> dict[int, EffortScale]:
+        """Scales of the efforts that agree with other joints although their gain is unusual.
+
+        A wrong unit scales all terms of a joint's torque. The base parameters that the joint shares with other joints then
+        differ. If they agree, the file is wrong. The joint whose torque by the file is largest sets the unit.
+        """
+        (low, high), (least, most) = self.limits.sure_gains, self.limits.gains
+        seen = {k: gain.value for k, gain in enumerate(self.gains) if gain.visible}
+        agree = [k for k, value in seen.items() if low <= value <= high]
+        by_file = self.evidence.of_motors().file_torque()
+        if by_file is None or all(least <= value <= most for value in seen.values()):
+            return {}
+        if int(np.std(by_file, axis=0).argmax()) not in agree:
+            return {}
+        found: dict[int, EffortScale] = {}
+        while True:
+            left = [k for k in seen if k not in agree and self.held_out[k].r2 >= self.limits.fair_r2]
+            scales = {k: self._agreeing(k, agree) for k in left}
+            new = {k: scale for k, scale in scales.items() if scale is not None}
+            if not new:
+                return found
+            surest = min(new, key=lambda k: new[k].std / new[k].value)
+            found[surest] = new[surest]
+            agree.append(surest)
+
+    def _agreeing(self, k: int, others: Sequence[int]) -> EffortScale | None:
+        """The scale of joint k's effort if it is that of the other joints' efforts, and surely not the one of its gain."""
+        gain, (low, high), (least, most) = self.gains[k], self.limits.sure_gains, self.limits.gains
+        is_small = gain.value < 1.0
+        least = min(least, max(ABOUT * gain.value, 0.0))
+        most = max(most, gain.value / ABOUT)
+        scale = effort_scale(self.evidence, k, others, least, most)
+        if scale is None or not low <= scale.value <= high:
+            return None
+        spread = float(np.hypot(scale.std, ABOUT * gain.std if is_small else gain.std / ABOUT))
+        away = scale.value - least if is_small else most - scale.value
+        likelier = scale.over_less if is_small else scale.over_more
+        return scale if likelier > LIKELIER and away > self.limits.sure * spread else None
 
     @property
     def starved(self) -> bool:

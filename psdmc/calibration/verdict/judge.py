@@ -125,7 +125,8 @@ def _suspects(found: Findings) -> tuple[Ground, ...]:
     """Explanations of a bad fit; none for a log too short to tell."""
     if found.starved:
         return ()
-    named = (suspect(found.evidence), unit_suspect(found.gains))
+    gains = [gain for k, gain in enumerate(found.gains) if k not in found.file_errors]
+    named = (suspect(found.evidence), unit_suspect(gains))
     return tuple(ground for ground in named if ground is not None)
 
 
@@ -196,7 +197,11 @@ def _too_few(found: Findings) -> Iterator[Ground]:
 
 def _wrong_gains(found: Findings) -> Iterator[Ground]:
     low, high = found.limits.gains
-    wrong = [k for k, gain in enumerate(found.gains) if gain.visible and not low <= gain.value <= high]
+    wrong = [
+        k
+        for k, gain in enumerate(found.gains)
+        if gain.visible and not low <= gain.value <= high and k not in found.file_errors
+    ]
     if wrong:
         yield Ground("wrong_gains", {"items": found.gained(wrong), "low": low, "high": high})
 
@@ -235,6 +240,7 @@ def doubts(found: Findings) -> Iterator[Ground]:
     yield from _fair(found)
     yield from _earlier_steps(found)
     yield from _odd_gains(found)
+    yield from _wrong_file(found)
     yield from _unlike_limits(found)
     yield from _hardly_moving(found)
     yield from _lacking(found)
@@ -342,10 +348,22 @@ def _odd_gains(found: Findings) -> Iterator[Ground]:
     odd = [
         k
         for k, gain in enumerate(found.gains)
-        if gain.visible and least <= gain.value <= most and not low <= gain.value <= high
+        if gain.visible
+        and least <= gain.value <= most
+        and not low <= gain.value <= high
+        and k not in found.file_errors
     ]
     if odd:
         yield Ground("odd_gains", {"items": found.gained(odd)})
+
+
+def _wrong_file(found: Findings) -> Iterator[Ground]:
+    """A doubt about the robot file, at joints whose effort has the scale of the other joints' efforts."""
+    scales = found.file_errors
+    if scales:
+        items = found.gained(list(scales))
+        more = [{"scale": scale.value, "scale_std": scale.std} for scale in scales.values()]
+        yield Ground("wrong_file", {"items": [a | b for a, b in zip(items, more, strict=True)]})
 
 
 def _unlike_limits(found: Findings) -> Iterator[Ground]:

@@ -10,6 +10,7 @@ deviation of an error is that of stretches of time whose residuals may depend on
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -52,6 +53,11 @@ LEAST = {"zero": 0.005, "ratio": 0.01, "position": 0.01, "torque": 0.03, "tilt":
 LOADED = 0.9
 """Share that a load explains of all that the fit explains beyond the robot file, from which the load is named."""
 
+SCALES = np.geomspace(1e-4, 1e4, 25)
+"""Scales of an effort that are tried, with both signs: from kN m to mN m, and what wrong constants add."""
+STEADY = 0.97
+"""Smooth sign of the speed from which a joint is far enough from a reversal to show the scale of its effort."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogError:
@@ -85,6 +91,19 @@ class UnstatedLoad:
     mass: float
     std: float
     explains: float
+
+
+@dataclass(frozen=True, slots=True)
+class EffortScale:
+    """The logged effort of a joint divided by the effort that other joints predict: value and standard deviation.
+
+    over_less, over_more  logarithms by which the value is likelier than all smaller and all larger scales outside a range
+    """
+
+    value: float
+    std: float
+    over_less: float
+    over_more: float
 
 
 def log_errors(evidence: Evidence, model: DynamicsModel) -> tuple[LogError, ...]:
@@ -205,6 +224,41 @@ def unstated_load(evidence: Evidence) -> UnstatedLoad | None:
     return UnstatedLoad(mass, std, float(explains))
 
 
+def effort_scale(
+    evidence: Evidence, k: int, others: Sequence[int], low: float, high: float
+) -> EffortScale | None:
+    """Return the most likely scale between `low` and `high` of joint k's effort, by the base parameters that the joint
+    shares with other joints; None if the log is too short.
+
+    The efforts of the other joints are taken as right. If motors drive several joints, k and the others are motors.
+    """
+    evidence = evidence.thinned(ROWS).of_motors()
+    joints = [*others, k]
+    steady = np.abs(evidence.sign[:, joints]) > STEADY  # friction near a reversal is no part of the model
+    design = _design(evidence)[:, joints] * steady[:, :, None]
+    torque, rigid = evidence.torque[:, joints] * steady, evidence.model.l
+    sums = Sums(design, [], torque)
+    if sums.freedom <= 0:
+        return None
+    stated = sums.fitted(())
+    tried = np.concatenate([-SCALES, SCALES, [low, high]])
+    likely = np.array([sums.likelier(stated, sums.scaled(rigid, scale).fitted(())) for scale in tried])
+    inside = np.where((tried > low) & (tried < high), likely, -np.inf)
+    value, best = float(tried[inside.argmax()]), float(inside.max())
+    for _ in range(STEPS):
+        scaled = design.copy()
+        scaled[:, -1, :rigid] *= value
+        first = Sums(scaled, [], torque)
+        theta_b = first.values((), first.fitted(()).weights)[:rigid]
+        slope = np.zeros((*torque.shape, 1))
+        slope[:, -1, 0] = scaled[:, -1, :rigid] @ theta_b
+        both = Sums(scaled, [slope], torque)
+        change, std = _size(*both.last(both.fitted((0,)), (0,), scaled, slope, torque))
+        value, std = value * (1.0 + change), abs(value) * std
+    over = [float(steady.mean() * (best - likely[side].max())) for side in (tried <= low, tried >= high)]
+    return EffortScale(value, std, *over)
+
+
 def _design(evidence: Evidence) -> Array:
     """(N, n, l + 3 n) of base parameters, and Coulomb and viscous friction and offset of each joint (of its motor)."""
     n, coupling = evidence.n, evidence.coupling
@@ -319,6 +373,14 @@ class Sums:
         """Return the values of all fitted columns in their own units."""
         places, values = self._solved(which, weights)
         return np.asarray(values / self.sizes[places] * self.sizes[-1])
+
+    def scaled(self, count: int, scale: float) -> Sums:
+        """Return the sums with the first columns of the last joint multiplied by a factor."""
+        factor = np.ones(self.grams.shape[1])
+        factor[:count] = scale
+        changed = copy(self)
+        changed.grams = np.concatenate([self.grams[:-1], self.grams[-1:] * np.outer(factor, factor)])
+        return changed
 
     def _squares(self, columns: list[int], values: Array) -> Array:
         """(n,) sums of squared residuals."""

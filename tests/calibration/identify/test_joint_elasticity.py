@@ -18,6 +18,7 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.stored_log import StoredLog
+from psdmc.calibration.plant.spoiled import stuck
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.calibrated import NumberRow
@@ -113,6 +114,12 @@ def test_a_known_delay_is_not_taken_for_damping(pendulum: DynamicsModel) -> None
     wrong, right = found(pendulum, early, swing=ROTOR), found(pendulum, early, 0.008, swing=ROTOR)
     assert max(map(abs, errors(right.rows))) < 3.0
     assert by_name(wrong.rows)["joint_damping"].value == pytest.approx(DAMPING + 0.008 * STIFFNESS, rel=0.3)
+
+
+def test_a_motor_encoder_that_stood_still_jumps(pendulum: DynamicsModel) -> None:
+    log = stuck(log_by_scipy(STIFFNESS, DAMPING, NOISE, 2), 0, 12.0, 0.5, "motor_position")
+    with pytest.raises(InputError, match=r"joint swing: motor_position jumps by .* rad after 12\.49"):
+        calibrate_logs(pendulum, [log], CalibrateOptions(), ChainRegressor(pendulum), None, lambda _: None)
 
 
 def test_a_torque_sensor_behind_the_gear_needs_no_friction(pendulum: DynamicsModel) -> None:

@@ -73,3 +73,16 @@ def test_a_tilted_base_of_six_joints_is_named_with_its_angle(planted):
     said = [ground for ground in found.record.verdict.doubted if ground.code == "log_error"]
     tilt = next(item for item in said[0].values["items"] if item["kind"] == "tilt")
     assert abs(tilt["value"] - np.radians(5.0)) < 3.0 * tilt["std"]
+
+
+@pytest.mark.slow
+def test_faults_of_motor_positions_are_refused_or_harmless(planted):
+    campaign = planted[0]
+    robot = campaign.elastic()
+    base = campaign.calibrated(robot.model, robot.log)
+
+    assert set(campaign.stiffness(base.record)) == {"shoulder", "elbow"}
+    words = {fault: campaign.tried(robot, fault, base, None)[0] for fault in robot.faults}
+
+    assert words.pop("gear ratio of the motor position 1 % wrong") == "harmless"
+    assert set(words.values()) == {"refused"}
