@@ -61,6 +61,20 @@ def _without_its_own_messages() -> Iterator[None]:
             logger.setLevel(level)
 
 
+class Lost(Exception):
+    """The cluster, or several of its workers, ended before a result was there."""
+
+
+def result_of(future: Any) -> Any:
+    """Return the result of a job. Raises Lost if the cluster or several workers end before it is there."""
+    from distributed import KilledWorker
+
+    try:
+        return future.result()
+    except (CancelledError, KilledWorker) as error:
+        raise Lost(str(error)) from error
+
+
 def at_once(client: Any) -> int:
     """Return how many jobs the workers of a client are given at once."""
     return AHEAD * max(1, sum(map(int, client.nthreads().values())))

@@ -6,14 +6,14 @@ import pickle
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-from psdmc.cluster import at_once, connected
+from psdmc.cluster import Lost, at_once, connected, result_of
 
 AT_ONCE = 2
 """Parts in this process: NumPy and compiled functions let other threads run, and each part needs memory."""
@@ -46,11 +46,9 @@ class Workers:
     def result(self, future: Any, again: Callable[[], Any]) -> Any:
         """Return the result of a part. If the cluster is lost, `again` computes it."""
         if not self.lost:
-            from distributed import KilledWorker
-
             try:
-                return future.result()
-            except (CancelledError, KilledWorker):
+                return result_of(future)
+            except Lost:
                 self.lost = True
                 self.said(LOST)
         return again()

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import PLANT, ROBOT, Arm, plant_log_of
+from calibration.conftest import PLANT, ROBOT, Arm, plant_log_of
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.motor_model import Motors
