@@ -4,7 +4,8 @@ Each function gets its cheapest form."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Literal
 
@@ -84,6 +85,19 @@ def lower(
     """
     require_derivable(model.mechanism)
     lowered = _Lowered(model, lowering, costs, friction, gravity_input)
+    try:
+        return _kernels(lowered, functions, progress, theta_variants)
+    finally:
+        _last[:] = [lowered.searched]
+
+
+def _kernels(
+    lowered: _Lowered,
+    functions: Sequence[str] | None,
+    progress: Callable[[str], None],
+    theta_variants: bool,
+) -> dict[str, Kernel]:
+    model = lowered.given
     kernels: dict[str, Kernel] = {}
     names = wanted(functions, model.mechanism)
     for number, name in enumerate(names):
@@ -183,6 +197,21 @@ def _is_worth_two_bodies(shared: float, own: float, theta: bool, costs: Costs) -
     return shared > costs.worth_two_bodies * own and not (theta and own > costs.longest_of_two)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Searched:
+    """Frames, searches and arrangements of one model and one target, which later lowerings go on with."""
+
+    key: tuple[object, ...]
+    geometry: Geometry
+    searches: dict[bool, Search]
+    arrangements: dict[tuple[str, bool], Arrangement]
+
+
+_last: list[_Searched] = []
+"""At most one: that of the last lowering, while no other one has taken it. Programs often ask for one function of a robot
+after another, and searching takes most of the time."""
+
+
 class _Lowered:
     """One model's programs. Functions that run the same recursion share one search."""
 
@@ -194,6 +223,7 @@ class _Lowered:
         friction: FrictionInDynamics | None = None,
         gravity_input: bool = False,
     ) -> None:
+        self.given = model
         self.model = for_every_gravity(model) if gravity_input else model
         self.lowering, self.costs, self.friction, self.gravity_input = (
             lowering,
@@ -202,13 +232,23 @@ class _Lowered:
             gravity_input,
         )
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
-        self.geometry = Geometry(self.model.mechanism, model.representative, not gravity_input)
-        self._searches: dict[bool, Search] = {}
-        self._arrangements: dict[tuple[str, bool], Arrangement] = {}
+        self.searched = self._continued()
+        self.geometry = self.searched.geometry
+        self._searches, self._arrangements = self.searched.searches, self.searched.arrangements
         self._limbs: dict[str, LimbArrangement | None] = {}
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
         self._kernels: dict[tuple[str, bool], Kernel] = {}
         self._short: list[tuple[Program, Program]] = []
+
+    def _continued(self) -> _Searched:
+        """The last lowering's searches, if they are of this model, else new ones. No two lowerings share them at a time."""
+        key = (self.model.content_hash, self.costs, self.friction, self.gravity_input)
+        with suppress(IndexError):
+            last = _last.pop()
+            if last.key == key:
+                return last
+        geometry = Geometry(self.model.mechanism, self.given.representative, not self.gravity_input)
+        return _Searched(key, geometry, {}, {})
 
     def check(self, recipe: Recipe) -> None:
         """Raise InputError if the recipe's function adds unlike quantities, such as a mass and a length."""

@@ -48,7 +48,7 @@ BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil
 KEPT = os.environ.get("PSDMC_SCREENSHOTS")
 """`make test-pages`: the folder for screenshots."""
 WIDTHS = (400, 800, 1280) if KEPT else (400,)
-SCHEMES = ("light", "dark")
+SCHEMES = ("light", pytest.param("dark", marks=pytest.mark.slow))
 SITE = (
     (
         "index",

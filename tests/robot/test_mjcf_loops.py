@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from slow_cases import slow_but_for
 
 import psdmc
 from psdmc.errors import InputError
@@ -41,7 +42,7 @@ def written(tmp_path: Path, equality: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_but_for(["connect", "welded sites", "world"], KINDS))
 def test_constraints_are_mujocos(kind: str, tmp_path: Path) -> None:
     """Positions of the residual at any state, and the motions that the constraint leaves at closed ones."""
     path = written(tmp_path, KINDS[kind])
