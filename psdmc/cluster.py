@@ -65,6 +65,14 @@ class Lost(Exception):
     """The cluster, or several of its workers, ended before a result was there."""
 
 
+def submitted(client: Any, function: Any, *given: Any) -> Any:
+    """Return the future result of a job. Raises Lost if the connection to the scheduler is closed."""
+    try:
+        return client.submit(function, *given, pure=False)
+    except (OSError, RuntimeError) as error:
+        raise Lost(str(error)) from error
+
+
 def result_of(future: Any) -> Any:
     """Return the result of a job. Raises Lost if the cluster or several workers end before it is there."""
     from distributed import KilledWorker

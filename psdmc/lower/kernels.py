@@ -4,7 +4,7 @@ Each function gets its cheapest form."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Literal
@@ -84,40 +84,27 @@ def lower(
     InputError also if gravity is an input and the base parameters do not determine the torques under every gravity.
     """
     require_derivable(model.mechanism)
-    lowered = _Lowered(model, lowering, costs, friction, gravity_input)
-    try:
-        return _kernels(lowered, functions, progress, theta_variants)
-    finally:
-        _last[:] = [lowered.searched]
-
-
-def _kernels(
-    lowered: _Lowered,
-    functions: Sequence[str] | None,
-    progress: Callable[[str], None],
-    theta_variants: bool,
-) -> dict[str, Kernel]:
-    model = lowered.given
-    kernels: dict[str, Kernel] = {}
-    names = wanted(functions, model.mechanism)
-    for number, name in enumerate(names):
-        recipe, is_by_rows = recipe_of(name), name in BY_ROWS
-        takes_theta = recipe.signature.theta
-        lowered.check(recipe)
-        recipe = lowered.recipe(recipe)
-        variants = (False, True) if takes_theta and theta_variants else (False,)
-        for theta in (True,) if is_by_rows else variants:
-            if not theta and model.theta_b is None and takes_theta:
-                continue
-            share = (number + 0.5 * theta) / len(names)
-            progress(Step(f"lowering {recipe.name}{'_theta' if theta else ''}", share))
-            try:
-                kernel = lowered.kernel(recipe, theta)
-            except SingularMatrix as singular:
-                raise _refusal(model, recipe.signature, singular) from singular
-            kernel = kernel_by_rows(kernel) if is_by_rows else kernel
-            kernels[kernel.name] = kernel
-    return kernels
+    with _lowering(model, lowering, costs, friction, gravity_input) as lowered:
+        kernels: dict[str, Kernel] = {}
+        names = wanted(functions, model.mechanism)
+        for number, name in enumerate(names):
+            recipe, is_by_rows = recipe_of(name), name in BY_ROWS
+            takes_theta = recipe.signature.theta
+            lowered.check(recipe)
+            recipe = lowered.recipe(recipe)
+            variants = (False, True) if takes_theta and theta_variants else (False,)
+            for theta in (True,) if is_by_rows else variants:
+                if not theta and model.theta_b is None and takes_theta:
+                    continue
+                share = (number + 0.5 * theta) / len(names)
+                progress(Step(f"lowering {recipe.name}{'_theta' if theta else ''}", share))
+                try:
+                    kernel = lowered.kernel(recipe, theta)
+                except SingularMatrix as singular:
+                    raise _refusal(model, recipe.signature, singular) from singular
+                kernel = kernel_by_rows(kernel) if is_by_rows else kernel
+                kernels[kernel.name] = kernel
+        return kernels
 
 
 def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Kernel:
@@ -144,6 +131,7 @@ def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Ke
             "derive the model without --floating, or lock the joint with --lock",
         )
     require_derivable(robot)
+    # Its searches are not kept: the recipes of both kinds have one name, by which searches are found again.
     lowered, recipe = _Lowered(model, "factored", costs, None), load_recipe(kind)
     lowered.check(recipe)
     return lowered.kernel(recipe, False)
@@ -212,6 +200,22 @@ _last: list[_Searched] = []
 after another, and searching takes most of the time."""
 
 
+@contextmanager
+def _lowering(
+    model: DynamicsModel,
+    lowering: Lowering,
+    costs: Costs,
+    friction: FrictionInDynamics | None = None,
+    gravity_input: bool = False,
+) -> Iterator[_Lowered]:
+    """Yield a lowering, and keep its searches for the next one."""
+    lowered = _Lowered(model, lowering, costs, friction, gravity_input)
+    try:
+        yield lowered
+    finally:
+        _last[:] = [lowered.searched]
+
+
 class _Lowered:
     """One model's programs. Functions that run the same recursion share one search."""
 
@@ -223,7 +227,6 @@ class _Lowered:
         friction: FrictionInDynamics | None = None,
         gravity_input: bool = False,
     ) -> None:
-        self.given = model
         self.model = for_every_gravity(model) if gravity_input else model
         self.lowering, self.costs, self.friction, self.gravity_input = (
             lowering,
@@ -232,7 +235,7 @@ class _Lowered:
             gravity_input,
         )
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
-        self.searched = self._continued()
+        self.searched = self._continued(model)
         self.geometry = self.searched.geometry
         self._searches, self._arrangements = self.searched.searches, self.searched.arrangements
         self._limbs: dict[str, LimbArrangement | None] = {}
@@ -240,14 +243,14 @@ class _Lowered:
         self._kernels: dict[tuple[str, bool], Kernel] = {}
         self._short: list[tuple[Program, Program]] = []
 
-    def _continued(self) -> _Searched:
+    def _continued(self, given: DynamicsModel) -> _Searched:
         """The last lowering's searches, if they are of this model, else new ones. No two lowerings share them at a time."""
         key = (self.model.content_hash, self.costs, self.friction, self.gravity_input)
         with suppress(IndexError):
             last = _last.pop()
             if last.key == key:
                 return last
-        geometry = Geometry(self.model.mechanism, self.given.representative, not self.gravity_input)
+        geometry = Geometry(self.model.mechanism, given.representative, not self.gravity_input)
         return _Searched(key, geometry, {}, {})
 
     def check(self, recipe: Recipe) -> None:

@@ -256,7 +256,9 @@ def _jumping(of: Looked) -> Iterator[Fault]:
     """Faults of positions that jump: an encoder that stood still or lost counts, or rows that are missing without a gap
     in time."""
     for what, jumps in (("position", of.survey.jumps), ("motor_position", of.survey.motor_jumps)):
-        for joint, jump, speed in zip(of.chain.leading_joints, jumps, of.survey.speed.tolist(), strict=False):
+        for joint, jump, speed in zip(
+            of.chain.leading_joints, jumps, of.survey.speed.tolist(), strict=bool(jumps)
+        ):
             if jump is None:
                 continue
             allowed = _allowed(joint.limits.speed, of.options.free_speed, of.options)

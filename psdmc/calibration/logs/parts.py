@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-from psdmc.cluster import Lost, at_once, connected, result_of
+from psdmc.cluster import Lost, at_once, connected, result_of, submitted
 
 AT_ONCE = 2
 """Parts in this process: NumPy and compiled functions let other threads run, and each part needs memory."""
@@ -27,21 +27,27 @@ class Workers:
     """The workers of a Dask cluster.
 
     client  distributed.Client of their scheduler
+    ahead   number of parts that the workers are given at once
     said    function that is called with a sentence if the cluster is lost
     lost    whether the cluster was lost; this process then computes the rest
     """
 
     client: Any
+    ahead: int
     said: Callable[[str], None]
     lost: bool = False
 
-    def submitted(self, function: Any, part: Any) -> Any:
-        """Return the future result of a part; None if the cluster is lost."""
+    def submitted(self, function: Any, *given: Any) -> Any:
+        """Return the future result of a function; None if the cluster is lost."""
         if self.lost:
             return None
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Sending large graph")  # a part has 10 MB, and is sent once
-            return self.client.submit(_applied, function, part, pure=False)
+            try:
+                return submitted(self.client, function, *given)
+            except Lost:
+                self._lose()
+                return None
 
     def result(self, future: Any, again: Callable[[], Any]) -> Any:
         """Return the result of a part. If the cluster is lost, `again` computes it."""
@@ -49,9 +55,12 @@ class Workers:
             try:
                 return result_of(future)
             except Lost:
-                self.lost = True
-                self.said(LOST)
+                self._lose()
         return again()
+
+    def _lose(self) -> None:
+        self.lost = True
+        self.said(LOST)
 
 
 LOST = "the Dask cluster was lost: this process computed the rest"
@@ -70,7 +79,7 @@ def on_cluster(scheduler: str | None, said: Callable[[str], None]) -> Iterator[W
         yield None
         return
     with connected(scheduler) as client:
-        workers = Workers(client, said)
+        workers = Workers(client, at_once(client), said)
         before = _workers.set(workers)
         try:
             yield workers
@@ -88,9 +97,10 @@ def each_part(parts: Iterable[Part], work: Callable[[Part], Result]) -> Iterator
         return
     import cloudpickle
 
-    function = workers.client.submit(pickle.loads, cloudpickle.dumps(work), pure=False)
-    ahead = at_once(workers.client)
-    for part, future in _ahead(parts, lambda part: workers.submitted(function, part), ahead):
+    function = workers.submitted(pickle.loads, cloudpickle.dumps(work))
+    for part, future in _ahead(
+        parts, lambda part: workers.submitted(_applied, function, part), workers.ahead
+    ):
         yield part, workers.result(future, partial(work, part))
 
 

@@ -27,13 +27,12 @@ class Cluster:
     def __init__(self, lost_at: int) -> None:
         self.left = lost_at
 
-    def nthreads(self) -> dict[str, int]:
-        return {"a": 1, "b": 1}
-
     def submit(self, function: Any, *given: Any, pure: bool) -> Future[Any]:
         assert not pure
         future: Future[Any] = Future()
         self.left -= 1
+        if self.left < -3:
+            raise OSError("closed")
         if self.left < 0:
             future.set_exception(CancelledError())
         else:
@@ -43,11 +42,11 @@ class Cluster:
         return future
 
 
-@pytest.mark.parametrize(("lost_at", "said"), [(100, []), (1, [LOST]), (4, [LOST])])
+@pytest.mark.parametrize(("lost_at", "said"), [(100, []), (1, [LOST]), (4, [LOST]), (-9, [LOST])])
 def test_results_come_in_order_and_nothing_is_lost(lost_at: int, said: list[str]):
     pytest.importorskip("distributed")
     told: list[str] = []
-    token = parts._workers.set(Workers(Cluster(lost_at), told.append))
+    token = parts._workers.set(Workers(Cluster(lost_at), 4, told.append))
     try:
         found = list(each_part(range(9), lambda k: k**2))
         again = list(each_part(range(3), lambda k: -k))
