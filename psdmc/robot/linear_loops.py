@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.reproducible import cross, times
+from psdmc.reproducible import cosine, cross, sine, times
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, Array, Loop, Mechanism, NamedFrame, Placement
@@ -157,8 +157,11 @@ def _note(robot: Mechanism, loops: Sequence[Loop], coordinates: Sequence[Coordin
 
 
 # One loop: where it is closed, and whether it stays closed along the relations found there.
-Gap = Callable[[Array], Array]
-"""From all columns' positions to how far the loop is from closed, in its rows, then in rotations of half a turn."""
+Gaps = Callable[[Array], Array]
+"""From positions (states, columns) to how far the loop is from closed, in its rows, then in rotations of half a turn."""
+
+Placements = tuple[Array, Array]
+"""Rotations (3, 3, states) and translations (3, states); one state may stand for all."""
 
 
 def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequence[int]) -> Relations | None:
@@ -172,26 +175,27 @@ def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequenc
     used = {place[leader] for own in shares.values() for leader, _ in own}
     mine = [k for k in order if k in used]
 
-    def gap(q: Array) -> Array:
+    def gaps(q: Array) -> Array:
         values = {
-            i: sum(ratio * q[place[leader]] for leader, ratio in own) + robot.coordinates[i].offset
+            i: sum((ratio * q[:, place[leader]] for leader, ratio in own), np.zeros(len(q)))
+            + robot.coordinates[i].offset
             for i, own in shares.items()
         }
         first, second = (
             _placed(robot, end, path, values)
             for end, path in zip((loop.first, loop.second), ends, strict=True)
         )
-        return _gap(first.inverse() @ second, loop.rows)
+        return _gaps(first, second, loop.rows)
 
     count, rng = len(loop.rows), np.random.default_rng(SEED)
     near = np.zeros((1 + STARTS, len(columns)))
     near[1:, mine] = rng.uniform(-NEAR, NEAR, (STARTS, len(mine)))
-    rank = max(len(_eliminated(_slopes(gap, start, count, mine), mine).pivots) for start in near)
+    rank = max(len(_eliminated(_slopes(gaps, start, count, mine), mine).pivots) for start in near)
     for k, start in enumerate(near):
-        q = _assembled(gap, start, count, mine)
+        q = _assembled(gaps, start, count, mine)
         if q is None:
             continue
-        found = _eliminated(_slopes(gap, q, count, mine), mine)
+        found = _eliminated(_slopes(gaps, q, count, mine), mine)
         if len(found.pivots) < rank:
             continue  # a singular position: several ways lead from it
         whole = np.round(found.rows)
@@ -200,7 +204,7 @@ def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequenc
                 [_wrapped(robot, columns[p], x) for p, x in zip(found.pivots, times(whole, q), strict=True)]
             )
             relations = Relations(whole, offsets, found.pivots)
-            if _stays_closed(gap, relations, mine, rng):
+            if _stays_closed(gaps, relations, mine, rng):
                 return relations
         if k == 0:
             return None  # closed and regular at q = 0 of the leaders: this decides how the loop is assembled
@@ -211,34 +215,65 @@ def _path(robot: Mechanism, end: NamedFrame) -> tuple[int, ...]:
     return () if end.joint == BASE else robot.path_to(end.joint)
 
 
-def _placed(robot: Mechanism, end: NamedFrame, path: Sequence[int], values: Mapping[int, float]) -> Placement:
+def _placed(
+    robot: Mechanism, end: NamedFrame, path: Sequence[int], values: Mapping[int, Array]
+) -> Placements:
     """The end of a loop, seen from the last body that carries both ends."""
-    found = Placement.identity()
+    found = _fixed(Placement.identity())
     for i in path:
         if i in values:
             joint = robot.joints[i]
-            found = found @ joint.placement @ joint.type.transform(values[i])
-    return found @ end.placement
+            angle, way = joint.type.turn(values[i]), joint.type.slide(values[i])
+            found = _moved(_moved(found, _fixed(joint.placement)), _about_z(angle, way, len(values[i])))
+    return _moved(found, _fixed(end.placement))
 
 
-def _gap(apart: Placement, rows: Sequence[int]) -> Array:
-    turn, about = apart.rotation, [row - 3 for row in rows if row >= 3]
+def _fixed(placement: Placement) -> Placements:
+    return placement.rotation[..., None], placement.translation[:, None]
+
+
+def _moved(outer: Placements, inner: Placements) -> Placements:
+    rotation, translation = outer
+    return _product(rotation, inner[0]), _product(rotation, inner[1]) + translation
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Matrices (3, 3, states) times matrices or vectors (3, ..., states), terms added in order."""
+    terms: list[Array] = [(a[:, k, None] if b.ndim == 3 else a[:, k]) * b[k] for k in range(3)]
+    return terms[0] + terms[1] + terms[2]
+
+
+def _about_z(angle: Array | None, way: Array | None, count: int) -> Placements:
+    turn, shift = np.repeat(np.eye(3)[..., None], count, axis=2), np.zeros((3, count))
+    if angle is not None:
+        turn[0, 0] = turn[1, 1] = cosine(angle)
+        turn[1, 0] = sine(angle)
+        turn[0, 1] = -turn[1, 0]
+    if way is not None:
+        shift[2] = way
+    return turn, shift
+
+
+def _gaps(first: Placements, second: Placements, rows: Sequence[int]) -> Array:
+    back = np.swapaxes(first[0], 0, 1)
+    turn, apart = _moved((back, -_product(back, first[1])), second)
+    about = [row - 3 for row in rows if row >= 3]
     if len(about) == 2:
         (free,) = {0, 1, 2} - {*about}
         error, turned = cross(np.eye(3)[free], turn[:, free]), 1.0 - turn[free, free]
     else:
-        error = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2.0
-        turned = 3.0 - turn[0, 0] - turn[1, 1] - turn[2, 2] if about else 0.0
-    closed = [apart.translation[row] if row < 3 else error[row - 3] for row in rows]
-    return np.array([*closed, turned])
+        error = np.stack([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2.0
+        turned = 3.0 - turn[0, 0] - turn[1, 1] - turn[2, 2] if about else 0.0 * apart[0]
+    closed = [apart[row] if row < 3 else error[row - 3] for row in rows]
+    return np.stack(np.broadcast_arrays(*closed, turned), axis=1)
 
 
-def _slopes(gap: Gap, q: Array, count: int, moving: Sequence[int]) -> Array:
+def _slopes(gaps: Gaps, q: Array, count: int, moving: Sequence[int]) -> Array:
     """(count, columns) derivatives of the loop's rows, which depend on the columns `moving` only."""
     found = np.zeros((count, len(q)))
-    for k in moving:
-        step = STEP * np.eye(len(q))[k]
-        found[:, k] = (gap(q + step) - gap(q - step))[:count] / (2.0 * STEP)
+    steps = STEP * np.eye(len(q))[list(moving)]
+    ahead, behind = np.split(gaps(np.vstack([q + steps, q - steps]))[:, :count], 2)
+    found[:, moving] = ((ahead - behind) / (2.0 * STEP)).T
     return found
 
 
@@ -263,14 +298,14 @@ def _eliminated(rows: Array, order: Sequence[int], right: Array | None = None) -
     return Relations(work[: len(pivots), :-1], work[:, -1], tuple(pivots))
 
 
-def _assembled(gap: Gap, start: Array, count: int, order: Sequence[int]) -> Array | None:
+def _assembled(gaps: Gaps, start: Array, count: int, order: Sequence[int]) -> Array | None:
     """A closed position near `start`, by Newton's method; None if there is none. The leaders stay where they are, unless
     the pivots change."""
     q = start.copy()
     for _ in range(STEPS):
-        error = gap(q)
+        error = gaps(q[None])[0]
         is_closed = np.abs(error).max() < CLOSED
-        found = _eliminated(_slopes(gap, q, count, order), order, error[:count])
+        found = _eliminated(_slopes(gaps, q, count, order), order, error[:count])
         step = found.offsets[: len(found.pivots)]
         q[list(found.pivots)] -= step * min(1.0, 0.5 / max(np.abs(step).max(initial=0.0), 1e-300))
         if is_closed:  # and with this step to the last digits
@@ -287,13 +322,13 @@ def _wrapped(robot: Mechanism, joint: int, offset: float) -> float:
     return quarters * QUARTER if abs(angle - quarters * QUARTER) < CLOSED else angle
 
 
-def _stays_closed(gap: Gap, relations: Relations, mine: Sequence[int], rng: np.random.Generator) -> bool:
+def _stays_closed(gaps: Gaps, relations: Relations, mine: Sequence[int], rng: np.random.Generator) -> bool:
     leaders = [k for k in mine if k not in relations.pivots]
     for _ in range(TESTS):
         q = np.zeros(relations.rows.shape[1])
         q[leaders] = rng.uniform(-math.pi, math.pi, len(leaders))
         q[list(relations.pivots)] = relations.offsets - times(relations.rows, q)
-        if np.abs(gap(q)).max() > 10.0 * CLOSED:
+        if np.abs(gaps(q[None])).max() > 10.0 * CLOSED:
             return False
     return bool(leaders)
 
