@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import stats
+from scipy.linalg import lapack
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Evidence
@@ -327,6 +328,15 @@ def _tilts(model: DynamicsModel, motion: Sequence[Array]) -> Array:
     return np.concatenate(parts, axis=2)
 
 
+def _solution(matrix: Array, right: Array) -> Array:
+    """The solution of a symmetric system without directions whose eigenvalue is too small. If there is none of these, as
+    LAPACK's estimate of the condition number tells, Cholesky's method takes a twentieth of the time."""
+    factor, fails = lapack.dpotrf(matrix)
+    if not fails and lapack.dpocon(factor, np.abs(matrix).sum(axis=0).max())[0] > 10.0 * RANK_TOLERANCE**2:
+        return np.asarray(lapack.dpotrs(factor, right)[0])
+    return np.asarray(np.linalg.pinv(matrix, rcond=RANK_TOLERANCE**2, hermitian=True) @ right)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """A weighted fit: RMS residual (n,) of each joint and the weights (n,) that gave it."""
@@ -365,9 +375,7 @@ class Sums:
         a, b = gram[np.ix_(columns, columns)], gram[columns, -1]
         norms = np.sqrt(np.diag(a))
         scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
-        inverse = np.linalg.pinv(a * np.outer(scale, scale), rcond=RANK_TOLERANCE**2, hermitian=True)
-        found: Array = inverse @ (b * scale) * scale
-        return columns, found
+        return columns, _solution(a * np.outer(scale, scale), b * scale) * scale
 
     def values(self, which: Sequence[int], weights: Array) -> Array:
         """Return the values of all fitted columns in their own units."""
