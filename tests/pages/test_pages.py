@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,6 @@ BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil
 KEPT = os.environ.get("PSDMC_SCREENSHOTS")
 """`make test-pages`: the folder for screenshots."""
 WIDTHS = (400, 800, 1280) if KEPT else (400,)
-SCHEMES = ("light", pytest.param("dark", marks=pytest.mark.slow))
 SITE = (
     (
         "index",
@@ -154,22 +153,44 @@ def browser() -> Iterator[Any]:
         found.close()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("name", NAMES)
-def test_nothing_scrolls_sideways(browser: Any, pages: dict[str, Path], name: str, width: int, scheme: str):
-    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-    page.goto(pages[name].as_uri())
-    if KEPT:
-        page.screenshot(path=Path(KEPT) / f"{name}_{width}_{scheme}.png", full_page=True)
-    found = page.evaluate("document.documentElement.scrollWidth")
-    page.close()
+@pytest.fixture(scope="module")
+def page(request: pytest.FixtureRequest, browser: Any, pages: dict[str, Path]) -> Iterator[Any]:
+    """A page in Chromium, opened once for all tests of this page, width and scheme, which leave it as they find it."""
+    name, width, scheme = request.param
+    opened = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    opened.goto(pages[name].as_uri())
+    yield opened
+    opened.close()
 
-    assert found <= width
+
+def of(
+    *names: str, widths: Sequence[int] = WIDTHS, schemes: Sequence[str] = ("light",)
+) -> pytest.MarkDecorator:
+    """A test of these pages; `make test` leaves dark ones to `make test-slow`."""
+    cases = [
+        pytest.param(
+            (name, width, scheme),
+            id=f"{name}-{width}-{scheme}",
+            marks=[pytest.mark.slow] if scheme == "dark" else [],
+        )
+        for name in names
+        for width in widths
+        for scheme in schemes
+    ]
+    return pytest.mark.parametrize("page", cases, indirect=True, scope="module")
+
+
+@of(*NAMES, schemes=("light", "dark"))
+def test_nothing_scrolls_sideways(page: Any, request: pytest.FixtureRequest):
+    if KEPT:
+        page.screenshot(path=Path(KEPT) / f"{request.node.callspec.id.replace('-', '_')}.png", full_page=True)
+
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]
 
 
 CUT = """() => {
-  for (const details of document.querySelectorAll("details")) details.open = true;
+  const folded = document.querySelectorAll("details:not([open])");
+  for (const details of folded) details.open = true;
   dispatchEvent(new Event("resize"));
   const cut = [];
   for (const table of document.querySelectorAll("main table, article table")) {
@@ -178,28 +199,22 @@ CUT = """() => {
     const hidden = cells.find((cell) => cell.scrollWidth > cell.clientWidth + 1);
     if (over > 1 || hidden) cut.push(`${Math.round(over)} px: ${(hidden ?? table).textContent.trim().slice(0, 60)}`);
   }
+  for (const details of folded) details.open = false;
+  dispatchEvent(new Event("resize"));
   return cut;
 }"""
 """Tables that reach beyond what holds them, or one of whose cells does."""
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("name", NAMES)
-def test_no_table_is_cut(browser: Any, pages: dict[str, Path], name: str, width: int):
-    page = browser.new_page(viewport={"width": width, "height": 900})
-    page.goto(pages[name].as_uri())
-    found = page.evaluate(CUT)
-    page.close()
-
-    assert found == []
+@of(*NAMES)
+def test_no_table_is_cut(page: Any):
+    assert page.evaluate(CUT) == []
 
 
-def test_a_table_that_became_a_list_names_each_value(browser: Any, pages: dict[str, Path]):
-    page = browser.new_page(viewport={"width": 400, "height": 900})
-    page.goto(pages["bench"].as_uri())
+@of("bench", widths=(400,))
+def test_a_table_that_became_a_list_names_each_value(page: Any):
     heads = page.eval_on_selector_all("table.stacked tr:first-child > td", "e => e.map(c => c.dataset.head)")
     role = page.eval_on_selector("table.stacked td", "e => e.getAttribute('role')")
-    page.close()
 
     assert heads[:4] == [
         "robot",
@@ -226,15 +241,10 @@ HIDING = """() => {
 """Pictures whose legend lies on a curve's box."""
 
 
-@pytest.mark.parametrize("name", ["bench", "calibration"])
-def test_no_legend_hides_a_curve(browser: Any, pages: dict[str, Path], name: str):
-    page = browser.new_page(viewport={"width": 800, "height": 900})
-    page.goto(pages[name].as_uri())
-    found, legends = page.evaluate(HIDING), page.locator("svg g[id^=legend]").count()
-    page.close()
-
-    assert legends > 0
-    assert found == []
+@of("bench", "calibration", widths=(800,))
+def test_no_legend_hides_a_curve(page: Any):
+    assert page.locator("svg g[id^=legend]").count() > 0
+    assert page.evaluate(HIDING) == []
 
 
 GAP = """() => {
@@ -255,25 +265,15 @@ GAP = """() => {
 """px: the tallest stretch of the first screen with neither text nor picture."""
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("name", NAMES)
-def test_no_first_screen_is_empty(browser: Any, pages: dict[str, Path], name: str, width: int):
-    page = browser.new_page(viewport={"width": width, "height": 900})
-    page.goto(pages[name].as_uri())
-    found = page.evaluate(GAP)
-    page.close()
-
-    assert found < 200
+@of(*NAMES)
+def test_no_first_screen_is_empty(page: Any):
+    assert page.evaluate(GAP) < 200
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("name", NAMES)
-def test_axe_finds_no_serious_fault(browser: Any, pages: dict[str, Path], name: str, scheme: str):
+@of(*NAMES, widths=(800,), schemes=("light", "dark"))
+def test_axe_finds_no_serious_fault(page: Any):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    page = browser.new_page(viewport={"width": 800, "height": 900}, color_scheme=scheme)
-    page.goto(pages[name].as_uri())
     found = axe.run(page).response["violations"]
-    page.close()
     serious = [
         f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in found if v["impact"] in ("serious", "critical")
     ]
@@ -282,13 +282,10 @@ def test_axe_finds_no_serious_fault(browser: Any, pages: dict[str, Path], name: 
 
 
 @pytest.mark.skipif("view" not in OWN, reason="plotly is not installed")
-@pytest.mark.parametrize("width", [400, 1280])
-def test_legend_and_texts_of_a_view_have_the_plot_s_size(browser: Any, pages: dict[str, Path], width: int):
+@of("view", widths=(400, 800))
+def test_legend_and_texts_of_a_view_have_the_plot_s_size(page: Any):
     """The style of other pictures, which scale with the page, would cut them."""
-    page = browser.new_page(viewport={"width": width, "height": 900})
-    page.goto(pages["view"].as_uri())
     found = page.evaluate("document.querySelector('#plot .main-svg').getBoundingClientRect().width")
     expected = page.evaluate("document.getElementById('plot').clientWidth")
-    page.close()
 
     assert found == pytest.approx(expected, abs=1.0)
