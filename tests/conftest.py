@@ -4,7 +4,7 @@ thrown away with it; Ctrl-C is heard by the commands under test also where a she
 has it ignored; Python keeps the bytecode of tests and psdmc, which hundreds of processes load, also where the environment
 says otherwise; commands under test tell no progress, which depends on the machine's load; tests that need a program which
 is not installed are skipped, and the run ends with how many tests were skipped for which reason; --part K/N runs the
-tests whose name's checksum leaves K if divided by N."""
+tests whose name's checksum leaves K if divided by N; tests named in long_tests.txt are slow."""
 
 from __future__ import annotations
 
@@ -38,11 +38,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--part", default="0/1", metavar="K/N", help="run part K of N of the tests")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    _mark_long_tests(config, items)
     part, parts = map(int, config.getoption("--part").split("/"))
     chosen = [zlib.crc32(item.nodeid.partition("[")[0].encode()) % parts == part for item in items]
     config.hook.pytest_deselected(items=[item for item, own in zip(items, chosen, strict=True) if not own])
     items[:] = [item for item, own in zip(items, chosen, strict=True) if own]
+
+
+LONG_TESTS = Path(__file__).parent / "long_tests.txt"
+
+
+def _mark_long_tests(config: pytest.Config, items: list[pytest.Item]) -> None:
+    lines = LONG_TESTS.read_text(encoding="utf-8").splitlines()
+    long = {line for line in lines if not line.startswith("#")}
+    for item in items:
+        if item.nodeid in long:
+            item.add_marker(pytest.mark.slow)
+    files = {item.nodeid.partition("::")[0] for item in items}
+    unknown = {line for line in long if line.partition("::")[0] in files} - {item.nodeid for item in items}
+    if unknown and config.args == ["tests"]:
+        raise pytest.UsageError(f"{LONG_TESTS.name}: there is no test {min(unknown)}")
 
 
 @pytest.fixture(scope="session", autouse=True)
