@@ -204,9 +204,9 @@ def solved(problem: crocoddyl.ShootingProblem, solver_of=crocoddyl.SolverFDDP) -
     solver.setCallbacks([log])
     xs = [problem.x0] * (problem.T + 1)
     us = problem.quasiStatic(xs[:-1])
-    begin = time.perf_counter()
+    begin = time.process_time()
     solver.solve(xs, us, 200, False)
-    seconds = time.perf_counter() - begin
+    seconds = time.process_time() - begin
     found = [data.differential.multibody.contacts.contacts for data in problem.runningDatas]
     forces = np.array([[contacts[foot].f.linear for foot in FEET] for contacts in found])
     return Gait(np.array(solver.xs), np.array(solver.us), forces, list(log.costs), solver.iter, seconds)
@@ -215,10 +215,10 @@ def solved(problem: crocoddyl.ShootingProblem, solver_of=crocoddyl.SolverFDDP) -
 def derivative_seconds(problem: crocoddyl.ShootingProblem, gait: Gait) -> float:
     """Time of calc and calcDiff for all nodes."""
     xs, us = list(gait.xs), list(gait.us)
-    begin = time.perf_counter()
+    begin = time.process_time()
     problem.calc(xs, us)
     problem.calcDiff(xs, us)
-    return time.perf_counter() - begin
+    return time.process_time() - begin
 
 
 def heading(column: str) -> None:
