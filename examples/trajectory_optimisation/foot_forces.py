@@ -38,7 +38,7 @@ VALUES = ("xout", "h", "Fx", "Fu", "Hx", "Hu", "Lx", "Lu", "Lxx", "Lxu", "Luu")
 
 
 class InPython(crocoddyl.DifferentialActionModelAbstract):
-    """A node whose dynamics and constraints are computed in NumPy, with functions of `psdmc.compile`. Costs are Crocoddyl's."""
+    """A node with dynamics and constraints in NumPy, by functions of `psdmc.compile`. Costs are Crocoddyl's."""
 
     def __init__(self, robot: psdmc.CompiledRobot, state, actuation, contacts, costs) -> None:
         self.own = crocoddyl.DifferentialActionModelContactInvDynamics(state, actuation, contacts, costs)
@@ -105,7 +105,7 @@ class InPython(crocoddyl.DifferentialActionModelAbstract):
 
 
 class Node(crocoddyl.DifferentialActionDataAbstract):
-    """Data of a node: its own part is what Crocoddyl's costs read. force (4, 3) N, along the axes of the world; wrenches (4, 6),
+    """Data of a node: its own part is what Crocoddyl's costs read. force (4, 3) N, along the world's axes; wrenches (4, 6),
     along those of the feet."""
 
     def __init__(self, model: InPython) -> None:

@@ -160,11 +160,14 @@ def crocoddyls(state, actuation, contacts, costs) -> crocoddyl.DifferentialActio
 def shooting(
     robot: pinocchio.Model, wanted: Plan, dynamics, by_forces: bool = False
 ) -> crocoddyl.ShootingProblem:
-    """The problem, where `dynamics` makes the model of a node from state, actuation, contacts and costs. Controls are torques,
-    or, with `by_forces`, accelerations and forces at the feet."""
+    """The problem, where `dynamics` makes the model of a node from state, actuation, contacts and costs. Controls are
+    torques, or, with `by_forces`, accelerations and forces at the feet."""
     state = crocoddyl.StateMultibody(robot)
     actuation = crocoddyl.ActuationModelFloatingBase(state)
-    nu, ids = state.nv + 3 * len(FEET) if by_forces else actuation.nu, [robot.getFrameId(foot) for foot in FEET]
+    nu, ids = (
+        state.nv + 3 * len(FEET) if by_forces else actuation.nu,
+        [robot.getFrameId(foot) for foot in FEET],
+    )
     effort = crocoddyl.ResidualModelControl(state, nu)
     if by_forces:
         effort = crocoddyl.ResidualModelJointEffort(state, actuation, np.zeros(actuation.nu), nu, False)
@@ -231,7 +234,10 @@ def row(name: str, problem: crocoddyl.ShootingProblem, repeats: int, solver_of=c
     seconds = min(solved(problem, solver_of).seconds for _ in range(repeats))
     node = min(derivative_seconds(problem, gait) for _ in range(repeats)) / problem.T
     rate = f"{gait.iterations / seconds:.0f}"
-    print(f"{name:22}{gait.costs[-1]:16.12f}{gait.iterations:12}{rate:>12}{1e6 * node:>11.0f} us a node", flush=True)
+    print(
+        f"{name:22}{gait.costs[-1]:16.12f}{gait.iterations:12}{rate:>12}{1e6 * node:>11.0f} us a node",
+        flush=True,
+    )
     return gait
 
 
