@@ -138,7 +138,7 @@ def differences(
 
 
 def shared_seconds(problem: crocoddyl.ShootingProblem, found: gait.Gait) -> float:
-    """Time of Crocoddyl's costs and constraints at all nodes, with their derivatives: every row of the table contains it."""
+    """CPU time of Crocoddyl's costs and constraints at all nodes, with their derivatives, which every row contains."""
     problem.calc(list(found.xs), list(found.us))
     nodes = [node.differential for node in problem.runningModels]
     datas = [data.differential for data in problem.runningDatas]

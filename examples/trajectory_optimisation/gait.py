@@ -79,7 +79,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Gait:
-    """A solution: xs (k + 1, 37), us (k, 12), forces (k, 4, 3) N, costs of all iterations, seconds."""
+    """A solution: xs (k + 1, 37), us (k, controls), forces (k, 4, 3) N, costs of all iterations, CPU seconds."""
 
     xs: Array
     us: Array
@@ -164,10 +164,8 @@ def shooting(
     torques, or, with `by_forces`, accelerations and forces at the feet."""
     state = crocoddyl.StateMultibody(robot)
     actuation = crocoddyl.ActuationModelFloatingBase(state)
-    nu, ids = (
-        state.nv + 3 * len(FEET) if by_forces else actuation.nu,
-        [robot.getFrameId(foot) for foot in FEET],
-    )
+    nu = state.nv + 3 * len(FEET) if by_forces else actuation.nu
+    ids = [robot.getFrameId(foot) for foot in FEET]
     effort = crocoddyl.ResidualModelControl(state, nu)
     if by_forces:
         effort = crocoddyl.ResidualModelJointEffort(state, actuation, np.zeros(actuation.nu), nu, False)
@@ -216,7 +214,7 @@ def solved(problem: crocoddyl.ShootingProblem, solver_of=crocoddyl.SolverFDDP) -
 
 
 def derivative_seconds(problem: crocoddyl.ShootingProblem, gait: Gait) -> float:
-    """Time of calc and calcDiff for all nodes."""
+    """CPU time of calc and calcDiff for all nodes."""
     xs, us = list(gait.xs), list(gait.us)
     begin = time.process_time()
     problem.calc(xs, us)
