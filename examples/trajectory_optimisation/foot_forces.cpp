@@ -13,9 +13,10 @@ namespace {
 
 using Model = crocoddyl::DifferentialActionModelContactInvDynamics;
 
-// Inputs and results of one node. Of the frames' rows, the first three are linear.
-struct Node : crocoddyl::DifferentialActionDataContactInvDynamics {
-    explicit Node(Model *model) : crocoddyl::DifferentialActionDataContactInvDynamics(model) { wrenches.setZero(); }
+// Inputs and results of one node. Of the frames' rows, the first three are linear. Boost needs another name than Node,
+// which contact_dynamics.cpp has, as a program may load both modules.
+struct FeetNode : crocoddyl::DifferentialActionDataContactInvDynamics {
+    explicit FeetNode(Model *model) : crocoddyl::DifferentialActionDataContactInvDynamics(model) { wrenches.setZero(); }
 
     Matrix<CONTACTS, 3> position;
     Matrix<3 * CONTACTS, 3> rotation;
@@ -35,7 +36,7 @@ class FootForces : public Model {
 
     Handle createData() override
     {
-        auto node = std::make_shared<Node>(this);
+        auto node = std::make_shared<FeetNode>(this);
         for (const char *name : robot_frame_names) node->contacts.push_back(node->multibody.contacts->contacts.at(name).get());
         return node;
     }
@@ -43,7 +44,7 @@ class FootForces : public Model {
     // Torques, accelerations of the contacts, cost, and what the constraints make of them.
     void calc(const Handle &data, const Given &x, const Given &u) override
     {
-        Node &node = static_cast<Node &>(*data);
+        FeetNode &node = static_cast<FeetNode &>(*data);
         const double *q = x.data(), *qd = q + NQ, *qdd = u.data();
         Eigen::VectorXd &tau = node.pinocchio.tau;
         pinocchio::forwardKinematics(pinocchio_, node.pinocchio, x.head<NQ>(), x.tail<NV>());
@@ -73,7 +74,7 @@ class FootForces : public Model {
     // Their derivatives. The world's axes turn in the foot, so the derivative of the torques by q has a part from the forces.
     void calcDiff(const Handle &data, const Given &x, const Given &u) override
     {
-        Node &node = static_cast<Node &>(*data);
+        FeetNode &node = static_cast<FeetNode &>(*data);
         const double *q = x.data(), *qd = q + NQ, *qdd = u.data();
         auto &by_q = node.pinocchio.dtau_dq;
         pinocchio::computeJointJacobians(pinocchio_, node.pinocchio);
@@ -124,8 +125,8 @@ BOOST_PYTHON_MODULE(foot_forces)
 {
     namespace py = boost::python;
     py::import("crocoddyl");
-    py::class_<Node, py::bases<crocoddyl::DifferentialActionDataContactInvDynamics>, std::shared_ptr<Node>, boost::noncopyable>(
-        "Node", "Data of a node.", py::no_init);
+    py::class_<FeetNode, py::bases<crocoddyl::DifferentialActionDataContactInvDynamics>, std::shared_ptr<FeetNode>, boost::noncopyable>(
+        "FeetNode", "Data of a node.", py::no_init);
     py::class_<FootForces, py::bases<Model>, std::shared_ptr<FootForces>, boost::noncopyable>(
         "FootForces", "Inverse dynamics with contacts by psdmc.",
         py::init<std::shared_ptr<crocoddyl::StateMultibody>, std::shared_ptr<crocoddyl::ActuationModelAbstract>,
