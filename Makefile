@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-intervals test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-pages audit fuzz mutate test-sanitize planted-faults
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-intervals test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-examples test-pages audit fuzz mutate test-sanitize planted-faults
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -108,6 +108,17 @@ $(ADAPTERS)/ready: pyproject.toml
 
 test-adapters: $(ADAPTERS)/ready ## test robots inside JAX, PyTorch, FMPy and pip's wheels, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
 	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks tests/backends/adapters
+
+EXAMPLES := .venv-examples
+EXAMPLE_TESTS = $(shell grep -o 'tests/[a-z_/]*\.py' examples/README.md)
+
+$(EXAMPLES)/ready: pyproject.toml
+	$(PYTHON) -m venv --clear $(EXAMPLES)
+	$(EXAMPLES)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test,bench,calibrate,examples]' 'pin==4.0.*'
+	@touch $@
+
+test-examples: $(EXAMPLES)/ready ## run the tests of the examples, with those in Crocoddyl, in a separate environment with Pinocchio 4.0
+	$(EXAMPLES)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile $(EXAMPLE_TESTS)
 
 test-pages: $(READY) ## open bench, calibration and site pages in Chromium at three widths, light and dark; screenshots in generated/pages
 	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet --editable '.[pages]'
@@ -220,6 +231,6 @@ mutate: $(READY) ## put faults into program/ and lower/ and list those that no f
 	$(RUN)/mutmut results
 
 clean: ## remove the environment and all generated files but the reference robot
-	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) $(LEARNING) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) $(ADAPTERS) $(EXAMPLES) $(LEARNING) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
 	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -4,33 +4,13 @@
 // costs. Contacts are point contacts with the names of the package's contacts, in LOCAL_WORLD_ALIGNED axes. All of them have
 // equal gains. A contact that is not active in the model is not active in the call. Costs may use contact forces, placements
 // of frames and their Jacobians. The Makefile beside this file compiles the module; gait.py uses it.
-#include <memory>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include <boost/python.hpp>
-
 #include <crocoddyl/multibody/actions/contact-fwddyn.hpp>
-#include <crocoddyl/multibody/contacts/contact-3d.hpp>
-#include <pinocchio/algorithm/jacobian.hpp>
-#include <pinocchio/algorithm/kinematics.hpp>
 
-extern "C" {
-#include <robot/robot.h>
-}
+#include "point_contacts.hpp"
 
 namespace {
 
-constexpr int NQ = robot_NQ, NV = robot_NV, ROOT = 6, JOINTS = NV - ROOT, CONTACTS = robot_FRAMES, FORCES = 3 * CONTACTS;
-
 using Model = crocoddyl::DifferentialActionModelContactFwdDynamics;
-using Given = Eigen::Ref<const Eigen::VectorXd>;
-using Handle = std::shared_ptr<crocoddyl::DifferentialActionDataAbstract>;
-template <int rows>
-using Vector = Eigen::Matrix<double, rows, 1>;
-template <int rows, int columns>
-using Matrix = Eigen::Matrix<double, rows, columns, Eigen::RowMajor>;
 
 // Inputs and results of one node. The derivatives are by q, qd, tau and error.
 struct Node : crocoddyl::DifferentialActionDataContactFwdDynamics {
@@ -59,20 +39,10 @@ class ContactDynamics : public Model {
   public:
     ContactDynamics(std::shared_ptr<crocoddyl::StateMultibody> state, std::shared_ptr<crocoddyl::ActuationModelAbstract> actuation,
                     std::shared_ptr<crocoddyl::ContactModelMultiple> contacts, std::shared_ptr<crocoddyl::CostModelSum> costs)
-        : Model(state, actuation, contacts, costs, 0.0, true), pinocchio_(*state->get_pinocchio())
+        : Model(state, actuation, contacts, costs, 0.0, true), pinocchio_(*state->get_pinocchio()), feet_(feet_of(*state, *actuation, *contacts))
     {
-        const auto &given = contacts->get_contacts();
-        if (state->get_nq() != NQ || state->get_nv() != NV || actuation->get_nu() != JOINTS || given.size() != CONTACTS)
-            throw std::invalid_argument("the package is of a robot with other joints or contacts");
-        for (int k = 0; k < CONTACTS; k++) {
-            const auto found = given.find(robot_frame_names[k]);
-            const auto point = found == given.end() ? nullptr : std::dynamic_pointer_cast<crocoddyl::ContactModel3D>(found->second->contact);
-            if (!point || point->get_type() != pinocchio::LOCAL_WORLD_ALIGNED)
-                throw std::invalid_argument(std::string(robot_frame_names[k]) + " is not a point contact in LOCAL_WORLD_ALIGNED axes");
-            if (k > 0 && point->get_gains() != points_[0]->get_gains()) throw std::invalid_argument("the contacts have different gains");
-            items_.push_back(found->second.get());
-            points_.push_back(point);
-        }
+        for (const Foot &foot : feet_)
+            if (foot.point->get_gains() != feet_[0].point->get_gains()) throw std::invalid_argument("the contacts have different gains");
     }
 
     Handle createData() override
@@ -90,10 +60,10 @@ class ContactDynamics : public Model {
         pinocchio::forwardKinematics(pinocchio_, node.pinocchio, x.head<NQ>(), x.tail<NV>());
         robot_forward_kinematics(q, node.position.data(), node.rotation.data());
         node.tau.tail<JOINTS>() = u;
-        node.kp = points_[0]->get_gains()[0], node.kd = points_[0]->get_gains()[1];
+        node.kp = feet_[0].point->get_gains()[0], node.kd = feet_[0].point->get_gains()[1];
         for (int k = 0; k < CONTACTS; k++) {
-            node.active[k] = items_[k]->active;
-            node.error.segment<3>(3 * k) = node.position.row(k).transpose() - points_[k]->get_reference();
+            node.active[k] = feet_[k].item->active;
+            node.error.segment<3>(3 * k) = node.position.row(k).transpose() - feet_[k].point->get_reference();
         }
         check(robot_constrained_forward_dynamics(q, qd, node.tau.data(), node.active.data(), &mu, &node.kp, &node.kd, node.error.data(),
                                                  node.qdd.data(), node.forces.data()), "constrained_forward_dynamics");
@@ -134,8 +104,7 @@ class ContactDynamics : public Model {
 
   private:
     const pinocchio::Model &pinocchio_;
-    std::vector<crocoddyl::ContactItem *> items_;
-    std::vector<std::shared_ptr<crocoddyl::ContactModel3D>> points_;
+    const std::vector<Foot> feet_;
 };
 
 }  // namespace

@@ -79,7 +79,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Gait:
-    """A solution: xs (k + 1, 37), us (k, 12), forces (k, 4, 3) N, costs of all iterations, seconds."""
+    """A solution: xs (k + 1, 37), us (k, controls), forces (k, 4, 3) N, costs of all iterations, CPU seconds."""
 
     xs: Array
     us: Array
@@ -121,11 +121,19 @@ def plan(robot: pinocchio.Model, phases: tuple[tuple[int, tuple[str, ...], float
     return Plan(np.array(air), np.array(feet), states)
 
 
-def module(folder: Path) -> ModuleType:
-    """contact_dynamics.cpp, compiled with the C package of HyQ, which is written into this folder."""
+def derived() -> psdmc.DynamicsModel:
+    return psdmc.derive(hyq(), floating=True, contacts=FEET, expand=False)
+
+
+def module(
+    model: psdmc.DynamicsModel,
+    folder: Path,
+    name: str = "contact_dynamics",
+    functions: tuple[str, ...] = FUNCTIONS,
+) -> ModuleType:
+    """The C++ file of this name, compiled with the C package of the model, which is written into this folder."""
     package = folder / "hyq"
-    model = psdmc.derive(hyq(), floating=True, contacts=FEET, expand=False)
-    psdmc.emit_c(model, package, functions=FUNCTIONS, name="robot")
+    psdmc.emit_c(model, package, functions=functions, name="robot")
     make = [
         "make",
         "--silent",
@@ -133,11 +141,10 @@ def module(folder: Path) -> ModuleType:
         str(HERE / "Makefile"),
         f"PACKAGE={package}",
         f"PYTHON={sys.executable}",
+        f"NAME={name}",
     ]
     subprocess.run(make, check=True)
-    spec = importlib.util.spec_from_file_location(
-        "contact_dynamics", package / "python" / "contact_dynamics.so"
-    )
+    spec = importlib.util.spec_from_file_location(name, package / "python" / f"{name}.so")
     assert spec is not None
     assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
@@ -150,11 +157,18 @@ def crocoddyls(state, actuation, contacts, costs) -> crocoddyl.DifferentialActio
     return crocoddyl.DifferentialActionModelContactFwdDynamics(state, actuation, contacts, costs, 0.0, True)
 
 
-def shooting(robot: pinocchio.Model, wanted: Plan, dynamics) -> crocoddyl.ShootingProblem:
-    """The problem, where `dynamics` makes the model of a node from state, actuation, contacts and costs."""
+def shooting(
+    robot: pinocchio.Model, wanted: Plan, dynamics, by_forces: bool = False
+) -> crocoddyl.ShootingProblem:
+    """The problem, where `dynamics` makes the model of a node from state, actuation, contacts and costs. Controls are
+    torques, or, with `by_forces`, accelerations and forces at the feet."""
     state = crocoddyl.StateMultibody(robot)
     actuation = crocoddyl.ActuationModelFloatingBase(state)
-    nu, ids = actuation.nu, [robot.getFrameId(foot) for foot in FEET]
+    nu = state.nv + 3 * len(FEET) if by_forces else actuation.nu
+    ids = [robot.getFrameId(foot) for foot in FEET]
+    effort = crocoddyl.ResidualModelControl(state, nu)
+    if by_forces:
+        effort = crocoddyl.ResidualModelJointEffort(state, actuation, np.zeros(actuation.nu), nu, False)
     cone = crocoddyl.FrictionCone(np.eye(3), FRICTION, 4, False)
     pyramid = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(cone.lb, cone.ub))
 
@@ -171,10 +185,9 @@ def shooting(robot: pinocchio.Model, wanted: Plan, dynamics) -> crocoddyl.Shooti
                 away = crocoddyl.ResidualModelFrameTranslation(state, index, place, nu)
                 costs.addCost(foot, crocoddyl.CostModelResidual(state, away), SWING)
             if not (off or last):
-                force = crocoddyl.ResidualModelContactFrictionCone(state, index, cone, nu, True)
+                force = crocoddyl.ResidualModelContactFrictionCone(state, index, cone, nu, not by_forces)
                 costs.addCost(f"{foot} in pyramid", crocoddyl.CostModelResidual(state, pyramid, force), CONE)
         if not last:
-            effort = crocoddyl.ResidualModelControl(state, nu)
             costs.addCost("effort", crocoddyl.CostModelResidual(state, effort), EFFORT)
         return dynamics(state, actuation, contacts, costs)
 
@@ -183,30 +196,47 @@ def shooting(robot: pinocchio.Model, wanted: Plan, dynamics) -> crocoddyl.Shooti
     return crocoddyl.ShootingProblem(wanted.states[0], models, end)
 
 
-def solved(problem: crocoddyl.ShootingProblem, iterations: int = 200) -> Gait:
-    """FDDP from the standing robot, on one thread."""
+def solved(problem: crocoddyl.ShootingProblem, solver_of=crocoddyl.SolverFDDP) -> Gait:
+    """What the solver finds from the standing robot, on one thread."""
     problem.nthreads = 1
-    solver = crocoddyl.SolverFDDP(problem)
+    solver = solver_of(problem)
     solver.th_stop = 1e-12
     log = crocoddyl.CallbackLogger()
     solver.setCallbacks([log])
     xs = [problem.x0] * (problem.T + 1)
     us = problem.quasiStatic(xs[:-1])
-    begin = time.perf_counter()
-    solver.solve(xs, us, iterations, False)
-    seconds = time.perf_counter() - begin
+    begin = time.process_time()
+    solver.solve(xs, us, 200, False)
+    seconds = time.process_time() - begin
     found = [data.differential.multibody.contacts.contacts for data in problem.runningDatas]
     forces = np.array([[contacts[foot].f.linear for foot in FEET] for contacts in found])
     return Gait(np.array(solver.xs), np.array(solver.us), forces, list(log.costs), solver.iter, seconds)
 
 
 def derivative_seconds(problem: crocoddyl.ShootingProblem, gait: Gait) -> float:
-    """Time of calc and calcDiff for all nodes."""
+    """CPU time of calc and calcDiff for all nodes."""
     xs, us = list(gait.xs), list(gait.us)
-    begin = time.perf_counter()
+    begin = time.process_time()
     problem.calc(xs, us)
     problem.calcDiff(xs, us)
-    return time.perf_counter() - begin
+    return time.process_time() - begin
+
+
+def heading(column: str) -> None:
+    print(f"{column:22}{'cost':>16}{'iterations':>12}{'per second':>12}{'calc and calcDiff':>20}")
+
+
+def row(name: str, problem: crocoddyl.ShootingProblem, repeats: int, solver_of=crocoddyl.SolverFDDP) -> Gait:
+    """Solve the problem, and print a row of the table; the shortest times of the repetitions count."""
+    gait = solved(problem, solver_of)
+    seconds = min(solved(problem, solver_of).seconds for _ in range(repeats))
+    node = min(derivative_seconds(problem, gait) for _ in range(repeats)) / problem.T
+    rate = f"{gait.iterations / seconds:.0f}"
+    print(
+        f"{name:22}{gait.costs[-1]:16.12f}{gait.iterations:12}{rate:>12}{1e6 * node:>11.0f} us a node",
+        flush=True,
+    )
+    return gait
 
 
 def fitting() -> None:
@@ -233,21 +263,11 @@ def main() -> None:
     robot = pinocchio.buildModelFromUrdf(str(hyq()), pinocchio.JointModelFreeFlyer())
     wanted = plan(robot)
     problems = {
-        "psdmc": shooting(robot, wanted, module(given.folder).ContactDynamics),
+        "psdmc": shooting(robot, wanted, module(derived(), given.folder).ContactDynamics),
         "Crocoddyl": shooting(robot, wanted, crocoddyls),
     }
-    print(f"{'contact dynamics':18}{'cost':>16}{'iterations':>12}{'per second':>12}{'calc and calcDiff':>20}")
-    found = {}
-    for name, problem in problems.items():
-        gait = found[name] = solved(problem)
-        seconds = min(solved(problem).seconds for _ in range(given.repeats))
-        node = min(derivative_seconds(problem, gait) for _ in range(given.repeats)) / problem.T
-        rate = f"{gait.iterations / seconds:.0f}"
-        print(
-            f"{name:18}{gait.costs[-1]:16.12f}{gait.iterations:12}{rate:>12}{1e6 * node:>11.0f} us a node",
-            flush=True,
-        )
-    ours, theirs = found.values()
+    heading("contact dynamics")
+    ours, theirs = (row(name, problem, given.repeats) for name, problem in problems.items())
     print(f"difference of the costs    {abs(ours.costs[-1] / theirs.costs[-1] - 1.0):.1e} of the cost")
     for what, unit in (("xs", "rad, m, 1/s"), ("us", "N m"), ("forces", "N")):
         largest = np.abs(getattr(ours, what) - getattr(theirs, what)).max()

@@ -48,7 +48,7 @@ class Dynamics:
 @dataclass(frozen=True)
 class Jump:
     """cost; q (19, nodes + 1), qd (18, nodes + 1), tau (12, nodes), force (12, nodes) N along the base's axes; IPOPT's
-    iterations, and CPU seconds of the problem's functions and of all."""
+    iterations, and CPU seconds of the problem's functions and of all; duration of the motion in s."""
 
     cost: float
     q: Array
@@ -58,6 +58,7 @@ class Jump:
     iterations: int
     functions: float
     total: float
+    duration: float
 
 
 def jump(
@@ -128,6 +129,7 @@ def jump(
         found.stats()["iter_count"],
         sum(seconds for name, seconds in spent.items() if name.startswith("t_proc_nlp")),
         spent["t_proc_total"],
+        duration,
     )
 
 

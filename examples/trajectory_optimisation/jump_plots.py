@@ -9,7 +9,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from jump import DURATION, FEET, TORQUE, Array, Jump, solo12
+from jump import FEET, TORQUE, Array, Jump, solo12
 from matplotlib.animation import FuncAnimation, PillowWriter
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red")
@@ -19,7 +19,7 @@ def plot(found: Jump, file: Path) -> None:
     """Heights of base and feet, contact forces, torques, and four moments of the motion."""
     legs = legs_of(found)
     nodes = found.tau.shape[1]
-    time, dt = np.linspace(0.0, DURATION, nodes + 1), DURATION / nodes
+    time, dt = np.linspace(0.0, found.duration, nodes + 1), found.duration / nodes
     figure, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
     (height, forces), (torques, side) = axes
     height.plot(time, 100.0 * found.q[2], color="black", label="base")
@@ -56,7 +56,7 @@ def animate(found: Jump, file: Path) -> None:
     def shown(k: int) -> list:
         axis.clear()
         draw(axis, legs[k], "black")
-        axis.set_title(f"{k * DURATION / (len(legs) - 1):.2f} s", fontsize="medium")
+        axis.set_title(f"{k * found.duration / (len(legs) - 1):.2f} s", fontsize="medium")
         dress(axis, legs)
         return []
 

@@ -1,15 +1,20 @@
-"""examples/trajectory_optimisation/gait.py: a gait with psdmc's contact dynamics, held against Crocoddyl's own."""
+"""examples/trajectory_optimisation/gait.py and foot_forces.py: a gait with psdmc's contact dynamics, and with forces at the
+feet as controls, held against Crocoddyl's own."""
 
 from __future__ import annotations
 
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from unoptimised import without_optimisation
+
+import psdmc
 
 crocoddyl = pytest.importorskip("crocoddyl")
 pytestmark = pytest.mark.slow
@@ -33,12 +38,17 @@ def gait() -> Any:
 
 
 @pytest.fixture(scope="module")
-def problems(gait: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any, Any, Any]:
+def model(gait: Any) -> Any:
+    return gait.derived()
+
+
+@pytest.fixture(scope="module")
+def problems(gait: Any, model: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any, Any, Any]:
     """Pinocchio's model, the short plan, and its problem with psdmc's and with Crocoddyl's dynamics."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CFLAGS", "-O0")
         patch.setenv("CXXFLAGS", "-O0")
-        made = gait.module(tmp_path_factory.mktemp("gait"))
+        made = gait.module(model, tmp_path_factory.mktemp("gait"))
     robot = pin.buildModelFromUrdf(str(gait.hyq()), pin.JointModelFreeFlyer())
     plan = gait.plan(robot, PHASES)
     ours = gait.shooting(robot, plan, made.ContactDynamics)
@@ -79,3 +89,48 @@ def test_both_find_the_same_gait(gait: Any, problems: tuple[Any, Any, Any, Any],
         assert np.abs(feet - place).max() < 1e-2, "a step of 0.08 s is brisk"
     gait.plot(robot, plan, ours, theirs, tmp_path / "gait.png")
     assert (tmp_path / "gait.png").stat().st_size > 20_000
+
+
+@pytest.fixture(scope="module")
+def by_forces(gait: Any, model: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any, list[Any]]:
+    """Module, short plan, and its problem with forces as controls: psdmc's in C++ and in Python, and Crocoddyl's."""
+    import foot_forces
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CFLAGS", "-O0")
+        patch.setenv("CXXFLAGS", "-O0")
+        folder = tmp_path_factory.mktemp("forces")
+        in_cpp = gait.module(model, folder, "foot_forces", foot_forces.FUNCTIONS).FootForces
+    with without_optimisation():
+        compiled = psdmc.compile(model, functions=foot_forces.FUNCTIONS)
+    robot = pin.buildModelFromUrdf(str(gait.hyq()), pin.JointModelFreeFlyer())
+    plan = gait.plan(robot, PHASES)
+    ways = (
+        in_cpp,
+        partial(foot_forces.InPython, compiled),
+        crocoddyl.DifferentialActionModelContactInvDynamics,
+    )
+    return foot_forces, plan, [gait.shooting(robot, plan, dynamics, True) for dynamics in ways]
+
+
+def test_nodes_with_forces_as_controls_are_crocoddyls(by_forces: tuple[Any, Any, list[Any]]) -> None:
+    """Costs, constraints and all derivatives, in C++ and in Python, at states away from the plan."""
+    foot_forces, plan, (*ours, theirs) = by_forces
+    for problem in ours:
+        found = foot_forces.differences(problem, theirs, plan)
+        assert max(found.values()) < 1e-9, found
+
+
+def test_forces_as_controls_have_the_optimum_of_contact_dynamics(
+    gait: Any, by_forces: tuple[Any, Any, list[Any]]
+) -> None:
+    """Crocoddyl's contact dynamics eliminate the constraints, and the solver FDDP is another one."""
+    _, plan, both = by_forces
+    robot = both[-1].runningModels[0].state.pinocchio
+    other = gait.solved(gait.shooting(robot, plan, gait.crocoddyls))
+    found = [gait.solved(problem, crocoddyl.SolverIntro) for problem in both]
+    for one in found:
+        assert one.costs[-1] == pytest.approx(other.costs[-1], rel=1e-8)
+        assert np.abs(one.xs - other.xs).max() < 1e-4, "the cost hardly changes near its smallest value"
+        assert np.abs(one.forces - other.forces).max() < 1e-4 * np.abs(other.forces).max()
+    assert other.costs[-1] < 0.9 * other.costs[0]
