@@ -30,7 +30,7 @@ from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import DRIVE, Mechanism
 
 DELAY = 9
 FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
@@ -325,20 +325,29 @@ class JointRun:
 
 
 def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, options: StepOptions) -> JointRun:
-    """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move."""
-    log = run.log.of_motors or run.log  # friction acts at the motors
-    states = filtered(checked(log, robot.chain, options.filter.cutoff), options.filter)
+    """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move.
+
+    Friction acts at the motors, gravity and inertia at the links. Behind an elastic gear, these move differently.
+    """
+    links = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
+    of_motors = run.log.of_motors
+    states = links
+    if of_motors is not None:
+        states = filtered(checked(of_motors, robot.chain, options.filter.cutoff), options.filter)
     _require_alone(run, robot.chain, k, states)
-    gravity = (gravity_regressor(robot.regressor, states.q) @ theta_gravity)[:, k]
+    gravity = (gravity_regressor(robot.regressor, links.q) @ theta_gravity)[:, k]
     if run.tool is not None:
-        gravity = gravity + payload_torque(robot.chain, states.q, run.tool.mass, run.tool.com)[:, k]
+        gravity = gravity + payload_torque(robot.chain, links.q, run.tool.mass, run.tool.com)[:, k]
+    if of_motors is not None:
+        drive = float(np.nan_to_num(robot.chain.parameters[k, DRIVE]))
+        gravity = gravity + drive * (states.qdd - links.qdd)[:, k]
     rows = thinned(states, options.filter)
     out = held_out(len(rows), options.split)
     return JointRun(
         time=states.time,
         period=states.period,
         qd=states.qd[:, k],
-        qdd=states.qdd[:, k],
+        qdd=links.qdd[:, k],
         gravity=gravity,
         measured=robot.motors.torque(states.effort)[:, k],
         low_pass=states.low_pass,
