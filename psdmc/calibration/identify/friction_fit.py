@@ -59,6 +59,7 @@ class JointFriction:
     delay        time between position and current, s
     correlation  of the residual from sample to sample
     widened      factor by which correlated residuals increased the standard deviations
+    with_delay   (8,)    covariances of the delay with the seven values, and its variance
     """
 
     joint: str
@@ -70,6 +71,7 @@ class JointFriction:
     delay: float
     correlation: float = 0.0
     widened: float = 1.0
+    with_delay: Array = field(default_factory=lambda: np.zeros(8))
 
     @property
     def std(self) -> Array:
@@ -266,7 +268,9 @@ def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptio
     no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: v_s has no effect
     if no_peak and PARAMETERS[2] not in unseen and options.law == "lugre":
         unseen.append(PARAMETERS[2])
-    return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))
+    with_delay = np.append(turn @ spread[:, DELAY], spread[DELAY, DELAY])
+    own = (float(p[7]), float(p[8]), float(p[DELAY]))
+    return JointFriction(name, friction, covariance, tuple(unseen), *own, with_delay=with_delay)
 
 
 # The friction run of one joint
