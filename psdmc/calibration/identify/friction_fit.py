@@ -41,6 +41,8 @@ PEAK_SPEEDS = (0.01, 0.04)
 """Stribeck velocities of further starts of the last step, as shares of the run's largest speed."""
 PEAK_HEIGHT = 0.2
 """F_s - F_c of these starts, as a share of F_c."""
+SHORTEST_DELAY = 1e-12
+"""s, bound of a delay that is not estimated: none."""
 SHORT_DESCENT, LONG_DESCENT = 8, 25
 """Numbers of evaluations: to compare starts, and to refine the best one."""
 UNSEEN_CURVATURE = 1e-13
@@ -115,35 +117,35 @@ def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionO
 
 def _plain(fast: Array) -> Array:
     """Coulomb and viscous friction as LuGre parameters: no Stribeck peak, linear, rigid bristles."""
-    coulomb, viscous, _, inertia, offset = fast
-    return np.array(
-        [coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, inertia, offset, 0.0]
-    )
+    coulomb, viscous, _, *others = fast
+    return np.array([coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, *others])
 
 
 def _fast(data: JointRun, options: FrictionOptions) -> Array:
-    """(20): F_c, F_v, d_v with the run's inertia and offset, from samples well beyond the Stribeck velocity."""
+    """(20): F_c, F_v, d_v with the run's inertia, offset and delay, from samples well beyond the Stribeck velocity. A delay
+    makes a part of the inertia's torque look like friction."""
     speed = np.abs(data.qd)
     rows = data.fit[speed[data.fit] > options.fast * speed.max()]
     qd, qdd = data.qd[rows], data.qdd[rows]
     target = (data.measured - data.gravity)[rows]
+    rate = np.gradient(data.measured, data.time)[rows]
+    reach = options.largest_delay if options.estimate_delay else SHORTEST_DELAY
 
     def residual(p: Array) -> Array:
         friction = (p[0] + p[1] * np.abs(qd) ** p[2]) * np.sign(qd)
-        return np.asarray(friction + p[3] * qdd + p[4] - target)
+        return np.asarray(friction + p[3] * qdd + p[4] + p[5] * rate - target)
 
     size = float(np.sqrt(np.mean(target**2)))
-    low = [1e-6 * size, 0.0, 0.1, 0.0, -np.inf]
-    high = [np.inf, np.inf, 2.5, np.inf, np.inf]
-    fitted = optimize.least_squares(
-        residual, [0.5 * size, 0.3 * size, 0.8, 1e-3 * size, 0.0], bounds=(low, high), x_scale="jac"
-    )
+    low = [1e-6 * size, 0.0, 0.1, 0.0, -np.inf, -reach]
+    high = [np.inf, np.inf, 2.5, np.inf, np.inf, reach]
+    start = [0.5 * size, 0.3 * size, 0.8, 1e-3 * size, 0.0, 0.0]
+    fitted = optimize.least_squares(residual, start, bounds=(low, high), x_scale="jac")
     return np.asarray(fitted.x)
 
 
 def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
     """F_s, v_s, sigma_0, sigma_1 by Nelder-Mead, from the best of a coarse grid of stiffness and Stribeck velocity."""
-    coulomb, viscous, exponent, inertia, offset = fast
+    coulomb, viscous, exponent, *others = fast
     top = float(np.abs(data.qd).max())
 
     def unknowns(x: Array) -> Array:
@@ -158,9 +160,7 @@ def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
                 exponent,
                 log_stiffness,
                 damping,
-                inertia,
-                offset,
-                0.0,
+                *others,
             ]
         )
 
