@@ -132,6 +132,7 @@ SYMPTOMS = {
     "odd_gains",
     "wrong_gains",
     "wrong_file",
+    "unjudged_scale",
     "friction_gives_power",
     "no_stiffness",
 }

@@ -299,6 +299,10 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
         "but the unit of the log is right: by the parameters that joints share, the logged effort is "
         f"{_each(v, '{scale:.2g} +- {scale_std:.1g}')} times the true one"
     ),
+    "unjudged_scale": lambda v: (
+        f"the scale of the effort of joint(s) {_each(v, '{joint}')} is not judged: their torque is mostly friction or drive "
+        "inertia, and other joints do not show it; a wrong unit or torque constant there would not be noticed: check it"
+    ),
     "friction_gives_power": lambda v: (
         f"friction would give power instead of taking it: {_each(v, 'joint {joint} {power:.2g} +- {std:.1g} W')}: "
         "effort and motion have opposite signs there, or belong to different joints"

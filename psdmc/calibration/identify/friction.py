@@ -28,6 +28,17 @@ class FrictionResult:
         """Return the time in s by which the position lags behind the current: the median over the joints."""
         return float(np.median([joint.delay for joint in self.joints.values()])) if self.joints else 0.0
 
+    def covariance_with_delay(self, name: str) -> Array:
+        """Return the covariance (8, 8) of a joint's seven friction values and `delay`; zeros for values of a joint that had
+        no run."""
+        found, count = np.zeros((8, 8)), max(len(self.joints), 1)
+        efficiency = 1.0 if count <= 2 else 0.5 * np.pi  # of a median, whose variance exceeds that of a mean
+        found[7, 7] = efficiency * sum(joint.with_delay[7] for joint in self.joints.values()) / count**2
+        if name in self.joints:
+            found[:7, :7] = self.joints[name].covariance
+            found[:7, 7] = found[7, :7] = self.joints[name].with_delay[:7] / count
+        return found
+
 
 def calibrate_friction(
     runs: Mapping[str, JointRun], options: FrictionOptions, start: FrictionResult | None = None

@@ -30,7 +30,7 @@ from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import DRIVE, Mechanism
 
 DELAY = 9
 FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
@@ -41,6 +41,8 @@ PEAK_SPEEDS = (0.01, 0.04)
 """Stribeck velocities of further starts of the last step, as shares of the run's largest speed."""
 PEAK_HEIGHT = 0.2
 """F_s - F_c of these starts, as a share of F_c."""
+SHORTEST_DELAY = 1e-12
+"""s, bound of a delay that is not estimated: none."""
 SHORT_DESCENT, LONG_DESCENT = 8, 25
 """Numbers of evaluations: to compare starts, and to refine the best one."""
 UNSEEN_CURVATURE = 1e-13
@@ -59,6 +61,7 @@ class JointFriction:
     delay        time between position and current, s
     correlation  of the residual from sample to sample
     widened      factor by which correlated residuals increased the standard deviations
+    with_delay   (8,)    covariances of the delay with the seven values, and its variance
     """
 
     joint: str
@@ -70,6 +73,7 @@ class JointFriction:
     delay: float
     correlation: float = 0.0
     widened: float = 1.0
+    with_delay: Array = field(default_factory=lambda: np.zeros(8))
 
     @property
     def std(self) -> Array:
@@ -113,35 +117,35 @@ def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionO
 
 def _plain(fast: Array) -> Array:
     """Coulomb and viscous friction as LuGre parameters: no Stribeck peak, linear, rigid bristles."""
-    coulomb, viscous, _, inertia, offset = fast
-    return np.array(
-        [coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, inertia, offset, 0.0]
-    )
+    coulomb, viscous, _, *others = fast
+    return np.array([coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, *others])
 
 
 def _fast(data: JointRun, options: FrictionOptions) -> Array:
-    """(20): F_c, F_v, d_v with the run's inertia and offset, from samples well beyond the Stribeck velocity."""
+    """(20): F_c, F_v, d_v with the run's inertia, offset and delay, from samples well beyond the Stribeck velocity. A delay
+    makes a part of the inertia's torque look like friction."""
     speed = np.abs(data.qd)
     rows = data.fit[speed[data.fit] > options.fast * speed.max()]
     qd, qdd = data.qd[rows], data.qdd[rows]
     target = (data.measured - data.gravity)[rows]
+    rate = np.gradient(data.measured, data.time)[rows]
+    reach = options.largest_delay if options.estimate_delay else SHORTEST_DELAY
 
     def residual(p: Array) -> Array:
         friction = (p[0] + p[1] * np.abs(qd) ** p[2]) * np.sign(qd)
-        return np.asarray(friction + p[3] * qdd + p[4] - target)
+        return np.asarray(friction + p[3] * qdd + p[4] + p[5] * rate - target)
 
     size = float(np.sqrt(np.mean(target**2)))
-    low = [1e-6 * size, 0.0, 0.1, 0.0, -np.inf]
-    high = [np.inf, np.inf, 2.5, np.inf, np.inf]
-    fitted = optimize.least_squares(
-        residual, [0.5 * size, 0.3 * size, 0.8, 1e-3 * size, 0.0], bounds=(low, high), x_scale="jac"
-    )
+    low = [1e-6 * size, 0.0, 0.1, 0.0, -np.inf, -reach]
+    high = [np.inf, np.inf, 2.5, np.inf, np.inf, reach]
+    start = [0.5 * size, 0.3 * size, 0.8, 1e-3 * size, 0.0, 0.0]
+    fitted = optimize.least_squares(residual, start, bounds=(low, high), x_scale="jac")
     return np.asarray(fitted.x)
 
 
 def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
     """F_s, v_s, sigma_0, sigma_1 by Nelder-Mead, from the best of a coarse grid of stiffness and Stribeck velocity."""
-    coulomb, viscous, exponent, inertia, offset = fast
+    coulomb, viscous, exponent, *others = fast
     top = float(np.abs(data.qd).max())
 
     def unknowns(x: Array) -> Array:
@@ -156,9 +160,7 @@ def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
                 exponent,
                 log_stiffness,
                 damping,
-                inertia,
-                offset,
-                0.0,
+                *others,
             ]
         )
 
@@ -266,7 +268,9 @@ def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptio
     no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: v_s has no effect
     if no_peak and PARAMETERS[2] not in unseen and options.law == "lugre":
         unseen.append(PARAMETERS[2])
-    return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))
+    with_delay = np.append(turn @ spread[:, DELAY], spread[DELAY, DELAY])
+    own = (float(p[7]), float(p[8]), float(p[DELAY]))
+    return JointFriction(name, friction, covariance, tuple(unseen), *own, with_delay=with_delay)
 
 
 # The friction run of one joint
@@ -325,20 +329,29 @@ class JointRun:
 
 
 def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, options: StepOptions) -> JointRun:
-    """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move."""
-    log = run.log.of_motors or run.log  # friction acts at the motors
-    states = filtered(checked(log, robot.chain, options.filter.cutoff), options.filter)
+    """Return joint k's friction run with the torques of gravity and load. Raises InputError if other joints move.
+
+    Friction acts at the motors, gravity and inertia at the links. Behind an elastic gear, these move differently.
+    """
+    links = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
+    of_motors = run.log.of_motors
+    states = links
+    if of_motors is not None:
+        states = filtered(checked(of_motors, robot.chain, options.filter.cutoff), options.filter)
     _require_alone(run, robot.chain, k, states)
-    gravity = (gravity_regressor(robot.regressor, states.q) @ theta_gravity)[:, k]
+    gravity = (gravity_regressor(robot.regressor, links.q) @ theta_gravity)[:, k]
     if run.tool is not None:
-        gravity = gravity + payload_torque(robot.chain, states.q, run.tool.mass, run.tool.com)[:, k]
+        gravity = gravity + payload_torque(robot.chain, links.q, run.tool.mass, run.tool.com)[:, k]
+    if of_motors is not None:
+        drive = float(np.nan_to_num(robot.chain.parameters[k, DRIVE]))
+        gravity = gravity + drive * (states.qdd - links.qdd)[:, k]
     rows = thinned(states, options.filter)
     out = held_out(len(rows), options.split)
     return JointRun(
         time=states.time,
         period=states.period,
         qd=states.qd[:, k],
-        qdd=states.qdd[:, k],
+        qdd=links.qdd[:, k],
         gravity=gravity,
         measured=robot.motors.torque(states.effort)[:, k],
         low_pass=states.low_pass,

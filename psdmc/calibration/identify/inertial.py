@@ -165,7 +165,7 @@ def _rows(
         if name in friction.joints:
             rubbed[:, k] = friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
             if sensitive:
-                own = _friction_slopes(friction.joints[name], states, k, rubbed[:, k])
+                own = friction_slopes(friction.joints[name], states.qd[:, k], states.period)
                 slopes += [late(slope, k) for slope in own]
     return _Rows(
         time=states.time[at],
@@ -207,15 +207,16 @@ class Late:
         return spread
 
 
-def _friction_slopes(found: JointFriction, states: States, k: int, unmoved: Array) -> list[Array]:
-    """d torque / d parameter for each of the seven, by one-sided differences that keep the bounds."""
-    slopes = []
+def friction_slopes(found: JointFriction, speed: Array, period: float) -> list[Array]:
+    """Return the change of a joint's friction torque along its speed (N,) per unit of each of the seven values, by
+    one-sided differences that keep the bounds."""
+    slopes, unmoved = [], friction_torque(found.friction, speed, period)
     values, std = found.friction, found.std
     for j in range(7):
         step = FRICTION_STEP * min(std[j], 0.5 * abs(values[j])) or 1e-6 * max(abs(values[j]), 1e-6)
         moved = values.copy()
         moved[j] += step if j != 0 or values[0] + step <= values[1] else -step
-        changed = friction_torque(moved, states.qd[:, k], states.period)
+        changed = friction_torque(moved, speed, period)
         slopes.append((changed - unmoved) / (moved[j] - values[j]))
     return slopes
 

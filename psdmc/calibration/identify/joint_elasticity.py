@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from psdmc.calibration.identify.estimate import Estimate, Prior
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
 from psdmc.calibration.identify.friction import FrictionResult
+from psdmc.calibration.identify.inertial import friction_slopes
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_columns, motion_of
@@ -138,9 +139,9 @@ def joint_elasticity(
     rows: list[NumberRow] = []
     for k in np.flatnonzero(moving):
         joint = chain.leading_joints[k]
-        found = _fitted(
-            whole, int(k), kept[0].quantity, options, options.elasticity.drive_inertia.get(joint.name)
-        )
+        covariance = None if known is None else known.covariance_with_delay(joint.name)
+        inertia = options.elasticity.drive_inertia.get(joint.name)
+        found = _fitted(whole, int(k), kept[0].quantity, options, inertia, covariance)
         rows += _rows(joint, *found, float(motors.relative_std[k]))
     return Elasticity(tuple(rows), _notes(chain, both & ~moving, rows))
 
@@ -153,20 +154,23 @@ class _Samples:
     noise     (N, n, 3) what the encoders' noise alone would give
     friction  (N, n, f) torques per unit of each friction value
     torque    (N, n) of the motors
+    known     (N, n, c) change of (prediction - torque) per unit of each of c earlier results: friction values and delay
     """
 
     columns: Array
     noise: Array
     friction: Array
     torque: Array
+    known: Array
 
     @staticmethod
     def of(parts: Sequence[_Samples]) -> _Samples:
-        names = ("columns", "noise", "friction", "torque")
+        names = ("columns", "noise", "friction", "torque", "known")
         return _Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def at(self, rows: NDArray[np.bool_]) -> _Samples:
-        return _Samples(self.columns[rows], self.noise[rows], self.friction[rows], self.torque[rows])
+        parts = (self.columns, self.noise, self.friction, self.torque, self.known)
+        return _Samples(*(part[rows] for part in parts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,6 +191,20 @@ class _Efforts:
             if name in self.known.joints:
                 rubbed = friction_torque(self.known.joints[name].friction, speed[:, k], states.period)
                 found[:, k] -= states.low_pass(rubbed)[at]
+        return found
+
+    def slopes(self, states: States, speed: Array, at: NDArray[np.intp]) -> Array:
+        """(rows, n, 8) change of (prediction - torque) per unit of each joint's seven friction values and of the delay;
+        (rows, n, 0) if these are not known."""
+        if self.known is None:
+            return np.zeros((len(at), len(self.names), 0))
+        found = np.zeros((len(at), len(self.names), 8))
+        measured = CubicSpline(states.time, self.motors.torque(states.effort))
+        found[:, :, 7] = measured(states.time[at] - self.known.delay, 1)
+        for k, name in enumerate(self.names):
+            if name in self.known.joints:
+                own = friction_slopes(self.known.joints[name], speed[:, k], states.period)
+                found[:, k, :7] = np.stack([states.low_pass(slope)[at] for slope in own], axis=-1)
         return found
 
 
@@ -220,13 +238,25 @@ def _samples(
         friction = more if friction is None else np.concatenate([friction, more], axis=2)
     if friction is None:
         friction = np.zeros((len(at), len(shape), 0))
-    return _Samples(columns[at], noise[at], friction, efforts.torque(here, there.qd, at))
+    return _Samples(
+        columns[at],
+        noise[at],
+        friction,
+        efforts.torque(here, there.qd, at),
+        efforts.slopes(here, there.qd, at),
+    )
 
 
 def _fitted(
-    samples: _Samples, k: int, quantity: str, options: LinearOptions, inertia: float | None
+    samples: _Samples,
+    k: int,
+    quantity: str,
+    options: LinearOptions,
+    inertia: float | None,
+    known: Array | None,
 ) -> tuple[tuple[str, ...], Array, Array, NDArray[np.bool_]]:
-    """Names, values, standard deviations and whether each is determined, for the unknowns that are reported."""
+    """Names, values, standard deviations and whether each is determined, for the unknowns that are reported; `known` is the
+    covariance of earlier results."""
     columns, noise = samples.columns[:, k], samples.noise[:, k]
     columns = columns - columns.mean(axis=0) * [1.0, 0.0, 0.0]  # encoders have their own zeros
     torque = samples.torque[:, k]
@@ -245,7 +275,8 @@ def _fitted(
     size = np.sqrt(np.mean(torque**2)) or 1.0
     scale = size / np.maximum(np.sqrt(np.mean(whole**2, axis=0)), 1e-300)
     prior = Prior(np.zeros(whole.shape[1]), scale, wrong[:, None])
-    solved = estimate(whole[:, None], torque[:, None], options.fit, prior=prior)
+    consider = None if known is None else Consider(samples.known[:, k : k + 1], known)
+    solved = estimate(whole[:, None], torque[:, None], options.fit, consider, prior=prior)
     values, grown = _without_noise(solved, whole, wrong)
     m = len(names)
     return names, values[:m], solved.std[:m] * grown[:m], solved.identifiable[:m]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.delay import delays_of
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.calibration.verdict.gains import friction_powers, joint_gains
+from psdmc.calibration.verdict.gains import SETTLED, friction_powers, joint_gains
 from psdmc.calibration.verdict.log_errors import EffortScale, effort_scale
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.calibration.verdict.suspects import ABOUT
@@ -25,7 +25,7 @@ NOISE_FLOOR = 1e-4
 
 LIKELIER = 5.0
 """Logarithm of the likelihood by which a scale of the effort that agrees with other joints exceeds all scales that would
-explain an unusual gain."""
+explain an unusual gain, or an unusual scale all scales that are not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +50,8 @@ class Findings:
     speed             (n,) RMS speed of each joint
     fitted, held_out  RMSE and R^2 of each joint's whole torque, on fitted and on held-out samples
     file_errors       scale of the effort of each joint whose unusual gain is an error of the robot file, by joint
+    overscaled        joints whose gain is not visible, but unusual, and other joints confirm that the effort's scale is
+    unjudged          joints whose effort may have any scale: neither the robot file nor other joints show it
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Findings:
         self.fitted = [_whole_torque(record, name, held_out=False) for name in self.names]
         self.held_out = [_whole_torque(record, name, held_out=True) for name in self.names]
         self.file_errors = self._file_errors()
+        self.overscaled, self.unjudged = self._hidden_scales()
 
     def _file_errors(self) -> dict[int, EffortScale]:
         """Scales of the efforts that agree with other joints although their gain is unusual.
@@ -73,9 +76,9 @@ class Findings:
         A wrong unit scales all terms of a joint's torque. The base parameters that the joint shares with other joints then
         differ. If they agree, the file is wrong. The joint whose torque by the file is largest sets the unit.
         """
-        (low, high), (least, most) = self.limits.sure_gains, self.limits.gains
+        least, most = self.limits.gains
         seen = {k: gain.value for k, gain in enumerate(self.gains) if gain.visible}
-        agree = [k for k, value in seen.items() if low <= value <= high]
+        agree = self._agreed()
         by_file = self.evidence.of_motors().file_torque()
         if by_file is None or all(least <= value <= most for value in seen.values()):
             return {}
@@ -91,6 +94,37 @@ class Findings:
             surest = min(new, key=lambda k: new[k].std / new[k].value)
             found[surest] = new[surest]
             agree.append(surest)
+
+    def _agreed(self) -> list[int]:
+        """Joints with a visible gain that is not unusual."""
+        low, high = self.limits.sure_gains
+        return [k for k, gain in enumerate(self.gains) if gain.visible and low <= gain.value <= high]
+
+    def _hidden_scales(self) -> tuple[list[int], list[int]]:
+        """The joints without a visible gain whose effort surely has an unusual scale, and those that nothing judges.
+
+        A joint's torque by the file may be small beside the measured one because the effort is logged many times too
+        large. The base parameters that the joint shares with other joints then confirm the gain.
+        """
+        odd: list[int] = []
+        unjudged: list[int] = []
+        if self.evidence.model.theta_b is None:
+            return odd, unjudged
+        (least, most), agreed = self.limits.gains, self._agreed()
+        by_load = {row.joint for row in self.record.motors if row.seen}
+        for k, gain in enumerate(self.gains):
+            if gain.visible or self.names[k] in by_load or not self.moved()[k, 0]:
+                continue
+            scale = effort_scale(self.evidence, k, agreed, least, most) if agreed else None
+            over = (0.0, 0.0) if scale is None else (scale.over_less, scale.over_more)
+            settled = gain.std <= SETTLED * abs(gain.value)
+            if settled and (
+                (gain.value < least and over[0] < -LIKELIER) or (gain.value > most and over[1] < -LIKELIER)
+            ):
+                odd.append(k)
+            elif min(over) <= LIKELIER:
+                unjudged.append(k)
+        return odd, unjudged
 
     def _agreeing(self, k: int, others: Sequence[int]) -> EffortScale | None:
         """The scale of joint k's effort if it is that of the other joints' efforts, and surely not the one of its gain."""

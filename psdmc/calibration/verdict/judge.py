@@ -200,7 +200,8 @@ def _wrong_gains(found: Findings) -> Iterator[Ground]:
     wrong = [
         k
         for k, gain in enumerate(found.gains)
-        if gain.visible and not low <= gain.value <= high and k not in found.file_errors
+        if k in found.overscaled
+        or (gain.visible and not low <= gain.value <= high and k not in found.file_errors)
     ]
     if wrong:
         yield Ground("wrong_gains", {"items": found.gained(wrong), "low": low, "high": high})
@@ -241,6 +242,7 @@ def doubts(found: Findings) -> Iterator[Ground]:
     yield from _earlier_steps(found)
     yield from _odd_gains(found)
     yield from _wrong_file(found)
+    yield from _unjudged(found)
     yield from _unlike_limits(found)
     yield from _hardly_moving(found)
     yield from _lacking(found)
@@ -364,6 +366,12 @@ def _wrong_file(found: Findings) -> Iterator[Ground]:
         items = found.gained(list(scales))
         more = [{"scale": scale.value, "scale_std": scale.std} for scale in scales.values()]
         yield Ground("wrong_file", {"items": [a | b for a, b in zip(items, more, strict=True)]})
+
+
+def _unjudged(found: Findings) -> Iterator[Ground]:
+    """A doubt about joints whose effort may have any scale, because nothing shows it."""
+    if found.unjudged:
+        yield Ground("unjudged_scale", {"items": [{"joint": found.names[k]} for k in found.unjudged]})
 
 
 def _unlike_limits(found: Findings) -> Iterator[Ground]:

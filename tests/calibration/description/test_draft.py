@@ -68,6 +68,45 @@ def test_named_columns_are_recognised(tmp_path: Path, groups):
     assert np.array_equal(log.time, TIME)
 
 
+MOTOR = Q + 0.003 * np.cos(Q)
+"""Positions of motors, divided by the gear ratio: they differ by what an elastic gear bends."""
+
+
+@pytest.mark.parametrize(
+    "groups",
+    [
+        (("motor_q{}", MOTOR), ("motor_qd{}", 9 * QD), ("link_q{}", Q), ("link_qd{}", QD)),
+        (("q{}", Q), ("qd{}", QD), ("q_motor_{}", MOTOR)),
+        (("q{}", MOTOR), ("qd{}", 9 * QD), ("load_q{}", Q), ("load_qd{}", QD)),
+        (("motor{}Pos_deg", -np.degrees(50.0 * MOTOR)), ("output{}Pos_rad", Q), ("output{}Vel", QD)),
+    ],
+    ids=["both named", "motor named", "link named", "own turns"],
+)
+def test_positions_of_motor_and_link_are_told_apart(tmp_path: Path, groups):
+    write_columns(
+        columns("time", *groups, ("motor_torque{}", TAU), ("load{}", 9 * TAU)), tmp_path / "log.csv"
+    )
+
+    log = drafted_log(tmp_path, "log.csv")
+
+    assert np.abs(log.position - Q).max() < 1e-12
+    assert log.motor_position is not None
+    assert np.abs(log.motor_position - MOTOR).max() < 1e-12
+    assert log.velocity is not None
+    assert np.abs(log.velocity - QD).max() < 1e-12
+    assert np.abs(log.effort - TAU).max() < 1e-12
+
+
+def test_one_encoder_is_the_position_whatever_its_name(tmp_path: Path):
+    write_columns(columns("time", ("motor_q{}", Q), ("load_{}", TAU)), tmp_path / "log.csv")
+
+    log = drafted_log(tmp_path, "log.csv")
+
+    assert log.motor_position is None
+    assert np.abs(log.position - Q).max() < 1e-12
+    assert np.abs(log.effort - TAU).max() < 1e-12
+
+
 def test_columns_without_names_are_taken_in_order(tmp_path: Path):
     np.savetxt(tmp_path / "bare.csv", np.column_stack([1000 * TIME, Q, QD, TAU]), "%.17g", ",")
 

@@ -8,6 +8,7 @@ import pytest
 from psdmc.calibration.identify import friction_fit
 from psdmc.calibration.identify.friction_fit import MOST_KEPT, JointRun
 from psdmc.calibration.identify.state_friction import friction_torque
+from psdmc.calibration.identify.steps import FrictionOptions
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
 from psdmc.friction.state import STATE_LAW
 
@@ -49,6 +50,31 @@ def test_friction_is_simulated_once_for_equal_parameters(run: JointRun, monkeypa
         + 0.1
     )
     np.testing.assert_array_equal(other, expected)
+
+
+def test_a_delayed_inertia_is_not_taken_for_friction():
+    """The first step of the fit, on a motion of 2 and 6 Hz; the law and the inertia's torque in closed form."""
+    time = np.arange(8000) * PERIOD
+    low_pass = LowPass.design(FilterOptions(cutoff=40.0), PERIOD)
+    coulomb, viscous, exponent, inertia, delay = 3.0, 4.0, 0.7, 1.05, 1e-3
+    w, size = 2.0 * np.pi * np.array([2.0, 6.0]), np.array([3.0, 2.0])
+
+    def motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        turn = t[:, None] * w
+        return (size * np.sin(turn)).sum(1), (size * w * np.cos(turn)).sum(1)
+
+    speed, acceleration = motion(time + delay)
+    torque = (coulomb + viscous * np.abs(speed) ** exponent) * np.sign(speed) + inertia * acceleration
+    every = np.arange(500, 7500, 12)
+    still = np.zeros(len(time))
+    data = JointRun(time, PERIOD, *motion(time), still, low_pass(torque), low_pass, every, every, every)
+
+    found = friction_fit._fast(data, FrictionOptions())
+
+    assert found[0] == pytest.approx(coulomb, rel=0.5)  # the filter smooths reversals
+    assert found[3] == pytest.approx(inertia, rel=0.01)
+    assert found[5] == pytest.approx(delay, rel=0.15)
+    assert abs(friction_fit._fast(data, FrictionOptions(estimate_delay=False))[0] - coulomb) > coulomb
 
 
 @pytest.mark.parametrize("which", range(7))

@@ -7,16 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from elastic_pendulum import ROTOR, Log, log_by_scipy, write_plant
+from elastic_pendulum import ABOUT_JOINT, ROTOR, SWING, Log, friction, log_by_scipy, write_plant
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify.friction import FrictionResult
-from psdmc.calibration.identify.friction_fit import JointFriction
+from psdmc.calibration.identify.friction_fit import JointFriction, prepared
 from psdmc.calibration.identify.joint_elasticity import Elasticity, joint_elasticity
 from psdmc.calibration.identify.linear_options import ElasticityOptions, LinearOptions
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.identify.steps import FrictionRun, Robot, StepOptions
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.plant.spoiled import stuck
 from psdmc.derivation.derive import derive_model
@@ -37,17 +39,17 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> DynamicsModel:
     return derive_model(load_robot(folder / "pendulum.toml", drive_inertia=True).chain)
 
 
-def known_delay(delay: float) -> FrictionResult | None:
+def known_delay(delay: float, std: float) -> FrictionResult | None:
     """What friction runs give that found a delay and no friction of this joint."""
-    zero = np.zeros(7)
-    return (
-        FrictionResult({"other": JointFriction("other", zero, np.zeros((7, 7)), (), 0.0, 0.0, delay)}, ())
-        if delay
-        else None
-    )
+    zero, own = np.zeros(7), np.append(np.zeros(7), std**2)
+    other = JointFriction("other", zero, np.zeros((7, 7)), (), 0.0, 0.0, delay, with_delay=own)
+    return FrictionResult({"other": other}, ()) if delay else None
 
 
-def found(model: DynamicsModel, log: Log | StoredLog, delay: float = 0.0, **known: float) -> Elasticity:
+def found(
+    model: DynamicsModel, log: Log | StoredLog, delay: float = 0.0, late: float = 0.0, **known: float
+) -> Elasticity:
+    """Elasticity by a log whose delay, with the standard deviation `late`, is known."""
     options = LinearOptions(elasticity=ElasticityOptions(drive_inertia=known))
     assert model.theta_b is not None
     return joint_elasticity(
@@ -57,7 +59,7 @@ def found(model: DynamicsModel, log: Log | StoredLog, delay: float = 0.0, **know
         options,
         Motors.torques(1),
         model.theta_b,
-        known_delay(delay),
+        known_delay(delay, late),
     )
 
 
@@ -114,6 +116,35 @@ def test_a_known_delay_is_not_taken_for_damping(pendulum: DynamicsModel) -> None
     wrong, right = found(pendulum, early, swing=ROTOR), found(pendulum, early, 0.008, swing=ROTOR)
     assert max(map(abs, errors(right.rows))) < 3.0
     assert by_name(wrong.rows)["joint_damping"].value == pytest.approx(DAMPING + 0.008 * STIFFNESS, rel=0.3)
+
+
+def test_the_uncertainty_of_a_delay_is_one_of_the_damping(pendulum: DynamicsModel) -> None:
+    """It is what a delay larger by one standard deviation does to the damping."""
+    log, none, std = log_by_scipy(STIFFNESS, DAMPING, NOISE, 1), 1e-9, 1e-3
+    sure, unsure, moved = (
+        by_name(found(pendulum, log, delay, late, swing=ROTOR).rows)["joint_damping"]
+        for delay, late in ((none, 0.0), (none, std), (std, 0.0))
+    )
+    assert unsure.value == sure.value
+    assert unsure.std == pytest.approx(np.hypot(sure.std, moved.value - sure.value), rel=0.02)
+    assert unsure.std > 2.0 * sure.std
+
+
+def test_the_inertia_of_a_friction_run_is_that_of_the_link(pendulum: DynamicsModel) -> None:
+    """The torque without friction is that of the spring and of the rotor; SciPy integrated the link."""
+    stiffness = 500.0
+    log = log_by_scipy(stiffness, DAMPING, 1e-9, 1, torque_noise=1e-9)
+    rate = SWING.at(log.time)[1][:, None]
+    log = replace(log, effort=log.effort - friction(rate))
+    model, chain = ChainRegressor(pendulum), pendulum.mechanism
+    options = StepOptions(FilterOptions(cutoff=20.0))
+    assert pendulum.theta_b is not None
+    robot = Robot(chain, model, Motors.torques(1))
+    run = prepared(robot, pendulum.theta_b, FrictionRun("swing", log, None), 0, options)
+    error = (run.low_pass(run.rigid(ABOUT_JOINT + ROTOR, 0.0, 0.0)) - run.measured)[run.every]
+    rigid = ROTOR * (run.qdd - np.gradient(run.qd, run.period))[run.every]
+    bent = np.sqrt(np.mean(rigid**2))
+    assert np.sqrt(np.mean(error**2)) < 0.1 * bent
 
 
 def test_a_motor_encoder_that_stood_still_jumps(pendulum: DynamicsModel) -> None:

@@ -31,11 +31,16 @@ RANGE = (0.2, 5.0)
 """Gains that a verdict accepts."""
 
 
-def light_arm(folder: Path, com: float) -> Arm:
-    """An arm whose elbow has its centre of mass here, m along the link; its axis is at -0.3 m."""
+def light_arm(folder: Path, com: float, drive: float = 0.1, inertia: float = 0.03) -> Arm:
+    """An arm whose elbow has its centre of mass here, m along the link; its axis is at -0.3 m. The inertias of its drive and
+    of its link are in kg m^2."""
     robot = ROBOT.replace("com = [-0.1, -0.01, 0.0]", f"com = [{com}, 0.0, 0.0]").replace(
         "mass = 2.0", "mass = 6.0"
     )
+    robot = robot.replace("drive_inertia = 0.1", f"drive_inertia = {drive}").replace(
+        "zz = 0.03", f"zz = {inertia}"
+    )
+    robot = robot.replace("xx = 0.01, yy = 0.03", f"xx = {inertia}, yy = {inertia}")
     (folder / "two_link.toml").write_text(robot, encoding="utf-8")
     (folder / "plant.toml").write_text(PLANT, encoding="utf-8")
     model = derive_model(load_robot(folder / "two_link.toml", drive_inertia=True).chain)
@@ -104,6 +109,29 @@ def test_a_log_in_another_unit_is_refused_even_if_the_wrong_file_makes_one_gain_
 
     assert not found.usable
     assert "wrong_gains" in codes(found.against)
+
+
+@pytest.mark.parametrize("file", ["right", "wrong"])
+@pytest.mark.parametrize("factor", [43.0, 100.0])
+def test_an_effort_so_large_that_the_file_s_torque_is_hidden_beside_it_is_refused(
+    request, good_log, file: str, factor: float
+):
+    found = verdict_on(request.getfixturevalue(file), scaled(good_log, [1.0, factor]))
+
+    assert not found.joints[ELBOW].visible
+    assert "wrong_gains" in codes(found.against)
+
+
+def test_a_joint_whose_scale_nothing_shows_is_a_doubt_and_no_reason(tmp_path):
+    """The elbow's mass is on its axis: friction is nearly all of its torque."""
+    arm = light_arm(tmp_path, -0.3, 1e-3, 1e-3)
+
+    found = verdict_on(arm, plant_log_of(arm.plant))
+
+    said = next(ground for ground in found.doubted if ground.code == "unjudged_scale")
+    assert found.usable
+    assert [item["joint"] for item in said.values["items"]] == ["elbow"]
+    assert "the scale of the effort of joint(s) elbow is not judged" in said.words
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
