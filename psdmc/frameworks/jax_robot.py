@@ -109,7 +109,9 @@ class JaxRobot:
     def __repr__(self) -> str:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"
 
-    def call(self, function: Signature, inputs: Sequence[Any], theta_b: Any = None, gravity: Any = None) -> Any:
+    def call(
+        self, function: Signature, inputs: Sequence[Any], theta_b: Any = None, gravity: Any = None
+    ) -> Any:
         """Call a generated function of the robot; `function` is an entry of `psdmc.functions.SIGNATURES`."""
         made = results(function) if len(function.outputs) > 1 else None
         function, inputs = self.compiled.with_gravity(function, inputs, gravity)

@@ -236,7 +236,9 @@ class _Calls:
 
     def call(self, function: str, *inputs: Tensor) -> tuple[Tensor, ...]:
         signature = self.robot.signature(SIGNATURES[function])
-        none = inputs[0].new_zeros(3) if self.gravity is None else self.gravity  # zero where its effects cancel
+        none = (
+            inputs[0].new_zeros(3) if self.gravity is None else self.gravity
+        )  # zero where its effects cancel
         gravity = (none,) if GRAVITY in signature.inputs else ()
         theta = (self.theta_b,) if SIGNATURES[function].theta else ()
         found = self.robot.operator(function)(*inputs, *gravity, *theta)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pinocchio as pin
+from bundled import under_gravity
 from robots_at_hand import in_wheel, loaded
 
 from psdmc.derivation.derive import derive_model
@@ -131,10 +132,7 @@ def weighed(name: str) -> DynamicsModel:
 
 def pulled(name: str, gravity: Array) -> Reference:
     """The robot in Pinocchio, whose model has another gravity, (3,)."""
-    own = differentiated(name).pinocchio
-    model = own.model.copy()
-    model.gravity.linear = gravity
-    return replace(own, model=model)
+    return under_gravity(differentiated(name).pinocchio, gravity)
 
 
 def torques_of_gravity(name: str, q: Array) -> Array:

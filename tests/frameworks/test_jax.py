@@ -172,9 +172,13 @@ def test_gravity_has_its_own_gradient(name: str, mode: str) -> None:
 
 def test_gravity_where_it_is_no_input() -> None:
     robot, q = psdmc.jax(weighed("scara"), gravity_input=True), jnp.zeros(4)
-    refused(lambda: robot.mass_matrix(q, gravity=q[:3]), "mass_matrix has no input gravity", "gravity_input=True")
+    refused(
+        lambda: robot.mass_matrix(q, gravity=q[:3]), "mass_matrix has no input gravity", "gravity_input=True"
+    )
     refused(lambda: robot_of("scara").gravity(q, gravity=q[:3]), "gravity has no input", "gravity_input=True")
-    refused(lambda: robot.gravity(q, gravity=q), r"gravity: gravity has shape \(4,\), expected \(..., 3\)", "")
+    refused(
+        lambda: robot.gravity(q, gravity=q), r"gravity: gravity has shape \(4,\), expected \(..., 3\)", ""
+    )
     step = jax.grad(lambda gravity: robot.rk4_step(q, q, q, 0.01, gravity=gravity).qd_next.sum())
     refused(lambda: step(q[:3]), "rk4_step has no derivative by gravity", "forward_dynamics")
 

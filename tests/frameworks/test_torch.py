@@ -130,7 +130,9 @@ def test_gravity_has_its_own_gradient(name: str, mode: str) -> None:
     """Accelerations under another gravity, and their derivatives by gravity and by torques, are Pinocchio's."""
     robot, gravity = psdmc.torch(weighed(name), gravity_input=True), np.array([1.0, -3.0, -8.0])
     q, qd, tau = (x[0] for x in drawn(name, "forward_dynamics", 1))
-    qdd, _, _, inverse = pulled(name, gravity).forward_dynamics_derivatives(q.numpy(), qd.numpy(), tau.numpy())
+    qdd, _, _, inverse = pulled(name, gravity).forward_dynamics_derivatives(
+        q.numpy(), qd.numpy(), tau.numpy()
+    )
 
     def forward(gravity: Any, tau: Any) -> Any:
         return robot.forward_dynamics(q, qd, tau, gravity=gravity)
