@@ -13,6 +13,7 @@ import time
 import zlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -141,7 +142,9 @@ def circle(rows: int = 400) -> Motion:
     t = 1.0 + 4.0 * np.linspace(0.0, 1.0, rows) ** 1.2
     q = np.column_stack([np.sin(t), 0.5 * np.cos(2.0 * t)])
     qd = np.column_stack([np.cos(t), -np.sin(2.0 * t)])
-    return Motion("circle", ("shoulder", "elbow"), t, q, qd, np.column_stack([-np.sin(t), -2.0 * np.cos(2.0 * t)]))
+    return Motion(
+        "circle", ("shoulder", "elbow"), t, q, qd, np.column_stack([-np.sin(t), -2.0 * np.cos(2.0 * t)])
+    )
 
 
 ALONG = Sampling(500, ("inverse_dynamics",), rows=200, along=circle())
@@ -185,7 +188,9 @@ def test_noise_along_a_motion(arm: DynamicsModel, tmp_path: Path) -> None:
     errors = []
     for name in ("q", "qd", "qdd"):
         t = noisy["time"][:, 0]
-        exact = {"q": motion.spline, "qd": motion.spline.derivative(), "qdd": motion.spline.derivative(2)}[name](t)
+        exact = {"q": motion.spline, "qd": motion.spline.derivative(), "qdd": motion.spline.derivative(2)}[
+            name
+        ](t)
         deviation = getattr(motion, name).std(axis=0)
         errors.append((noisy[name] - exact) / (0.1 * deviation))
         assert not np.array_equal(plain[name], noisy[name])
@@ -228,7 +233,10 @@ def test_what_a_motion_does_not_give_is_refused(
     ("rows", "said"),
     [
         ("time_s,position_rad.shoulder\n0,0\n1,1\n2,1\n3,1\n", r"no positions of joint\(s\) elbow"),
-        ("time_s,position_rad.shoulder,position_m.elbow\n0,0,0\n", r"position of joint\(s\) elbow in another unit"),
+        (
+            "time_s,position_rad.shoulder,position_m.elbow\n0,0,0\n",
+            r"position of joint\(s\) elbow in another unit",
+        ),
         ("position_rad.shoulder,position_rad.elbow\n0,0\n", r"no column\(s\) time_s"),
         ("time_s,tau\n0,0\n", r"no column\(s\) position_rad.<joint>"),
         ("{head},velocity_rad_s.elbow\n0,0,0,0\n", r"no column\(s\) velocity_rad_s.shoulder"),
@@ -237,7 +245,9 @@ def test_what_a_motion_does_not_give_is_refused(
         ("{head}\n0,0,0\n1,1,1\n", "2 rows, expected 4 or more"),
     ],
 )
-def test_files_that_are_no_motion_are_refused(arm: DynamicsModel, tmp_path: Path, rows: str, said: str) -> None:
+def test_files_that_are_no_motion_are_refused(
+    arm: DynamicsModel, tmp_path: Path, rows: str, said: str
+) -> None:
     (tmp_path / "model.npz").write_bytes(file_bytes(arm))
     head = "time_s,position_rad.shoulder,position_rad.elbow"
     (tmp_path / "motion.csv").write_text(rows.replace("{head}", head))
@@ -259,7 +269,16 @@ def test_the_command_draws_along_a_file_of_excite(arm: DynamicsModel, tmp_path: 
         table[f"acceleration_rad_s2.{name}"] = whole.qdd[:, k]
     table |= {f"{column}.gripper": whole.time for column in ("velocity_rad_s", "acceleration_rad_s2")}
     write_columns(table, tmp_path / "motion.npz")
-    words = ["-o", tmp_path / "c", "--states", "500", "--part-states", "200", "--along", tmp_path / "motion.npz"]
+    words = [
+        "-o",
+        tmp_path / "c",
+        "--states",
+        "500",
+        "--part-states",
+        "200",
+        "--along",
+        tmp_path / "motion.npz",
+    ]
     with without_optimisation():
         done = typed("sample", tmp_path / "model.npz", *words)
     assert done.returncode == 0, done.stderr
@@ -499,11 +518,14 @@ def test_a_process_that_is_killed_leaves_the_parts_of_one_that_is_not(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "drawn", [{"draw": "sobol"}, {"along": circle(), "noise": 0.1}], ids=["sobol", "along"]
+)
 def test_a_worker_that_dies_is_replaced_and_the_parts_are_the_same(
-    arm: DynamicsModel, tmp_path: Path
+    arm: DynamicsModel, tmp_path: Path, drawn: dict[str, Any]
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    what = Sampling(40_000, draw="sobol", rows=1000)
+    what = Sampling(40_000, rows=1000, **drawn)
     sampling.sample(arm, tmp_path / "whole", what)
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
     told: list[str] = []

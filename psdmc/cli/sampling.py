@@ -59,7 +59,8 @@ def sample(
     along: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="draw states at random times of this motion: a .csv, .parquet or .npz as of excite"
+            metavar="FILE",
+            help="draw states at random times of this motion: a .csv, .parquet or .npz as of excite",
         ),
     ] = None,
     noise: Annotated[

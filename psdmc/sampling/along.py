@@ -52,7 +52,7 @@ class Motion:
             )
         for what in ("time", "q", "qd", "qdd"):
             values = getattr(self, what)
-            odd = [] if values is None else np.argwhere(~np.isfinite(values))
+            odd = np.argwhere(~np.isfinite(() if values is None else values))
             if len(odd):
                 raise InputError(
                     f"{self.name}: {what}, row {odd[0][0] + 1}: no finite number", "correct the row"

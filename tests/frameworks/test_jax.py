@@ -142,7 +142,7 @@ def test_every_ruled_function_has_both_modes(name: str, function: str) -> None:
 @pytest.mark.parametrize("mode", ["jacfwd", "jacrev"])
 @pytest.mark.parametrize("name", slow_but_for(["scara"], ["scara", "hopper", "kr6"]))
 def test_gravity_has_its_own_gradient(name: str, mode: str) -> None:
-    """Results under another gravity, and derivatives by gravity and the other inputs, are Pinocchio's, jitted and vmapped."""
+    """Results under another gravity are Pinocchio's, and derivatives by gravity and the other inputs, jitted and vmapped."""
     robot, q, qd, tau = psdmc.jax(weighed(name), gravity_input=True), *state(name)
     gravity = np.array([1.0, -3.0, -8.0])
     turned, by_gravity = pulled(name, gravity), torques_of_gravity(name, q)

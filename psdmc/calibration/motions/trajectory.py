@@ -113,7 +113,9 @@ def read_motion(path: Path, chain: Mechanism) -> tuple[tuple[str, ...], Array, t
         missing = [column for column in wanted if column not in columns]
         if (missing and len(missing) < len(wanted)) or "time_s" not in columns or not names:
             lacking = listed(missing) if missing and names else "time_s" if names else "position_rad.<joint>"
-            raise InputError(f"{path}: no column(s) {lacking}", "a motion has time_s and position_rad.<joint>")
+            raise InputError(
+                f"{path}: no column(s) {lacking}", "a motion has time_s and position_rad.<joint>"
+            )
         parts.append(None if missing else np.column_stack([columns[column] for column in wanted]))
     return names, columns["time_s"], tuple(parts)
 
