@@ -282,7 +282,9 @@ class _Operator:
             kernel, own = f"{kernel}_theta", [theta_b.contiguous()]
         elif theta_b is not None:
             kernel, named = f"{kernel}{THETA_ROWS}", [*named, (THETA_B, theta_b)]
-        rows = [tensor.expand((*lead, *self.robot.shape(quantity))).contiguous() for quantity, tensor in named]
+        rows = [
+            tensor.expand((*lead, *self.robot.shape(quantity))).contiguous() for quantity, tensor in named
+        ]
         places = [tensor.data_ptr() for tensor in (*rows, *own, *made)]
         self.robot.compiled(inputs[0].dtype).call_at(kernel, math.prod(lead), places)
         return made[0] if len(made) == 1 else tuple(made)
