@@ -463,7 +463,14 @@ def test_gravity_is_an_input_with_derivatives(adapter: str, tmp_path: Path) -> N
     differences of Pinocchio's."""
     names, pull = ["inverse_dynamics", "forward_dynamics"], np.array([3.0, -2.0, 6.0])
     own = {"adapters": [adapter], "gravity_input": True}
-    emit_c(weighed_model("scara"), tmp_path / "c", "factored", names, name="scara", **own)  # type: ignore[arg-type]
+    emit_c(
+        weighed_model("scara"),
+        tmp_path / "c",
+        "factored",
+        [*names, "inverse_dynamics_vjp"],
+        name="scara",
+        **own,
+    )  # type: ignore[arg-type]
     assert not (tmp_path / "c" / "src" / "forward_dynamics_derivatives.c").exists()
     of, theta = built("scara", tmp_path / "c", adapter=adapter), [np.asarray(weighed_model("scara").theta_b)]
     ending, more = ("_theta", theta) if adapter == "casadi_theta" else ("", [])
