@@ -353,7 +353,7 @@ def test_wrong_arguments_are_refused() -> None:
 def test_the_handler_checks_arrays_itself() -> None:
     """Whoever calls it from another program: with a number of no function, too few arrays, or arrays that do not fit."""
     robot = robot_of("scara")
-    number = robot._kernel(SIGNATURES["gravity"], False).number
+    number = robot._kernel(SIGNATURES["gravity"], False).number(by_rows=False)
 
     def call(number: int, *given: Array) -> Any:
         out = jax.ShapeDtypeStruct((2, 4), np.float64)
