@@ -267,7 +267,9 @@ def compare_emitted(
     for option, value in (given or {}).items():
         if option in ("functions", "with"):
             value = (
-                chosen(listed(value)) if option == "with" else functions_of(model, value, recorded["with"])
+                chosen(listed(value))
+                if option == "with"
+                else functions_of(model, value, recorded["with"], "gravity-input" in recorded)
             )
         had = recorded.get(option)
         if value == had:

@@ -51,14 +51,14 @@ def emission(
 ) -> Emission:
     """Return what a back end receives for a model: the kernels of its functions, facts and reference states. The arguments
     are those of `compiler.emit_c`. Raises InputError as that does."""
-    names = functions_of(model, functions, adapters)
+    names = functions_of(model, functions, adapters, gravity_input)
     law = _friction_in_dynamics(model, friction, smoothing_speed)
     if estimator and law is not None:
         raise InputError(
             "an estimator cannot have friction in the dynamics: its torques contain no friction",
             "write --friction, and subtract the torques of R_friction from those of the motors",
         )
-    _check_gravity_input(gravity_input, estimator, adapters)
+    _check_gravity_input(gravity_input, estimator)
     require(model, names)
     costs = options.target.costs
     key = (model.content_hash, lowering, repr(costs), *names)
@@ -86,16 +86,15 @@ def emission(
     return Emission(info, kernels, options, references, tuple(adapters), momenta)
 
 
-def _check_gravity_input(gravity_input: object, estimator: str | None, adapters: Sequence[str]) -> None:
+def _check_gravity_input(gravity_input: object, estimator: str | None) -> None:
     """InputError where gravity cannot be an input."""
     if not isinstance(gravity_input, bool):
         raise InputError(
             f"gravity_input is {gravity_input!r}, expected True or False", "the default is False"
         )
-    wanting = "an estimator" if estimator else f"--with {adapters[0]}" if adapters else None
-    if gravity_input and wanting:
+    if gravity_input and estimator:
         raise InputError(
-            f"{wanting} cannot have gravity as an input: its own functions give none",
+            "an estimator cannot have gravity as an input: its own functions give none",
             "leave --gravity-input out, or write two packages",
         )
 
@@ -114,11 +113,11 @@ def _friction_in_dynamics(
 
 
 def functions_of(
-    model: DynamicsModel, functions: Sequence[str] | str | None, adapters: Sequence[str]
+    model: DynamicsModel, functions: Sequence[str] | str | None, adapters: Sequence[str], gravity_input: bool
 ) -> tuple[str, ...]:
     """Return the functions of a package, with those that its adapters need."""
     named = wanted(functions, model.mechanism)
-    return wanted(with_needed(named, adapters, model.nq > model.nv), model.mechanism)
+    return wanted(with_needed(named, adapters, model.nq > model.nv, gravity_input), model.mechanism)
 
 
 def emit_options(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import time
 import zlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,16 +22,19 @@ from command_line import typed
 from full_disk import files_of_at_most
 from random_trees import RandomTree
 from robots_at_hand import subject
+from scipy.interpolate import BPoly
 from scipy.stats import qmc
 from unoptimised import without_optimisation
 
 import psdmc
 from psdmc import cluster, sampling
+from psdmc.calibration.logs.log_files import write_columns
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError, ToolchainError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import file_bytes
-from psdmc.sampling import Sampled, Sampling
+from psdmc.sampling import Motion, Sampled, Sampling, parts
+from psdmc.sampling.plan import Plan
 
 parquet = pytest.importorskip("pyarrow.parquet")
 
@@ -130,6 +135,156 @@ def test_sobols_points_are_scipys_also_after_an_interruption(arm: DynamicsModel,
     for k, name in enumerate(("q", "qd", "qdd")):
         low, high = map(np.array, low_high[name])
         np.testing.assert_allclose(own[name], low + (high - low) * shares[:, 2 * k : 2 * k + 2], atol=1e-14)
+
+
+def circle(rows: int = 400) -> Motion:
+    """A motion in closed form whose joints swing, at uneven times from 1 s to 5 s, with rates and accelerations."""
+    t = 1.0 + 4.0 * np.linspace(0.0, 1.0, rows) ** 1.2
+    q = np.column_stack([np.sin(t), 0.5 * np.cos(2.0 * t)])
+    qd = np.column_stack([np.cos(t), -np.sin(2.0 * t)])
+    return Motion(
+        "circle", ("shoulder", "elbow"), t, q, qd, np.column_stack([-np.sin(t), -2.0 * np.cos(2.0 * t)])
+    )
+
+
+ALONG = Sampling(500, ("inverse_dynamics",), rows=200, along=circle())
+
+
+@pytest.mark.parametrize(("given", "exact"), [("q qd qdd", 1e-9), ("q qd", 1e-4), ("q", 1e-3)])
+def test_states_along_a_motion_are_those_of_its_times(
+    arm: DynamicsModel, tmp_path: Path, given: str, exact: float
+) -> None:
+    """Against the motion in closed form, at uniform times; with fewer columns, splines are less exact."""
+    whole = circle()
+    motion = replace(whole, qd=whole.qd if "qd" in given else None, qdd=whole.qdd if "qdd" in given else None)
+    sample(arm, tmp_path / "along", replace(ALONG, along=motion))
+    found = columns(tmp_path / "along")
+    (t,) = found["time"].T
+    assert list(found) == ["time", "q", "qd", "qdd", "inverse_dynamics"]
+    assert 1.0 <= t.min() < 1.1 < 4.9 < t.max() < 5.0
+    assert abs(t.mean() - 3.0) < 4.0 * 4.0 / np.sqrt(12.0 * 500)
+    near(found["q"], np.column_stack([np.sin(t), 0.5 * np.cos(2.0 * t)]), exact)
+    near(found["qd"], np.column_stack([np.cos(t), -np.sin(2.0 * t)]), 10.0 * exact)
+    near(found["qdd"], np.column_stack([-np.sin(t), -2.0 * np.cos(2.0 * t)]), 100.0 * exact)
+    states = [found[name] for name in ("q", "qd", "qdd")]
+    near(found["inverse_dynamics"], subject("two_link").pinocchio.inverse_dynamics(*states))
+
+
+def test_the_spline_is_scipys(arm: DynamicsModel) -> None:
+    """SciPy's polynomial of degree 5 through positions, rates and accelerations of each pair of rows."""
+    motion = circle(12)
+    given = np.stack([motion.q, motion.qd, motion.qdd], axis=1)
+    expected, t = BPoly.from_derivatives(motion.time, given), np.linspace(1.0, 5.0, 99)
+    near(motion.spline(t), expected(t))
+    near(motion.spline.derivative(2)(t), expected.derivative(2)(t), 1e-11)
+
+
+def test_noise_along_a_motion(arm: DynamicsModel, tmp_path: Path) -> None:
+    """Normal, independent of each other, and of a tenth of each value's deviation."""
+    many = replace(ALONG, states=4000, rows=4096, draw="sobol")
+    sample(arm, tmp_path / "plain", many)
+    sample(arm, tmp_path / "noisy", replace(many, noise=0.1))
+    plain, noisy, motion = columns(tmp_path / "plain"), columns(tmp_path / "noisy"), circle()
+    errors = []
+    for name in ("q", "qd", "qdd"):
+        t = noisy["time"][:, 0]
+        exact = {"q": motion.spline, "qd": motion.spline.derivative(), "qdd": motion.spline.derivative(2)}[
+            name
+        ](t)
+        deviation = getattr(motion, name).std(axis=0)
+        errors.append((noisy[name] - exact) / (0.1 * deviation))
+        assert not np.array_equal(plain[name], noisy[name])
+    together = np.hstack(errors)
+    assert np.abs(together.mean(axis=0)).max() < 0.05
+    assert np.abs(np.cov(together.T) - np.eye(6)).max() < 0.06
+
+
+def test_parts_along_a_motion_are_made_again_alike(arm: DynamicsModel, tmp_path: Path) -> None:
+    noisy = replace(ALONG, noise=0.1, real="float32")
+    sample(arm, tmp_path / "c", noisy)
+    before = hashes(tmp_path / "c")
+    (tmp_path / "c" / "part-000001.parquet").unlink()
+    assert sample(arm, tmp_path / "c", noisy).before == 2
+    assert hashes(tmp_path / "c") == before
+    other = circle()
+    other.q[7, 1] += 1e-9
+    with pytest.raises(InputError, match="holds another sampling, whose along is"):
+        sample(arm, tmp_path / "c", replace(noisy, along=other))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"functions": ("forward_dynamics",)}, "a motion does not give tau"),
+        ({"given": {"speed": 1.0}}, "--speed with --along"),
+        ({"along": None, "noise": 0.1}, "--noise without --along"),
+        ({"noise": -0.1}, "--noise is -0.1"),
+    ],
+)
+def test_what_a_motion_does_not_give_is_refused(
+    arm: DynamicsModel, tmp_path: Path, change: dict[str, object], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        sample(arm, tmp_path / "c", replace(ALONG, **change))  # type: ignore[arg-type]
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("time_s,position_rad.shoulder\n0,0\n1,1\n2,1\n3,1\n", r"no positions of joint\(s\) elbow"),
+        (
+            "time_s,position_rad.shoulder,position_m.elbow\n0,0,0\n",
+            r"position of joint\(s\) elbow in another unit",
+        ),
+        ("position_rad.shoulder,position_rad.elbow\n0,0\n", r"no column\(s\) time_s"),
+        ("time_s,tau\n0,0\n", r"no column\(s\) position_rad.<joint>"),
+        ("{head},velocity_rad_s.elbow\n0,0,0,0\n", r"no column\(s\) velocity_rad_s.shoulder"),
+        ("{head}\n0,0,0\n1,1,1\n1,1,1\n2,0,0\n", "row 3: the time does not grow"),
+        ("{head}\n0,0,0\n1,1,1\n2,nan,1\n3,0,0\n", "q, row 3: no finite number"),
+        ("{head}\n0,0,0\n1,1,1\n", "2 rows, expected 4 or more"),
+    ],
+)
+def test_files_that_are_no_motion_are_refused(
+    arm: DynamicsModel, tmp_path: Path, rows: str, said: str
+) -> None:
+    (tmp_path / "model.npz").write_bytes(file_bytes(arm))
+    head = "time_s,position_rad.shoulder,position_rad.elbow"
+    (tmp_path / "motion.csv").write_text(rows.replace("{head}", head))
+    words = ["-o", tmp_path / "c", "--states", "9", "--along", tmp_path / "motion.csv"]
+    done = typed("sample", tmp_path / "model.npz", *words)
+    assert done.returncode == 2, done.stderr
+    assert re.search(said, done.stderr), done.stderr
+    assert not (tmp_path / "c").exists()
+
+
+def test_the_command_draws_along_a_file_of_excite(arm: DynamicsModel, tmp_path: Path) -> None:
+    """The joints may stand in another order than the robot's, and more joints may be there."""
+    (tmp_path / "model.npz").write_bytes(file_bytes(arm))
+    whole = circle()
+    table = {"time_s": whole.time, "position_rad.gripper": whole.time}
+    for k, name in ((1, "elbow"), (0, "shoulder")):
+        table[f"position_rad.{name}"] = whole.q[:, k]
+        table[f"velocity_rad_s.{name}"] = whole.qd[:, k]
+        table[f"acceleration_rad_s2.{name}"] = whole.qdd[:, k]
+    table |= {f"{column}.gripper": whole.time for column in ("velocity_rad_s", "acceleration_rad_s2")}
+    write_columns(table, tmp_path / "motion.npz")
+    words = [
+        "-o",
+        tmp_path / "c",
+        "--states",
+        "500",
+        "--part-states",
+        "200",
+        "--along",
+        tmp_path / "motion.npz",
+    ]
+    with without_optimisation():
+        done = typed("sample", tmp_path / "model.npz", *words)
+    assert done.returncode == 0, done.stderr
+    assert "columns: time (1), q (2), qd (2), qdd (2), inverse_dynamics (2)" in done.stdout
+    sample(arm, tmp_path / "python", ALONG)
+    assert hashes(tmp_path / "c") == hashes(tmp_path / "python")
 
 
 def test_single_precision_gives_the_values_of_the_states_that_it_writes(
@@ -301,7 +456,7 @@ def test_a_disk_that_is_too_small_is_refused_before_the_work(arm: DynamicsModel,
 def test_without_pyarrow_it_says_what_to_install(
     arm: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sampling, "find_spec", lambda name: None)
+    monkeypatch.setattr(parts, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="psdmc sample needs pyarrow") as caught:
         sample(arm, tmp_path / "new")
     assert caught.value.hint == "pip install 'psdmc[sample]'"
@@ -363,11 +518,14 @@ def test_a_process_that_is_killed_leaves_the_parts_of_one_that_is_not(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "drawn", [{"draw": "sobol"}, {"along": circle(), "noise": 0.1}], ids=["sobol", "along"]
+)
 def test_a_worker_that_dies_is_replaced_and_the_parts_are_the_same(
-    arm: DynamicsModel, tmp_path: Path
+    arm: DynamicsModel, tmp_path: Path, drawn: dict[str, Any]
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    what = Sampling(40_000, draw="sobol", rows=1000)
+    what = Sampling(40_000, rows=1000, **drawn)
     sampling.sample(arm, tmp_path / "whole", what)
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
     told: list[str] = []
@@ -387,10 +545,10 @@ def test_a_worker_that_dies_is_replaced_and_the_parts_are_the_same(
 
 
 def test_workers_with_other_versions_are_refused(arm: DynamicsModel) -> None:
-    plan = sampling._Plan(arm, WHAT)
+    plan = Plan(arm, WHAT)
     other = json.dumps({**plan.manifest, "numpy": "1.0"})
     with pytest.raises(InputError, match=r"a worker's numpy is '.*', not '1\.0'"):
-        sampling._of_worker(zlib.compress(file_bytes(arm)), WHAT, other, 0)
+        parts._of_worker(zlib.compress(file_bytes(arm)), WHAT, other, 0)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(

@@ -1,4 +1,4 @@
-"""The command `psdmc sample`: compute functions of a robot at random states within its limits."""
+"""The command `psdmc sample`: compute functions of a robot at random states, within its limits or along a motion."""
 
 from __future__ import annotations
 
@@ -56,6 +56,19 @@ def sample(
         int | None,
         typer.Option(metavar="NUMBER", help="states of a file", show_default="a file has up to 64 MiB"),
     ] = None,
+    along: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="draw states at random times of this motion: a .csv, .parquet or .npz as of excite",
+        ),
+    ] = None,
+    noise: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE", help="with --along: add noise, as a share of each value's standard deviation"
+        ),
+    ] = 0.0,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -65,9 +78,15 @@ def sample(
 ) -> None:
     """Compute functions at random states within the robot's limits, and write Parquet files. An interrupted run goes on."""
     from psdmc.model.load import load
-    from psdmc.sampling import Sampling
+    from psdmc.sampling import Motion, Sampling
     from psdmc.sampling import sample as write
 
+    robot, motion = load(model), None
+    if along is not None:
+        from psdmc.calibration.motions.trajectory import read_motion
+
+        joints, time, parts = read_motion(along, robot.mechanism)
+        motion = Motion(str(along), joints, time, *parts)  # type: ignore[arg-type]
     limits = {"position": position, "speed": speed, "acceleration": acceleration, "effort": effort}
     what = Sampling(
         _count(states),
@@ -78,9 +97,11 @@ def sample(
         theta_spread,
         {word: value for word, value in limits.items() if value is not None},
         part_states,
+        motion,
+        noise,
     )
     with steps() as progress:
-        found = write(load(model), output, what, progress, scheduler)
+        found = write(robot, output, what, progress, scheduler)
     before = f"; {found.before} of them were there" if found.before else ""
     files = "1 part" if found.parts == 1 else f"{found.parts} parts"
     print(f"{output}: {found.states} states in {files}, {found.bytes / 1e6:.1f} MB{before}")

@@ -23,6 +23,7 @@ def jax(
     real: Real | None = None,
     trig: Trig | None = None,
     target: str | Target = NATIVE,
+    gravity_input: bool = False,
 ) -> JaxRobot:
     """Return an object whose methods compute a model's dynamics on arrays of JAX. They run compiled code on the CPU.
 
@@ -30,8 +31,10 @@ def jax(
     inside jax.jit, vmap, grad, jvp, jacfwd, jacrev, lax.scan and lax.map. psdmc compiles a function when JAX
     first traces it.
 
-    model  a model, or the path of a model file
-    real   precision of all arrays, "float64" or "float32"; None: float64
+    model          a model, or the path of a model file
+    real           precision of all arrays, "float64" or "float32"; None: float64
+    gravity_input  True: methods whose results depend on gravity have the argument `gravity`, (3,) or (..., 3), m/s^2, with
+                   its own gradient. The default is the gravity of the model, which you derive with `gravity_input=True`
 
     `compile` and `emit_c` explain the other options. Raises InputError if the precision is float64 and JAX's option
     jax_enable_x64 is off. Raises ToolchainError if JAX is not installed.
@@ -43,7 +46,7 @@ def jax(
         from psdmc.frameworks.jax_robot import jax_robot
     except ModuleNotFoundError as error:
         raise _missing(error, "JAX", "jax", "jaxlib") from error
-    return jax_robot(model, lowering, real, trig, target)
+    return jax_robot(model, lowering, real, trig, target, gravity_input)
 
 
 def torch(
@@ -51,6 +54,7 @@ def torch(
     lowering: Lowering = "auto",
     trig: Trig | None = None,
     target: str | Target = NATIVE,
+    gravity_input: bool = False,
 ) -> TorchRobot:
     """Return an object whose methods compute a model's dynamics on tensors of PyTorch. They run compiled code on the CPU.
 
@@ -58,7 +62,9 @@ def torch(
     gradients. They also work inside torch.compile and torch.func.vmap, grad, jvp, jacrev and jacfwd. psdmc compiles a
     function when you first call it, separately for float32 and float64.
 
-    model  a model, or the path of a model file
+    model          a model, or the path of a model file
+    gravity_input  True: methods whose results depend on gravity have the argument `gravity`, (3,) or (..., 3), m/s^2, with
+                   its own gradient. The default is the gravity of the model, which you derive with `gravity_input=True`
 
     `compile` and `emit_c` explain the other options. Raises ToolchainError if PyTorch is not installed.
 
@@ -69,7 +75,7 @@ def torch(
         from psdmc.frameworks.torch_robot import torch_robot
     except ModuleNotFoundError as error:
         raise _missing(error, "PyTorch", "torch") from error
-    return torch_robot(model, lowering, trig, target)
+    return torch_robot(model, lowering, trig, target, gravity_input)
 
 
 def _missing(error: ModuleNotFoundError, library: str, *modules: str) -> Exception:

@@ -23,10 +23,11 @@ from jax.interpreters import ad, batching, mlir
 from psdmc.compiler import compile
 from psdmc.errors import InputError
 from psdmc.frameworks import xla
+from psdmc.frameworks.coordinates import Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
     Arrays,
-    Coordinates,
+    Rule,
     refuse_constant,
     require_rule,
 )
@@ -34,6 +35,7 @@ from psdmc.functions import SIGNATURES
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
+from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Real, Target, Trig
@@ -55,16 +57,17 @@ def jax_robot(
     real: Real | None,
     trig: Trig | None,
     target: str | Target,
+    gravity_input: bool,
 ) -> JaxRobot:
     """Return the robot of a model for JAX. Equal arguments give the same object; `psdmc.jax` explains them."""
     found = model_of(model)
-    compiled = compile(found, lowering, real=real, trig=trig, target=target)
+    compiled = compile(found, lowering, real=real, trig=trig, target=target, gravity_input=gravity_input)
     if compiled.dtype == np.float64 and not jax.config.jax_enable_x64:
         raise InputError(
             f"{compiled.name}: the precision is float64, and JAX's option jax_enable_x64 is off",
             'call jax.config.update("jax_enable_x64", True) first, or give real="float32"',
         )
-    key = repr((found.content_hash, lowering, real, trig, target))
+    key = repr((found.content_hash, lowering, real, trig, target, gravity_input))
     robot, chain = compiled, found.mechanism
     sizes = Sizes(
         robot.n,
@@ -106,8 +109,12 @@ class JaxRobot:
     def __repr__(self) -> str:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"
 
-    def call(self, function: Signature, inputs: Sequence[Any], theta_b: Any = None) -> Any:
+    def call(
+        self, function: Signature, inputs: Sequence[Any], theta_b: Any = None, gravity: Any = None
+    ) -> Any:
         """Call a generated function of the robot; `function` is an entry of `psdmc.functions.SIGNATURES`."""
+        made = results(function) if len(function.outputs) > 1 else None
+        function, inputs = self.compiled.with_gravity(function, inputs, gravity)
         if not function.inputs:
             return jnp.asarray(getattr(self.compiled, function.name)())
         pairs = zip(function.inputs, inputs, strict=True)
@@ -118,7 +125,7 @@ class JaxRobot:
         if function.name in ON_COORDINATES:
             return getattr(self._coordinates, ON_COORDINATES[function.name])(*given)
         found = _call.bind(*given, kernel=kernel)
-        return found[0] if len(found) == 1 else results(function)(*found)
+        return found[0] if made is None else made(*found)
 
     def _checked(self, function: Signature, quantity: Quantity, given: Any) -> Array:
         """An input as an array (..., *axes of one state), q with quaternions of length one."""
@@ -162,8 +169,9 @@ def _method(function: Signature) -> Callable[..., Any]:
     def method(self: JaxRobot, *given: Any, **named: Any) -> Any:
         if "out" in named:
             raise TypeError(f"{function.name}(): a function of JAX has no argument 'out'")
+        gravity = named.pop(GRAVITY.name, None)
         inputs, theta_b, _ = bound_arguments(function, given, named)
-        return self.call(function, inputs, theta_b)
+        return self.call(function, inputs, theta_b, gravity)
 
     method.__name__, method.__doc__ = function.name, documentation(function)
     method.__qualname__ = f"{JaxRobot.__name__}.{function.name}"
@@ -216,6 +224,11 @@ class Kernel:
         packed = any("nonzeros" in output.axes for output in self.function.outputs)
         return replace(sizes, nonzeros=len(self.robot.compiled.pattern(name)[0])) if packed else sizes
 
+    @property
+    def rule(self) -> Rule:
+        """Return the rule that differentiates the function. Raises ArgumentError if psdmc has none."""
+        return require_rule(self.function.name, GRAVITY in self.function.inputs)
+
     def number(self, by_rows: bool) -> int:
         """Return the number under which XLA finds the compiled function. If the function is not compiled yet, psdmc
         compiles it.
@@ -242,14 +255,22 @@ class _Rules:
     """JAX as the rules of differentiation.py see it.
 
     theta_b  (l,) or (..., l); None: the robot's own
+    gravity  (..., 3), for functions with this input; None: zero, where its effects cancel
     """
 
     robot: JaxRobot
     theta_b: Array | None
+    gravity: Array | None = None
     arrays: Any = jnp
 
+    def under(self, gravity: Array) -> _Rules:
+        return replace(self, gravity=gravity)
+
     def call(self, name: str, *inputs: Array) -> Arrays:
-        function = SIGNATURES[name]
+        function, inputs = self.robot.compiled.with_gravity(SIGNATURES[name], inputs)
+        if GRAVITY in function.inputs:
+            own_gravity = jnp.zeros(3, inputs[0].dtype) if self.gravity is None else self.gravity
+            inputs = (*inputs[:-1], own_gravity)
         kernel = self.robot._kernel(function, self.theta_b is not None and function.theta)
         own = self.theta_b if kernel.theta else None
         return tuple(_call.bind(*kernel.given(inputs, own), kernel=kernel))
@@ -328,7 +349,7 @@ def _differentiated(
     if not any(moves):
         return outs, [ad.Zero.from_primal_value(out) for out in outs]
     function, coordinates = kernel.function, kernel.robot._coordinates
-    rule = require_rule(function.name)
+    rule = kernel.rule
     count = len(function.inputs)
     linear = []
     for quantity, q, tangent, moved in zip(function.inputs, primals, tangents, moves, strict=False):
@@ -376,7 +397,7 @@ class _Parts:
     @classmethod
     def of(cls, given: Sequence[Any], kernel: Kernel) -> _Parts:
         count = len(kernel.function.inputs)
-        constant = require_rule(kernel.function.name).constant
+        constant = kernel.rule.constant
         at = iter(range(count + kernel.theta, len(given)))
         places = tuple(None if quantity.name in constant else next(at) for quantity in kernel.function.inputs)
         theta_b = given[count] if kernel.theta else None
@@ -384,14 +405,14 @@ class _Parts:
 
 
 def _tangents(*given: Array, kernel: Kernel, by_theta: bool) -> list[Array]:
-    parts, rule = _Parts.of(given, kernel), require_rule(kernel.function.name)
+    parts, rule = _Parts.of(given, kernel), kernel.rule
     tangents = tuple(None if at is None else given[at] for at in parts.places)
     return list(rule.along(parts.rules, parts.inputs, tangents, given[-1] if by_theta else None))
 
 
 def _transposed(cotangents: Sequence[Any], *given: Any, kernel: Kernel, by_theta: bool) -> list[Any]:
     """Gradients, by the linear arguments; None for the others."""
-    parts, rule = _Parts.of(given, kernel), require_rule(kernel.function.name)
+    parts, rule = _Parts.of(given, kernel), kernel.rule
     weights = tuple(map(ad.instantiate_zeros, cotangents))
     gradients, theta = rule.back(parts.rules, parts.inputs, weights, by_theta)
     found: list[Any] = [None] * len(given)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -19,9 +19,9 @@ from torch._functorch.utils import enable_single_level_autograd_function
 from torch.autograd.function import _SingleLevelFunction
 
 from psdmc.compiler import compile as compiled
+from psdmc.frameworks.coordinates import Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
-    Coordinates,
     Rule,
     refuse_constant,
     require_rule,
@@ -30,12 +30,15 @@ from psdmc.frameworks.differentiation import (
 from psdmc.functions import SIGNATURES
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.general_gravity import for_every_gravity
 from psdmc.model.load import model_of
+from psdmc.program.gravity_input import GRAVITY, takes_gravity
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
+from psdmc.toolchain.call_arguments import with_gravity
 from psdmc.toolchain.compiled_functions import results
 from psdmc.toolchain.stubs import arguments
 
@@ -65,12 +68,16 @@ def torch_robot(
     lowering: Lowering = "auto",
     trig: Trig | None = None,
     target: str | Target = NATIVE,
+    gravity_input: bool = False,
 ) -> TorchRobot:
     """Return the robot of a model for PyTorch. Equal options give the same object; `psdmc.torch` explains the options."""
     found = model_of(model)
-    key = hashlib.sha256(repr((found.content_hash, lowering, trig, target)).encode()).hexdigest()
+    options = (lowering, trig, target, gravity_input)
+    key = hashlib.sha256(repr((found.content_hash, *options)).encode()).hexdigest()
     if key not in _ROBOTS:
-        _ROBOTS[key] = TorchRobot(found, (lowering, trig, target), key)
+        if gravity_input:
+            for_every_gravity(found)  # raises InputError for a model without all parameters
+        _ROBOTS[key] = TorchRobot(found, options, key)
     return _ROBOTS[key]
 
 
@@ -92,9 +99,10 @@ class TorchRobot:
         """The model, with the names, sizes and limits of the robot."""
         self.coordinates = Coordinates.of(model.mechanism, ARRAYS)
         self._options = options
+        self._gravity = tuple(model.mechanism.gravity.tolist()) if options[-1] else None
         self._compiled: dict[Any, CompiledRobot[Any]] = {}
         self._operators = {
-            name: _Operator(self, function).registered(f"{name}_{key[:16]}")
+            name: _Operator(self, self.signature(function)).registered(f"{name}_{key[:16]}")
             for name, function in SIGNATURES.items()
             if function.inputs
         }
@@ -111,9 +119,14 @@ class TorchRobot:
     def compiled(self, dtype: Any = torch.float64) -> CompiledRobot[Any]:
         """Return the CompiledRobot that the methods call for tensors of the given floating-point type."""
         if dtype not in self._compiled:
-            lowering, trig, target = self._options
+            lowering, trig, target, gravity_input = self._options
             self._compiled[dtype] = compiled(
-                self.model, lowering, real=REALS[dtype], trig=trig, target=target
+                self.model,
+                lowering,
+                real=REALS[dtype],
+                trig=trig,
+                target=target,
+                gravity_input=gravity_input,
             )
         return self._compiled[dtype]
 
@@ -129,6 +142,16 @@ class TorchRobot:
         rows, closed = chain.rows_of_contacts, chain.rows_of_loops
         sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), 0, rows, closed)
         return sizes.shape(quantity.axes)
+
+    def signature(self, function: Signature) -> Signature:
+        """Return the signature of the function's operator, whose last input can be gravity."""
+        return function if self._gravity is None else takes_gravity(function)
+
+    def gravity_of(self, function: Signature, like: Tensor, gravity: Tensor | None) -> tuple[Tensor, ...]:
+        """Return gravity as the operator's input, or no tensor if the operator has no such input. The default is the
+        model's gravity. Raises InputError if gravity is given and no input."""
+        own = None if self._gravity is None else like.new_tensor(self._gravity)
+        return with_gravity(self.model.mechanism.name, function, (), gravity, own)[1]
 
     def operator(self, function: str) -> Any:
         """Return PyTorch's operator that calls a generated function on tensors, and theta_b or None."""
@@ -153,6 +176,7 @@ def _method(function: Signature) -> Callable[..., Any]:
     required = len(function.inputs)
 
     def method(self: TorchRobot, *given: Tensor, **named: Tensor) -> Any:
+        gravity = named.pop(GRAVITY.name, None)
         missing = [name for name in names[len(given) : required] if name not in named]
         if missing or len(given) > len(names) or any(name not in names[len(given) :] for name in named):
             got = ", ".join([f"{len(given)} tensors", *named])
@@ -160,8 +184,10 @@ def _method(function: Signature) -> Callable[..., Any]:
         tensors = [*given, *(named.get(name) for name in names[len(given) :])]
         for name, tensor in zip(names, tensors, strict=True):
             _refuse_elsewhere(f"{function.name}: {name}", tensor, is_optional=name == "theta_b")
+        _refuse_elsewhere(f"{function.name}: {GRAVITY.name}", gravity, is_optional=True)
         if function.name in ON_COORDINATES:
             return self._on_coordinates(function, tensors)
+        tensors[required:required] = self.gravity_of(function, tensors[0], gravity)
         found = self.operator(function.name)(*tensors)
         return result(*found) if len(function.outputs) > 1 else found
 
@@ -202,11 +228,20 @@ class _Calls:
 
     robot: TorchRobot
     theta_b: Tensor
+    gravity: Tensor | None = None
     arrays: ClassVar[Any] = ARRAYS
 
+    def under(self, gravity: Tensor) -> _Calls:
+        return replace(self, gravity=gravity)
+
     def call(self, function: str, *inputs: Tensor) -> tuple[Tensor, ...]:
+        signature = self.robot.signature(SIGNATURES[function])
+        none = (
+            inputs[0].new_zeros(3) if self.gravity is None else self.gravity
+        )  # zero where its effects cancel
+        gravity = (none,) if GRAVITY in signature.inputs else ()
         theta = (self.theta_b,) if SIGNATURES[function].theta else ()
-        found = self.robot.operator(function)(*inputs, *theta)
+        found = self.robot.operator(function)(*inputs, *gravity, *theta)
         return found if isinstance(found, tuple) else (found,)
 
 
@@ -247,7 +282,9 @@ class _Operator:
             kernel, own = f"{kernel}_theta", [theta_b.contiguous()]
         elif theta_b is not None:
             kernel, named = f"{kernel}{THETA_ROWS}", [*named, (THETA_B, theta_b)]
-        rows = [tensor.expand(*lead, *self.robot.shape(quantity)).contiguous() for quantity, tensor in named]
+        rows = [
+            tensor.expand((*lead, *self.robot.shape(quantity))).contiguous() for quantity, tensor in named
+        ]
         places = [tensor.data_ptr() for tensor in (*rows, *own, *made)]
         self.robot.compiled(inputs[0].dtype).call_at(kernel, math.prod(lead), places)
         return made[0] if len(made) == 1 else tuple(made)
@@ -358,7 +395,8 @@ class _Operator:
                 f"{first} has no second derivatives",
                 "leave out create_graph=True, or take differences of first derivatives",
             )
-        rule = require_rule(name)
+        gravity = [moved for each, moved in zip(self.function.inputs, moves, strict=False) if each is GRAVITY]
+        rule = require_rule(name, bool(gravity), any(gravity))
         for given, moved in zip(arguments(self.function), moves, strict=True):
             if moved and (given in rule.constant or (given == THETA_B.name and not rule.parameters)):
                 raise refuse_constant(name, given)

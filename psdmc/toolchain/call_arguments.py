@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.gravity_input import GRAVITY, takes_gravity
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.real_arrays import AxisNames, real_array
 from psdmc.robot.unit_lengths import refuse_other_lengths
@@ -53,6 +53,24 @@ def bound_arguments(
     _, *values, out = bound.arguments.values()
     count = len(function.inputs)
     return tuple(values[:count]), *(values[count:] or [None]), out
+
+
+def with_gravity(
+    robot: str, function: Signature, inputs: Sequence[Any], gravity: Any, own: Any
+) -> tuple[Signature, tuple[Any, ...]]:
+    """Return the signature of a function and its inputs, with gravity as the last input if the robot's code has it. Raises
+    InputError if a gravity is given, and the function has no such input.
+
+    own  gravity that is the default; None: no function of the robot's code has gravity as an input
+    """
+    if own is not None and function.depends_on_gravity:
+        return takes_gravity(function), (*inputs, own if gravity is None else gravity)
+    if gravity is not None:
+        raise InputError(
+            f"{robot}: {function.name} has no input gravity",
+            'compile with gravity_input=True; functions such as "mass_matrix" do not depend on gravity',
+        )
+    return function, tuple(inputs)
 
 
 @cache

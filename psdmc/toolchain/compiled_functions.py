@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
-from psdmc.program.gravity_input import GRAVITY, takes_gravity
+from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.robot.mechanism import ROW_NAMES
@@ -30,6 +30,7 @@ from psdmc.toolchain.call_arguments import (
     parameters,
     states,
     takes_results,
+    with_gravity,
     with_rows,
 )
 from psdmc.toolchain.interface import Interface, Origin, batch_symbol, single_symbol
@@ -273,7 +274,7 @@ class CompiledFunctions(RobotFacts):
         out       array into which psdmc writes the result, or a tuple of arrays for several results; optional
         gravity   (3,), or (..., 3), one gravity per state, for a robot compiled with `gravity_input=True`; optional
         """
-        function, inputs = self._with_gravity(function, inputs, gravity)
+        function, inputs = self.with_gravity(function, inputs, gravity)
         variant = "" if theta_b is None else "_theta"
         if has_rows(function, theta_b):
             variant = THETA_ROWS
@@ -299,19 +300,13 @@ class CompiledFunctions(RobotFacts):
         outs = kept or outs
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
-    def _with_gravity(
-        self, function: Signature, inputs: Sequence[ArrayLike], gravity: ArrayLike | None
-    ) -> tuple[Signature, Sequence[ArrayLike]]:
-        """The function with gravity among its inputs, if the package has it there."""
-        if self._interface.gravity_input and function.depends_on_gravity:
-            given = self.gravity_acceleration if gravity is None else gravity
-            return takes_gravity(function), (*inputs, given)
-        if gravity is not None:
-            raise InputError(
-                f"{self._robot}: {function.name} has no input gravity",
-                'compile with gravity_input=True; functions such as "mass_matrix" do not depend on gravity',
-            )
-        return function, inputs
+    def with_gravity(
+        self, function: Signature, inputs: Sequence[Any], gravity: Any = None
+    ) -> tuple[Signature, tuple[Any, ...]]:
+        """Return a function's signature and inputs, with gravity as the last input if the package has it there. Without
+        `gravity`, this is the model's. Raises InputError if gravity is given and no input."""
+        own = list(self._interface.gravity) if self._interface.gravity_input else None
+        return with_gravity(self._robot, function, inputs, gravity, own)
 
     def pattern(self, name: str) -> tuple[Array, Array]:
         """Return the row indices and the column indices, (k,) each, of the k matrix entries that can differ from zero.

@@ -300,7 +300,6 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--with", "casadi"), "--with casadi cannot have gravity as an input"),
         (("--estimator", "mass"), "an estimator cannot have gravity as an input"),
     ],
 )

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pinocchio as pin
+from bundled import under_gravity
 from robots_at_hand import in_wheel, loaded
 
 from psdmc.derivation.derive import derive_model
@@ -24,6 +25,9 @@ Array = np.ndarray
 
 RULED = tuple(name for name in SIGNATURES if rule_of(name))
 """Functions that can be differentiated."""
+
+WEIGHED = tuple(name for name in RULED if SIGNATURES[name].depends_on_gravity)
+"""Those whose results depend on gravity."""
 
 ROBOTS = ("scara", "hopper", "kr6", "Panda", "hyq")
 QUICK = ("scara", "hopper")
@@ -118,6 +122,24 @@ def differentiated(name: str) -> Subject:
             path.write_text(HOPPER)
             robot = load_robot(path, floating=True)
     return Subject(derive_model(robot.mechanism, expand=False), reference(robot))
+
+
+def weighed(name: str) -> DynamicsModel:
+    """A robot's model for functions with gravity as an input."""
+    own = differentiated(name).model
+    return own if own.nq != own.nv else derive_model(own.mechanism, gravity_input=True)
+
+
+def pulled(name: str, gravity: Array) -> Reference:
+    """The robot in Pinocchio, whose model has another gravity, (3,)."""
+    return under_gravity(differentiated(name).pinocchio, gravity)
+
+
+def torques_of_gravity(name: str, q: Array) -> Array:
+    """(nv, 3) the derivative of the torques by gravity at one state, from Pinocchio: torques are linear in gravity."""
+    still = np.zeros((1, differentiated(name).sizes.nv))
+    units = (pulled(name, unit) for unit in np.eye(3))
+    return np.column_stack([robot.inverse_dynamics(q[None], still, still)[0] for robot in units])
 
 
 def on_its_sole() -> DynamicsModel:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from differentiated import RULED, Array, differentiated, near
+from differentiated import RULED, WEIGHED, Array, differentiated, near, pulled
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 import psdmc
-from psdmc.frameworks.differentiation import ArgumentError, Coordinates, require_rule
+from psdmc.frameworks.coordinates import Coordinates
+from psdmc.frameworks.differentiation import ArgumentError, require_rule
 from psdmc.functions import SIGNATURES
 from psdmc.toolchain.call import CompiledRobot
 
@@ -40,12 +42,18 @@ class OnNumpy:
 
     arrays: Any = np
 
-    def __init__(self, robot: CompiledRobot[Any], theta_b: Array | None = None) -> None:
-        self.robot, self.theta_b = robot, theta_b
+    def __init__(
+        self, robot: CompiledRobot[Any], theta_b: Array | None = None, gravity: Array | None = None
+    ) -> None:
+        self.robot, self.theta_b, self.gravity = robot, theta_b, gravity
+
+    def under(self, gravity: Array) -> OnNumpy:
+        return OnNumpy(self.robot, self.theta_b, gravity)
 
     def call(self, function: str, *inputs: Array) -> tuple[Array, ...]:
         signature = SIGNATURES[function]
-        found = self.robot.call(signature, inputs, self.theta_b if signature.theta else None)
+        gravity = self.gravity if signature.depends_on_gravity else None
+        found = self.robot.call(signature, inputs, self.theta_b if signature.theta else None, None, gravity)
         return (found,) if len(signature.outputs) == 1 else tuple(found)
 
 
@@ -97,6 +105,41 @@ def test_slopes_by_theta_b(name: str) -> None:
     for found, values in zip(along, zip(ahead, behind, strict=True), strict=True):
         assert near(found, (values[0] - values[1]) / 2e-5, 1e-7)
     assert near(gradient @ way, by_state(zip(along, weights, strict=True)), 1e-12)
+
+
+PULL, WAY = np.array([1.0, -3.0, -8.0]), np.array([4.0, 2.0, -3.0])
+"""A gravity, and a direction in which it changes, m/s^2."""
+
+
+@pytest.mark.parametrize("name", slow_but_for([n for n in WEIGHED if "step" not in n], WEIGHED))
+def test_slopes_by_gravity(name: str) -> None:
+    """Against the difference of Pinocchio's results under two gravities, which are linear in gravity. By the other inputs,
+    against the slopes under the gravity given."""
+    own, function, rule = differentiated("hopper"), SIGNATURES[name], require_rule(name, gravity=True)
+    inputs, ways = own.drawn(function, COUNT)
+    share = 1e-3 if "euler" in name else 1.0  # orientations after a step are not linear
+    weighed, ahead, behind = (
+        replace(own, pinocchio=pulled("hopper", PULL + k * share * WAY)) for k in (0.0, 1.0, -1.0)
+    )
+    expected = weighed.slopes(function, inputs, ways)
+    is_constant = "gravity" in rule.constant
+    assert is_constant == ("rk4" in name)
+    for k, output in enumerate(function.outputs if not is_constant else ()):
+        there, back = (each.values(function, inputs)[output.name] for each in (ahead, behind))
+        moved = own.between(back, there) if output.axes == ("nq",) else there - back
+        expected[k] = expected[k] + moved / (2.0 * share)
+    each_way = np.tile(WAY, (COUNT, 1))
+    with without_optimisation():
+        on = OnNumpy(psdmc.compile(own.model, gravity_input=True), own.model.theta_b)
+        along = rule.along(on, (*inputs, PULL), (*ways, each_way), None)
+        weights = tuple(np.random.default_rng(1).normal(size=each.shape) for each in along)
+        gradients, _ = rule.back(on, (*inputs, PULL), weights, False)
+
+    for found, slope in zip(along, expected, strict=True):
+        assert near(found, slope, SOLVED if name in INVERTING else EXACT)
+    forward = by_state(zip(along, weights, strict=True))
+    pairs = zip(gradients, (*ways, each_way), strict=True)
+    assert near(by_state((g, way) for g, way in pairs if g is not None), forward, 1e-12)
 
 
 def test_maps_between_entries_of_q_and_the_tangent() -> None:

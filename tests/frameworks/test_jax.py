@@ -10,18 +10,31 @@ from typing import Any
 
 import numpy as np
 import pytest
-from differentiated import QUICK, ROBOTS, RULED, Array, differentiated, near, on_its_sole
+from differentiated import (
+    QUICK,
+    ROBOTS,
+    RULED,
+    Array,
+    differentiated,
+    near,
+    on_its_sole,
+    pulled,
+    torques_of_gravity,
+    weighed,
+)
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.errors import InputError
 from psdmc.frameworks.differentiation import ArgumentError, require_rule
-from psdmc.functions import SIGNATURES
+from psdmc.functions import RECIPES, SIGNATURES
 
 jax = pytest.importorskip("jax")
 jnp = jax.numpy
 check_grads = pytest.importorskip("jax.test_util").check_grads
+
+energy_of = RECIPES["potential_energy"].pinocchio
 
 EXACT, SOLVED = 1e-10, 1e-8
 """Of each Jacobian's largest entry; SOLVED where the mass matrix is inverted, and its condition comes in."""
@@ -124,6 +137,50 @@ def test_every_ruled_function_has_both_modes(name: str, function: str) -> None:
     assert float(sum((g * e).sum() for g, e in zip(gradients, entries, strict=True))) == pytest.approx(
         forward, rel=1e-10
     )
+
+
+@pytest.mark.parametrize("mode", ["jacfwd", "jacrev"])
+@pytest.mark.parametrize("name", slow_but_for(["scara"], ["scara", "hopper", "kr6"]))
+def test_gravity_has_its_own_gradient(name: str, mode: str) -> None:
+    """Results under another gravity are Pinocchio's, and derivatives by gravity and the other inputs, jitted and vmapped."""
+    robot, q, qd, tau = psdmc.jax(weighed(name), gravity_input=True), *state(name)
+    gravity = np.array([1.0, -3.0, -8.0])
+    turned, by_gravity = pulled(name, gravity), torques_of_gravity(name, q)
+    qdd, by_q, by_qd, inverse = turned.forward_dynamics_derivatives(q, qd, tau)
+    blocks = (of_entries(name, q, by_q), by_qd, inverse, -inverse @ by_gravity)
+
+    def forward(q: Any, qd: Any, tau: Any, gravity: Any) -> Any:
+        return robot.forward_dynamics(q, qd, tau, gravity=gravity)
+
+    jacobian = getattr(jax, mode)(forward, (0, 1, 2, 3))
+    assert near(jax.jit(forward)(q, qd, tau, gravity), qdd, EXACT)
+    for found, expected in zip(jax.jit(jacobian)(q, qd, tau, gravity), blocks, strict=True):
+        assert near(found, expected, EXACT)
+    many = jax.jit(jax.vmap(jacobian, (None, None, None, 0)))(q, qd, tau, jnp.stack([2.0 * gravity, gravity]))
+    assert near(many[3][1], blocks[3], EXACT)
+
+    def torques(gravity: Any) -> Any:
+        return robot.inverse_dynamics(q, qd, qdd, robot.compiled.theta_b, gravity=gravity)
+
+    assert near(torques(gravity), tau, EXACT)
+    assert near(getattr(jax, mode)(torques)(gravity), by_gravity, EXACT)
+    energy = jax.grad(lambda gravity: robot.potential_energy(q, gravity=gravity))(gravity)
+    energies = [energy_of(pulled(name, unit), {"q": q[None]})["U"][0] for unit in np.eye(3)]
+    assert near(energy, np.array(energies), EXACT)
+    assert near(robot.gravity(q), differentiated(name).pinocchio.gravity(q), EXACT)  # that of the file
+
+
+def test_gravity_where_it_is_no_input() -> None:
+    robot, q = psdmc.jax(weighed("scara"), gravity_input=True), jnp.zeros(4)
+    refused(
+        lambda: robot.mass_matrix(q, gravity=q[:3]), "mass_matrix has no input gravity", "gravity_input=True"
+    )
+    refused(lambda: robot_of("scara").gravity(q, gravity=q[:3]), "gravity has no input", "gravity_input=True")
+    refused(
+        lambda: robot.gravity(q, gravity=q), r"gravity: gravity has shape \(4,\), expected \(..., 3\)", ""
+    )
+    step = jax.grad(lambda gravity: robot.rk4_step(q, q, q, 0.01, gravity=gravity).qd_next.sum())
+    refused(lambda: step(q[:3]), "rk4_step has no derivative by gravity", "forward_dynamics")
 
 
 def test_functions_without_derivatives_are_called_too() -> None:
@@ -296,7 +353,7 @@ def test_wrong_arguments_are_refused() -> None:
 def test_the_handler_checks_arrays_itself() -> None:
     """Whoever calls it from another program: with a number of no function, too few arrays, or arrays that do not fit."""
     robot = robot_of("scara")
-    number = robot._kernel(SIGNATURES["gravity"], False).number
+    number = robot._kernel(SIGNATURES["gravity"], False).number(by_rows=False)
 
     def call(number: int, *given: Array) -> Any:
         out = jax.ShapeDtypeStruct((2, 4), np.float64)

@@ -10,7 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from differentiated import QUICK, ROBOTS, RULED, Array, differentiated, near, on_its_sole
+from differentiated import (
+    QUICK,
+    ROBOTS,
+    RULED,
+    WEIGHED,
+    Array,
+    differentiated,
+    near,
+    on_its_sole,
+    pulled,
+    torques_of_gravity,
+    weighed,
+)
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
@@ -110,6 +122,62 @@ def test_gradcheck(name: str, function: str) -> None:
             (theta,),
             check_forward_ad=True,
         )
+
+
+@pytest.mark.parametrize("mode", ["jacfwd", "jacrev"])
+@pytest.mark.parametrize("name", slow_but_for(["scara"], ["scara", "hopper", "kr6"]))
+def test_gravity_has_its_own_gradient(name: str, mode: str) -> None:
+    """Accelerations under another gravity, and their derivatives by gravity and by torques, are Pinocchio's."""
+    robot, gravity = psdmc.torch(weighed(name), gravity_input=True), np.array([1.0, -3.0, -8.0])
+    q, qd, tau = (x[0] for x in drawn(name, "forward_dynamics", 1))
+    qdd, _, _, inverse = pulled(name, gravity).forward_dynamics_derivatives(
+        q.numpy(), qd.numpy(), tau.numpy()
+    )
+
+    def forward(gravity: Any, tau: Any) -> Any:
+        return robot.forward_dynamics(q, qd, tau, gravity=gravity)
+
+    given = (torch.tensor(gravity), tau)
+    assert near(forward(*given).numpy(), qdd, EXACT)
+    by_gravity, by_tau = getattr(func, mode)(forward, (0, 1))(*given)
+    assert near(by_gravity.numpy(), -inverse @ torques_of_gravity(name, q.numpy()), EXACT)
+    assert near(by_tau.numpy(), inverse, EXACT)
+    own = robot.gravity(q[None]).numpy()
+    assert near(own, differentiated(name).pinocchio.gravity(q.numpy()[None]), EXACT)  # under that of the file
+
+
+@pytest.mark.parametrize("function", slow_but_for(["inverse_dynamics", "potential_energy"], WEIGHED))
+def test_gradcheck_by_gravity(function: str) -> None:
+    """One gravity for all states and one for each, in both modes, and through torch.compile's checks of operators."""
+    robot, given = psdmc.torch(differentiated("hopper").model, gravity_input=True), drawn("hopper", function)
+    constant = require_rule(function, gravity=True).constant
+    for gravity in (torch.tensor([1.0, -3.0, -8.0]), torch.randn(len(given[0]), 3)):
+        gravity = gravity.double().requires_grad_()
+        if "gravity" not in constant:
+            assert torch.autograd.gradcheck(
+                lambda pull: getattr(robot, function)(*given, gravity=pull), gravity, check_forward_ad=True
+            )
+        states = [
+            x.detach().requires_grad_(quantity.name not in constant)
+            for quantity, x in zip(SIGNATURES[function].inputs, given, strict=True)
+        ]
+        own = gravity.detach().requires_grad_("gravity" not in constant)
+        torch.library.opcheck(robot.operator(function), (*states, own))
+
+
+def test_gravity_where_it_is_no_input() -> None:
+    robot, q = psdmc.torch(weighed("scara"), gravity_input=True), torch.zeros(4, dtype=torch.float64)
+    pull = q[:3].clone().requires_grad_()
+    with pytest.raises(InputError, match="mass_matrix has no input gravity"):
+        robot.mass_matrix(q, gravity=pull)
+    with pytest.raises(InputError, match="gravity has no input gravity"):
+        robot_of("scara").gravity(q, gravity=pull)
+    with pytest.raises(InputError, match="under the gravity of its file only"):
+        psdmc.torch(differentiated("scara").model, gravity_input=True)
+    with pytest.raises(TypeError, match=r"gravity: gravity is a list, expected a torch.Tensor"):
+        robot.gravity(q, gravity=[0.0, 0.0, -9.81])
+    with pytest.raises(ArgumentError, match="rk4_step has no derivative by gravity"):
+        robot.rk4_step(q, q, q, q[0], gravity=pull).qd_next.sum().backward()
 
 
 @pytest.mark.parametrize("name", slow_but_for(["hopper"], QUICK))

@@ -12,7 +12,14 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from bundled import ROBOTS, bundled_model, bundled_robot, robot_path
+from bundled import (
+    ROBOTS,
+    bundled_model,
+    bundled_robot,
+    robot_path,
+    under_gravity,
+    weighed_model,
+)
 from command_line import typed
 from pinocchio_in_casadi import acceleration, inverse_dynamics
 from random_trees import RandomTree
@@ -448,6 +455,48 @@ def turned_over(dynamics: casadi.Function, steps: int = 4, dt: float = 0.1) -> t
     opti.solver("ipopt", quiet | {"ipopt.hessian_approximation": "limited-memory", "ipopt.max_iter": 500})
     found = opti.solve()
     return float(found.value(opti.f)), np.concatenate([found.value(x).ravel() for x in (q, qd, tau)])
+
+
+@pytest.mark.parametrize("adapter", ["casadi", "casadi_theta", "casadi_hessian"])
+def test_gravity_is_an_input_with_derivatives(adapter: str, tmp_path: Path) -> None:
+    """Values and Jacobians are Pinocchio's under this gravity. Accelerations are linear in gravity: their derivatives are
+    differences of Pinocchio's."""
+    names, pull = ["inverse_dynamics", "forward_dynamics"], np.array([3.0, -2.0, 6.0])
+    own = {"adapters": [adapter], "gravity_input": True}
+    emit_c(
+        weighed_model("scara"),
+        tmp_path / "c",
+        "factored",
+        [*names, "inverse_dynamics_vjp"],
+        name="scara",
+        **own,
+    )  # type: ignore[arg-type]
+    assert not (tmp_path / "c" / "src" / "forward_dynamics_derivatives.c").exists()
+    of, theta = built("scara", tmp_path / "c", adapter=adapter), [np.asarray(weighed_model("scara").theta_b)]
+    ending, more = ("_theta", theta) if adapter == "casadi_theta" else ("", [])
+    (q, qd, x), plain = state(5), pinocchio_of("scara")
+    robot = under_gravity(plain, pull)
+    units = [under_gravity(plain, pull + unit) for unit in np.eye(3)]
+    for name in names:
+        function, values = (
+            of(f"{name}{ending}"),
+            [getattr(each, name)(q[None], qd[None], x[None])[0] for each in (robot, *units)],
+        )
+        close(function(q, qd, x, pull, *more), values[0])
+        blocks = function.jacobian()(q, qd, x, pull, *more, 0)
+        expected = getattr(robot, f"{name}_derivatives")(q[None], qd[None], x[None])[-3:]
+        for found, block in zip(blocks, expected, strict=False):
+            close(found, block[0])
+        close(blocks[3], np.column_stack([value - values[0] for value in values[1:]]))
+    symbol = casadi.MX.sym("gravity", 3)
+    square = casadi.sumsqr(function(q, qd, x, symbol, *more))
+    slopes = np.column_stack([value - values[0] for value in values[1:]])
+    gradient = casadi.Function("g", [symbol], [casadi.gradient(square, symbol)])
+    close(gradient(pull), 2.0 * slopes.T @ values[0])
+    if adapter == "casadi_hessian":
+        close(
+            casadi.Function("h", [symbol], [casadi.hessian(square, symbol)[0]])(pull), 2.0 * slopes.T @ slopes
+        )
 
 
 @pytest.fixture(scope="module")

@@ -92,6 +92,34 @@ def read_trajectory(path: str | Path) -> Trajectory:
     return Trajectory(names, columns["time_s"] - columns["time_s"][0], q, qd, qdd, sliding)
 
 
+def read_motion(path: Path, chain: Mechanism) -> tuple[tuple[str, ...], Array, tuple[Array | None, ...]]:
+    """Return names of joints, times (N,), and positions, rates and accelerations, (N, n) each, of a motion's table. Rates or
+    accelerations are None if the table has none. Times may be uneven.
+
+    Raises InputError for a missing column, or if a column's unit is not that of the robot's joint.
+    """
+    columns = read_columns(path)
+    names, sliding = _named(tuple(columns))
+    slides = sliding_joints(chain)
+    wrong = [n for n in names if n in chain.joint_names and (n in sliding) != (n in slides)]
+    if wrong:
+        raise InputError(
+            f"{path}: position of joint(s) {listed(wrong)} in another unit than the robot's",
+            "name columns position_m.<joint> for sliding joints, position_rad.<joint> for others",
+        )
+    parts: list[Array | None] = []
+    for part in range(3):
+        wanted = [_column(part, name, sliding) for name in names]
+        missing = [column for column in wanted if column not in columns]
+        if (missing and len(missing) < len(wanted)) or "time_s" not in columns or not names:
+            lacking = listed(missing) if missing and names else "time_s" if names else "position_rad.<joint>"
+            raise InputError(
+                f"{path}: no column(s) {lacking}", "a motion has time_s and position_rad.<joint>"
+            )
+        parts.append(None if missing else np.column_stack([columns[column] for column in wanted]))
+    return names, columns["time_s"], tuple(parts)
+
+
 def trajectory_joints(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names of the joints in a trajectory's file, and of those that slide, from its head alone."""
     return _named(column_names(Path(path)))

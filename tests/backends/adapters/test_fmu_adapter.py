@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bundled import bundled_model, bundled_robot
+from bundled import bundled_model, bundled_robot, under_gravity, weighed_model
 from random_trees import RandomTree
 from scipy.integrate import solve_ivp
 
 from psdmc.compiler import emit_c
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
+from psdmc.functions import RECIPES
 from psdmc.robot.reference import reference
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -33,9 +34,13 @@ TIGHT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
 FORWARD, ALL = ["forward_dynamics_jvp"], ["kinetic_energy", "potential_energy", "forward_kinematics"]
 
 
-def packed(robot: str, folder: Path, functions: list[str], adapter: str = "fmu") -> Path:
+def packed(
+    robot: str, folder: Path, functions: list[str], adapter: str = "fmu", gravity_input: bool = False
+) -> Path:
     """The FMU of a bundled robot, as `make fmu` or `make fmu2` packs it."""
-    emit_c(bundled_model(robot), folder / "arm", functions=functions, adapters=adapter, name="arm")
+    model = (weighed_model if gravity_input else bundled_model)(robot)
+    own = {"functions": functions, "adapters": adapter, "gravity_input": gravity_input}
+    emit_c(model, folder / "arm", name="arm", **own)  # type: ignore[arg-type]
     flags = "CFLAGS=-O0 -Wall -Wextra -Wpedantic -Wconversion -Wno-sign-conversion -Werror"
     make = ["make", "-s", "-C", folder / "arm", adapter, flags, f"CC={' '.join(find_compiler().command)}"]
     done = subprocess.run(make, capture_output=True, text=True, check=False)
@@ -102,10 +107,16 @@ def places(fmu: Path, *names: str) -> list[int]:
 
 
 def motion(
-    robot: str, start: np.ndarray, tau: np.ndarray, times: np.ndarray, share: float = 1.0
+    robot: str,
+    start: np.ndarray,
+    tau: np.ndarray,
+    times: np.ndarray,
+    share: float = 1.0,
+    gravity: object = None,
 ) -> np.ndarray:
     """q and qd at these times, by Pinocchio and SciPy; all masses times `share`."""
     oracle, n = reference(bundled_robot(robot)), len(tau)
+    oracle = oracle if gravity is None else under_gravity(oracle, gravity)
 
     def slope(t: float, x: np.ndarray) -> np.ndarray:
         return np.concatenate(
@@ -191,6 +202,52 @@ def moves_as_pinocchio_s(fmu: Path, kind: str, robot: str) -> None:
     expected = motion(robot, start, tau, result["time"], share=2.0)
     assert len(result) == 11
     assert np.abs(states_of(result, n) - expected).max() < 1e-8 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("version", "kind"), [("fmu", "ModelExchange"), ("fmu2", "CoSimulation")])
+def test_gravity_is_a_parameter(version: str, kind: str, tmp_path: Path) -> None:
+    """Motions are those of Pinocchio under the gravity given, and under that of the file if none is given."""
+    robot, pull, tau = "two_link", (3.0, -2.0, 6.0), np.array([0.5, -0.2])
+    fmu = packed(robot, tmp_path, ["potential_energy"], version, gravity_input=True)
+    assert validate_fmu(str(fmu)) == []
+    known = {one.name: one for one in read_model_description(str(fmu), validate=True).modelVariables}
+    file = bundled_model(robot).mechanism.gravity
+    assert [float(known[f"gravity[{k}]"].start) for k in range(3)] == list(file)
+    assert known["gravity[0]"].description == "gravity along x of the base frame"
+    given = {"tau[0]": tau[0], "tau[1]": tau[1], "internal_step": 2e-4}
+    turned = {f"gravity[{k}]": value for k, value in enumerate(pull)}
+    for start, gravity in ((given, file), (given | turned, pull)):
+        result = simulate_fmu(
+            str(fmu), fmi_type=kind, start_values=start, output=["q[0]", "q[1]", "qd[0]", "qd[1]", "U"],
+            stop_time=0.3, output_interval=0.05, relative_tolerance=1e-12,
+        )  # fmt: skip
+        expected = motion(robot, np.zeros(4), tau, result["time"], gravity=gravity)
+        assert np.abs(states_of(result, 2) - expected).max() < 1e-8 * np.abs(expected).max()
+        oracle = under_gravity(reference(bundled_robot(robot)), gravity)
+        energy = RECIPES["potential_energy"].pinocchio(oracle, {"q": expected[:, :2]})["U"]
+        assert np.abs(np.diff(result["U"]) - np.diff(energy)).max() < 1e-7 * np.abs(energy).max()
+
+
+def test_directional_derivatives_under_another_gravity(tmp_path: Path) -> None:
+    fmu = packed("two_link", tmp_path, FORWARD, gravity_input=True)
+    known = read_model_description(str(fmu))
+    model = FMU3Model(
+        guid=known.guid, unzipDirectory=extract(str(fmu), str(tmp_path / "fmu")), modelIdentifier="arm", instanceName="arm"
+    )  # fmt: skip
+    model.instantiate()
+    rng, places_of = np.random.default_rng(8), places(fmu, "q", "qd", "tau")
+    state, seed = rng.uniform(-1.0, 1.0, (2, 6))
+    model.setFloat64([*places_of, *places(fmu, "gravity")], [*state, 3.0, -2.0, 6.0])
+    oracle = under_gravity(reference(bundled_robot("two_link")), (3.0, -2.0, 6.0))
+    _, *blocks = oracle.forward_dynamics_derivatives(*(part[None] for part in state.reshape(3, 2)))
+    expected = np.hstack([block[0] for block in blocks]) @ seed
+
+    found = model.getDirectionalDerivative(places(fmu, "qdd"), places_of, list(seed))
+
+    assert np.abs(np.array(found) - expected).max() < 1e-12 * np.abs(expected).max()
+    with pytest.raises(FMICallException, match="status 3"):
+        model.setFloat64(places(fmu, "gravity")[:1], [float("nan")])
+    model.freeInstance()
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bundled import ROBOTS, bundled_model, bundled_robot
+from bundled import ROBOTS, bundled_model, bundled_robot, under_gravity, weighed_model
 from installed import is_installed
 from scipy.io import loadmat, savemat
 
@@ -57,7 +57,7 @@ def ran(folder: Path, program: str) -> str:
     return done.stdout
 
 
-def built(model: DynamicsModel, folder: Path, functions: list[str], **options: str) -> Path:
+def built(model: DynamicsModel, folder: Path, functions: list[str], **options: object) -> Path:
     emit_c(model, folder, functions=functions, adapters="mex", **options)  # type: ignore[arg-type]
     (build,) = (folder / "mex").glob("*_build_mex.m")
     ran(folder, f"{build.stem}('{STRICT}')")
@@ -112,6 +112,20 @@ def test_octave_s_results_are_pinocchio_s(kr6: Path, tmp_path: Path) -> None:
     assert np.array_equal(found["one"][:, 0], found["tau"][:, 2])
     assert found["none"].tolist() == [[6, 6, 0]]
     assert not found["rest"].any()
+
+
+@octave
+def test_gravity_is_an_argument_before_theta_b(tmp_path: Path) -> None:
+    package = built(weighed_model("scara"), tmp_path / "c", ["gravity"], gravity_input=True, name="arm")
+    rng = np.random.default_rng(3)
+    q, pull = rng.uniform(-1.0, 1.0, (7, 4)), rng.uniform(-9.0, 9.0, (7, 3))
+    savemat(tmp_path / "in.mat", {"q": q.T, "pull": pull.T})
+    program = "g = arm_gravity(q, pull); twice = arm_gravity(q, pull, 2 * arm_info().theta_b);"
+    ran(package, f"load('{tmp_path}/in.mat'); {program} save('-v7', '{tmp_path}/out.mat');")
+    found, oracle = loadmat(tmp_path / "out.mat"), reference(bundled_robot("scara"))
+    expected = np.vstack([under_gravity(oracle, g).gravity(x[None]) for x, g in zip(q, pull, strict=True)])
+    near(found["g"].T, expected)
+    near(found["twice"].T, 2.0 * expected)
 
 
 WRONG = {
@@ -260,6 +274,21 @@ def test_s_functions_are_pinocchio_s_dynamics(tmp_path: Path) -> None:
         near(found, getattr(oracle, name)(q[None], qd[None], x[None])[0])
     q[:] = np.nan
     assert b"arm_forward_dynamics_sfun: a matrix" in (outputs(loaded, q, qd, x, found) or b"")
+
+
+def test_gravity_is_the_last_port_of_an_s_function(tmp_path: Path) -> None:
+    own = {"functions": "inverse_dynamics", "adapters": "mex", "gravity_input": True}
+    emit_c(weighed_model("scara"), tmp_path / "c", name="arm", **own)  # type: ignore[arg-type]
+    assert "arm_inverse_dynamics(q, qd, qdd, gravity, [theta_b])" in (
+        tmp_path / "c" / "mex" / "arm_inverse_dynamics.m"
+    ).read_text(encoding="utf-8")
+    loaded, widths = block(tmp_path / "c", "arm_inverse_dynamics_sfun", tmp_path), (ctypes.c_int * 16)()
+    assert loaded.start(0, widths) == 5
+    assert widths[:5] == [4, 4, 4, 3, 4]
+    (q, qd, qdd), pull = np.random.default_rng(4).uniform(-1.0, 1.0, (3, 4)), np.array([3.0, -2.0, 6.0])
+    found, oracle = np.empty(4), under_gravity(reference(bundled_robot("scara")), pull)
+    assert outputs(loaded, q, qd, qdd, pull, found) is None
+    near(found, oracle.inverse_dynamics(q[None], qd[None], qdd[None])[0])
 
 
 def test_long_names_are_refused_and_files_are_the_package_s_own(tmp_path: Path) -> None:

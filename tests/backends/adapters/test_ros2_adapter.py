@@ -4,13 +4,14 @@ Pinocchio; and the ament package, where ament is installed."""
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from bundled import bundled_model, bundled_robot
+from bundled import bundled_model, bundled_robot, under_gravity, weighed_model
 from installed import is_installed
 from random_trees import RandomTree
 
@@ -32,9 +33,11 @@ ROS = (
 )
 
 
-def compiled(robot: str, folder: Path) -> Path:
+def compiled(robot: str, folder: Path, gravity_input: bool = False) -> Path:
     """The program that runs the controllers of a robot."""
-    emit_c(bundled_model(robot), folder / "arm", functions="gravity", adapters="ros2", name="arm")
+    model = (weighed_model if gravity_input else bundled_model)(robot)
+    own = {"functions": "gravity", "adapters": "ros2", "gravity_input": gravity_input}
+    emit_c(model, folder / "arm", name="arm", **own)  # type: ignore[arg-type]
     include, headers = folder / "arm" / "include", Path(__file__).parent / "ros"
     sources = sorted((folder / "arm" / "src").glob("*.c"))
     subprocess.run(["cc", "-std=c99", "-O0", "-c", f"-I{include}", *sources], cwd=folder, check=True)
@@ -51,9 +54,13 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compiled("kr6", tmp_path_factory.mktemp("ros2"))
 
 
-def driven(drive: Path, law: str, *rows: np.ndarray) -> subprocess.CompletedProcess[str]:
+def driven(
+    drive: Path, law: str, *rows: np.ndarray, gravity: Sequence[float] = ()
+) -> subprocess.CompletedProcess[str]:
     given = " ".join(repr(float(value)) for row in rows for value in row)
-    return subprocess.run([drive, law], input=given, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [drive, law, *map(repr, gravity)], input=given, capture_output=True, text=True, check=False
+    )
 
 
 def torques(done: subprocess.CompletedProcess[str], robot: str) -> np.ndarray:
@@ -81,6 +88,21 @@ def test_torques_are_pinocchio_s_and_nothing_is_allocated(drive: Path) -> None:
     expected = oracle.inverse_dynamics(q[None], qd[None], x[None])[0]
     assert np.abs(torques(done, "kr6") - expected).max() < 1e-12 * np.abs(expected).max()
     assert done.stdout.startswith("reference left out: it needs 6 finite numbers per field\n")
+
+
+@needs_gpp
+def test_gravity_is_a_parameter(tmp_path: Path) -> None:
+    rng, oracle, pull = np.random.default_rng(2), reference(bundled_robot("scara")), (3.0, -2.0, 6.0)
+    drive, zero = compiled("scara", tmp_path, gravity_input=True), np.zeros(4)
+    q, qd, qdd = rng.uniform(-1.0, 1.0, (3, 4))
+    for given, robot in (((), oracle), (pull, under_gravity(oracle, pull))):
+        held = torques(driven(drive, "gravity", zero, zero, q, qd, gravity=given), "scara")
+        moved = torques(driven(drive, "computed", zero, zero, q, qd, q, qd, qdd, gravity=given), "scara")
+        assert np.abs(held - robot.gravity(q[None])[0]).max() < 1e-12 * np.abs(held).max()
+        expected = robot.inverse_dynamics(q[None], qd[None], qdd[None])[0]
+        assert np.abs(moved - expected).max() < 1e-12 * np.abs(expected).max()
+    for wrong in ((0.0, 0.0), (0.0, 0.0, float("nan"))):
+        assert driven(drive, "gravity", zero, zero, q, qd, gravity=wrong).returncode == 1
 
 
 @needs_gpp
@@ -150,7 +172,7 @@ def test_ament_builds_the_package_without_the_plugin(tmp_path: Path) -> None:
 def test_robots_that_have_no_controller_are_refused(tmp_path: Path) -> None:
     arm = bundled_model("two_link")
     for model, options, expected in (
-        (arm, {"real": "float32"}, "ROS 2 controllers compute with double"),
+        (arm, {"real": "float32"}, "a ROS 2 controller computes with double"),
         (replace(arm, theta_b=None), {}, "needs values of the base parameters"),
         (derive_model(RandomTree(5, (-1, 0), "FR").mechanism(), expand=False), {}, "several coordinates"),
     ):

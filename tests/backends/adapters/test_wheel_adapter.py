@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from bundled import ROBOTS, bundled_model, bundled_robot
+from bundled import ROBOTS, bundled_model, bundled_robot, under_gravity
 from command_line import files_in
 from robots_at_hand import in_wheel
 
@@ -20,6 +20,7 @@ import psdmc
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.load import load_robot
 from psdmc.robot.reference import reference
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -135,6 +136,52 @@ numpy.savez(
     for name, values in expected.items():
         assert found[name].shape == values.shape, name
         assert np.abs(found[name] - values).max() <= 1e-10 * np.abs(values).max(), name
+
+
+def test_gravity_and_many_arrays_are_inputs(tmp_path: Path) -> None:
+    """Gravity stands before theta_b, one for all states or one for each. A function has more than 16 arrays."""
+    many = "constrained_forward_dynamics_derivatives"
+    model = psdmc.derive(in_wheel("hyq_no_sensors.urdf"), floating=True, contacts=["lf_foot"])
+    emit_c(
+        model,
+        tmp_path / "c",
+        functions=["inverse_dynamics", many],
+        adapters="wheel",
+        gravity_input=True,
+        name="leg",
+    )
+    rng, sizes = np.random.default_rng(6), (model.nq, model.nv, model.nv)
+    q, qd, x = (rng.uniform(-1.0, 1.0, (5, size)) for size in sizes)
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1)[:, None]
+    pull = rng.uniform(-9.0, 9.0, (5, 3))
+    np.savez(tmp_path / "in.npz", q=q, qd=qd, x=x, pull=pull, theta=3 * np.asarray(model.theta_b))
+    ran(
+        installed(tmp_path / "c", tmp_path),
+        f"""
+import numpy, leg
+at = numpy.load("in.npz")
+q, qd, x, pull = at["q"], at["qd"], at["x"], at["pull"]
+found = leg.{many}(q, qd, x, numpy.ones((5, 1)), 0.0, numpy.zeros(1), numpy.zeros(1), numpy.zeros(3), pull)
+numpy.savez(
+    "out.npz", tau=leg.inverse_dynamics(q, qd, x, pull), one=leg.inverse_dynamics(q, qd, x, pull[2]),
+    thrice=leg.inverse_dynamics(q, qd, x, pull, at["theta"]), qdd=found.qdd, forces=found.forces,
+)
+""",
+        tmp_path,
+    )
+    found, oracle = (
+        np.load(tmp_path / "out.npz"),
+        reference(load_robot(in_wheel("hyq_no_sensors.urdf"), floating=True)),
+    )
+    rows = [tuple(part[k : k + 1] for part in (q, qd, x)) for k in range(5)]
+    expected = np.vstack([under_gravity(oracle, pull[k]).inverse_dynamics(*rows[k]) for k in range(5)])
+    assert np.abs(found["tau"] - expected).max() <= 1e-10 * np.abs(expected).max()
+    assert np.abs(found["thrice"] - 3.0 * expected).max() <= 1e-10 * np.abs(expected).max()
+    assert np.abs(found["one"][2] - expected[2]).max() <= 1e-10 * np.abs(expected).max()
+    compiled = psdmc.compile(model, functions=[many], gravity_input=True)
+    same = getattr(compiled, many)(q, qd, x, [1.0], gravity=pull, kp=0.0, kd=0.0)
+    for name in ("qdd", "forces"):
+        assert np.abs(found[name] - getattr(same, name)).max() <= 1e-9 * np.abs(found[name]).max()
 
 
 WRONG = {

@@ -14,6 +14,8 @@ from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
+from psdmc.functions import SIGNATURES
+from psdmc.program.gravity_input import takes_gravity
 from psdmc.program.kernel import Kernel
 from psdmc.robot.mechanism import Mechanism
 
@@ -52,15 +54,19 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in ADAPTERS if name in names)
 
 
-def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -> list[str]:
+def with_needed(
+    functions: Sequence[str], adapters: Sequence[str], wide: bool, gravity_input: bool = False
+) -> list[str]:
     """Return the functions that a package must contain: the given functions, followed by further functions that the
     code of the adapters calls.
 
-    wide  whether q has more entries than qd (quaternions)
+    wide           whether q has more entries than qd (quaternions)
+    gravity_input  whether gravity is an input of the functions that depend on it
     """
-    found = dict.fromkeys(functions)
+    found, known = dict.fromkeys(functions), [SIGNATURES[name] for name in functions if name in SIGNATURES]
+    own = [takes_gravity(function) if gravity_input else function for function in known]
     for adapter in adapters:
-        found |= dict.fromkeys(NEEDS[adapter](functions, wide) if adapter in NEEDS else ())
+        found |= dict.fromkeys(NEEDS[adapter](own, wide) if adapter in NEEDS else ())
     return list(found)
 
 

@@ -49,7 +49,7 @@ from psdmc.backends.info import PackageInfo
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
-from psdmc.program.signature import Sizes
+from psdmc.program.signature import Signature, Sizes
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.costs import Costs
 
@@ -88,28 +88,27 @@ class CasadiView:
     helpers: frozenset[str]
 
 
-def needed(functions: Sequence[str], wide: bool, theta: bool = False) -> list[str]:
+def needed(functions: Sequence[Signature], wide: bool, theta: bool = False) -> list[str]:
     """Return the names of the functions that the derivatives of the given functions need in the package.
 
     wide   whether q has more entries than qd (quaternions)
     theta  whether derivatives by theta_b (the base parameters) are needed, too
     """
-    found = [name + DERIVATIVES for name in functions if has_blocks(name)]
+    found = [function.name + DERIVATIVES for function in functions if has_blocks(function)]
     return found + [MAP] * wide + [REGRESSOR] * (theta and bool(found))
 
 
-def needed_by_theta(functions: Sequence[str], wide: bool) -> list[str]:
+def needed_by_theta(functions: Sequence[Signature], wide: bool) -> list[str]:
     """The same for functions that take theta_b."""
     return needed(functions, wide, theta=True)
 
 
-def _is_by_program(name: str, sizes: Sizes, theta: bool = False) -> bool:
+def _is_by_program(function: Signature, sizes: Sizes, theta: bool = False) -> bool:
     """True if psdmc makes the Jacobian of a function from its PROGRAM: no function computes it, and it is not too large."""
-    if not _is_differentiated(name):
+    if not _is_differentiated(function.name):
         return False
-    recipe = RECIPES[name]
-    is_known = has_blocks(name) and (not theta or recipe.polynomials in LINEAR)
-    return not is_known and has_small_jacobian(recipe.signature, sizes, theta)
+    is_known = has_blocks(function) and (not theta or RECIPES[function.name].polynomials in LINEAR)
+    return not is_known and has_small_jacobian(function, sizes, theta)
 
 
 def _is_differentiated(name: str) -> bool:
@@ -127,7 +126,7 @@ def own_kernels(
         name, derived = kernel.function.name, Derived(kernel, info, costs)
         if kernel.is_loop_of_calls or not any(_is_of(adapter, kernel) for adapter in adapters):
             continue
-        if _is_by_program(name, info.sizes, kernel.theta):
+        if _is_by_program(kernel.function, info.sizes, kernel.theta):
             found.append(derived.jacobian)
         if HESSIANS in adapters and not kernel.theta and _is_differentiated(name):
             found += [derived.adjoint, derived.second]
@@ -167,7 +166,8 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
     whose = "a floating base" if robot.has_free_root else f"joint {wide.name!r}"
     rows, frames = robot.rows_of_contacts, len(robot.frames)
     sizes = Sizes(len(robot.own_joints), robot.nq, robot.nv, l, frames, 0, rows, robot.rows_of_loops)
-    without = [name for name in functions if not (has_blocks(name) or _is_by_program(name, sizes))]
+    known = {name: RECIPES[name].signature for name in functions if name in RECIPES}
+    without = [name for name, own in known.items() if not (has_blocks(own) or _is_by_program(own, sizes))]
     rest = f"; without derivatives: {', '.join(without)}" if without else ""
     return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"
 

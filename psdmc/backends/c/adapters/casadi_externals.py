@@ -20,7 +20,8 @@ from psdmc.backends.c.adapters.casadi_kernels import (
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.info import PackageInfo
 from psdmc.functions import RECIPES
-from psdmc.program.signature import Q
+from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.signature import Q, Signature
 from psdmc.recipes.recipe import Polynomials
 
 DERIVATIVES, GRADIENT, DIRECTION = "_derivatives", "_vjp", "_jvp"
@@ -90,13 +91,12 @@ class External:
     symbols: tuple[str, ...]
 
 
-def has_blocks(name: str) -> bool:
+def has_blocks(own: Signature) -> bool:
     """Whether some function computes all derivatives of this one. Its outputs are vectors: CasADi numbers the entries of a
-    matrix column by column, the blocks row by row."""
-    other = RECIPES.get(name + DERIVATIVES)
+    matrix column by column, the blocks row by row. No function has derivatives by the input gravity."""
+    other = RECIPES.get(own.name + DERIVATIVES)
     if other is None:
         return False
-    own = RECIPES[name].signature
     names = [output.name for output in other.signature.outputs]
     return all(len(o.axes) == 1 and f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
@@ -156,18 +156,19 @@ class Externals:
         is_known = not kernel.theta or RECIPES[name].polynomials in LINEAR
         if by_program is not None:
             yield self._by_program("jac_", kernel, by_program)
-        elif other is not None and has_blocks(name) and is_known:
+        elif other is not None and has_blocks(kernel.function) and is_known:
             yield self._jacobian(kernel, other)
         gradient = self.kernels.get(name + GRADIENT + PARAMETERS * kernel.theta)
         adjoint, second = (self.kernels.get(name + ending) for ending in (ADJOINT, SECOND))
-        if gradient is not None and len(kernel.outputs) == 1:
+        is_one = len(kernel.outputs) == 1 and GRAVITY not in kernel.function.inputs
+        if gradient is not None and is_one:
             yield self._reverse(kernel, gradient)
         elif adjoint is not None:
             yield self._by_program("adj1_", kernel, adjoint)
         if second is not None:
             yield self._by_program("jac_adj1_", kernel, second)
         direction = self.kernels.get(name + DIRECTION)
-        if direction is not None and len(kernel.outputs) == 1 and self.info.units and not kernel.theta:
+        if direction is not None and is_one and self.info.units and not kernel.theta:
             yield self._forward(kernel, direction)
 
     def _inputs(self, kernel: KernelView) -> tuple[Argument, ...]:

@@ -10,20 +10,25 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from types import MappingProxyType
 
+from psdmc.backends.c.adapters.suited import refuse_unsuited
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import c_comment
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
-from psdmc.errors import InputError
+from psdmc.program.signature import Signature
 
 DYNAMICS, DIRECTION = "forward_dynamics_theta", "forward_dynamics_jvp_theta"
 
 MORE_OUTPUTS = ("kinetic_energy_theta", "potential_energy_theta", "forward_kinematics")
 """Kernels whose outputs are the FMU's, too, where the package has them."""
+
+ALONG = {"dq": "along", "dqd": "along + n", "dtau": "along + 2 * n", "qdd": "of", "dqdd": "of + n"}
+"""Local arrays in C of directional derivatives, by name of the kernel's array."""
 
 BASE_UNITS = {
     "rad": 'rad="1"',
@@ -91,7 +96,7 @@ class Variable:
         return scalar, real
 
 
-def needed(functions: Sequence[str], wide: bool) -> list[str]:
+def needed(functions: Sequence[Signature], wide: bool) -> list[str]:
     """An FMU integrates forward dynamics."""
     return ["forward_dynamics"]
 
@@ -101,21 +106,7 @@ def files(package: PackageView, version: int = 3) -> dict[str, str]:
     cannot become an FMU."""
     info, robot = package.info, package.robot
     kernels = {kernel.name: kernel for kernel in package.kernels}
-    values = [parameter.value for parameter in info.parameters]
-    if package.real != "double":
-        raise InputError(
-            "an FMU computes with double, and the package with float", "leave out --real float32"
-        )
-    if info.is_wide:
-        raise InputError(
-            f"{info.name}: an FMU's states are q and qd, and q of this robot has joints with several coordinates",
-            "leave out the FMU; FMUs of floating bases and ball joints are not supported",
-        )
-    if None in values:
-        raise InputError(
-            f"{info.name}: an FMU needs values of the base parameters, and this model's are unknown",
-            "calibrate the model first, or leave out the FMU",
-        )
+    refuse_unsuited(package, "an FMU", "--with fmu" if version == 3 else "--with fmu2")
     more = [kernels[name] for name in MORE_OUTPUTS if name in kernels]
     blocks = {block.name: block for block in _blocks(package, more)}
     variables = [one for block in blocks.values() for one in _variables(block, package)]
@@ -131,7 +122,9 @@ def files(package: PackageView, version: int = 3) -> dict[str, str]:
         "token": hashlib.sha256(repr((info.psdmc_version, info.model_hash, variables)).encode()).hexdigest(),
         "description": _xml(info.name),
         "more": [(kernel.prototypes["single"].symbol, _arguments(kernel)) for kernel in more],
-        "direction": DIRECTION in kernels and not more,
+        "dynamics": _arguments(kernels[DYNAMICS]),
+        "gravity": info.gravity if info.gravity_input else (),
+        "direction": _arguments(kernels[DIRECTION], ALONG) if DIRECTION in kernels and not more else "",
     }
     return {
         path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES[version].items()
@@ -142,6 +135,7 @@ def _blocks(package: PackageView, more: Sequence[KernelView]) -> Iterator[Block]
     """All variables, in the order of their value references."""
     n, computed = package.dof, 'causality="output" initial="calculated"'
     state = 'causality="output" initial="exact" start="0"'
+    parameter = 'causality="parameter" variability="tunable"'
     blocks = [
         ("time", 1, 'causality="independent" variability="continuous" description="time, s"'),
         ("q", n, state),
@@ -149,8 +143,9 @@ def _blocks(package: PackageView, more: Sequence[KernelView]) -> Iterator[Block]
         ("tau", n, 'causality="input" start="0"'),
         ("der_q", n, 'causality="local" initial="calculated"'),
         ("qdd", n, computed),
-        ("theta_b", package.l, 'causality="parameter" variability="tunable"'),
-        ("internal_step", 1, 'causality="parameter" variability="tunable" start="0.001" min="0"'),
+        ("theta_b", package.l, parameter),
+        *((("gravity", 3, parameter),) if package.info.gravity_input else ()),
+        ("internal_step", 1, f'{parameter} start="0.001" min="0"'),
         *((output.name, output.size, computed) for kernel in more for output in kernel.outputs),
     ]
     at = 0
@@ -175,6 +170,9 @@ def _variables(block: Block, package: PackageView) -> Iterator[Variable]:
         if block.name == "theta_b":
             parameter = package.info.parameters[k]
             own |= {"description": f"{parameter.equation} [{parameter.unit}]", "start": repr(parameter.value)}
+        if block.name == "gravity":
+            frame, start = f"the {package.info.base_frame}", repr(package.info.gravity[k])
+            own |= {"description": f"gravity along {'xyz'[k]} of {frame}", "unit": "m/s2", "start": start}
         if block.name == "internal_step":
             own["description"] = "largest step of the co-simulation's integrator, s"
         if whole.get(block.name) == "J":
@@ -183,9 +181,11 @@ def _variables(block: Block, package: PackageView) -> Iterator[Variable]:
         yield Variable(block.at + k, f"{text} {block.attributes}")
 
 
-def _arguments(kernel: KernelView) -> str:
+def _arguments(kernel: KernelView, places: Mapping[str, str] = MappingProxyType({})) -> str:
+    """C text of a call's arguments: variables of the FMU, or other places by name of the array."""
     names = [vector.name for vector in kernel.inputs] + (["theta_b"] if kernel.theta else [])
-    return ", ".join(f"v + at_{name}" for name in [*names, *(output.name for output in kernel.outputs)])
+    names += [output.name for output in kernel.outputs]
+    return ", ".join(places.get(name, f"v + at_{name}") for name in names)
 
 
 def _xml(text: str) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from psdmc.backends.c.adapters.suited import refuse_unsuited
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
-from psdmc.errors import InputError
+from psdmc.program.signature import Signature
 
 FILES = {
     "ros2/{}_control.hpp": "ros2_control.hpp",
@@ -21,7 +22,7 @@ FILES = {
 }
 
 
-def needed(functions: Sequence[str], wide: bool) -> list[str]:
+def needed(functions: Sequence[Signature], wide: bool) -> list[str]:
     """What the two controllers compute."""
     return ["gravity", "inverse_dynamics"]
 
@@ -29,20 +30,7 @@ def needed(functions: Sequence[str], wide: bool) -> list[str]:
 def files(package: PackageView) -> dict[str, str]:
     """Return the text of each file of the ament package, by path. Raises InputError if the robot or its model does not
     suit controllers of joint torques."""
-    info, robot = package.info, package.robot
-    if package.real != "double":
-        raise InputError(
-            "ROS 2 controllers compute with double, and the package with float", "leave out --real float32"
-        )
-    if info.is_wide:
-        raise InputError(
-            f"{info.name}: a controller commands each joint's torque, and q has joints with several coordinates",
-            "leave out --with ros2; controllers of floating bases and ball joints are not supported",
-        )
-    if any(parameter.value is None for parameter in info.parameters):
-        raise InputError(
-            f"{info.name}: a controller needs values of the base parameters, and this model's are unknown",
-            "calibrate the model first, or leave out --with ros2",
-        )
+    robot = package.robot
+    refuse_unsuited(package, "a ROS 2 controller", "--with ros2")
     view = {"package": package, "name": f"{robot.lower()}_controllers"}
     return {path.format(robot): render(f"adapters/{text}.jinja", **view) for path, text in FILES.items()}

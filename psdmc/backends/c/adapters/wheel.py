@@ -33,10 +33,12 @@ def files(package: PackageView) -> dict[str, str]:
     if keyword.iskeyword(robot) or robot in {"numpy", *sys.stdlib_module_names}:
         raise InputError(f"a Python module cannot be called {robot!r}", "choose another name with --name")
     model = package.info.model_hash[:8]
+    kernels = [batch_call(kernel, package.l) for kernel in package.kernels]
     view = {
         "package": package,
+        "most_arrays": max(len(kernel.sizes) for kernel in kernels),
         "version": f"{package.version}+m{model}" if model else package.version,
-        "kernels": [batch_call(kernel, package.l) for kernel in package.kernels],
+        "kernels": kernels,
         "functions": [batch_function(function) for function in package.functions],
         "joint_names": ", ".join(ascii(joint.name) for joint in package.info.joints),
         "frame_names": ", ".join(map(ascii, package.info.frames)),

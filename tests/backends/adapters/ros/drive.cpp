@@ -29,13 +29,16 @@ static std::vector<double> row()
     return values;
 }
 
-template <class Kind> static int run()
+template <class Kind> static int run(const std::vector<double> &gravity)
 {
     Kind controller;
     controller_interface::ControllerInterface &own = controller;
     own.on_init();
     own.get_node()->parameters["stiffness"] = row();
     own.get_node()->parameters["damping"] = row();
+    if (!gravity.empty()) {
+        own.get_node()->parameters["gravity"] = gravity;
+    }
     const std::vector<double> q = row(), qd = row();
     for (const std::string &name : own.state_interface_configuration().names) {
         own.state_interfaces_.insert(own.state_interfaces_.begin(), {name, 0.0}); /* in another order */
@@ -73,7 +76,11 @@ template <class Kind> static int run()
     return own.command_interfaces_[1].value == 0.0 ? 0 : 4;
 }
 
-int main(int, char **words)
+int main(int count, char **words)
 {
-    return words[1][0] == 'g' ? run<GravityCompensation>() : run<ComputedTorque>();
+    std::vector<double> gravity;
+    for (int k = 2; k < count; k++) {
+        gravity.push_back(std::strtod(words[k], nullptr));
+    }
+    return words[1][0] == 'g' ? run<GravityCompensation>(gravity) : run<ComputedTorque>(gravity);
 }
