@@ -1,0 +1,220 @@
+"""A CUDA package as data for the templates. The bodies of its functions are those of C packages for one state. A GPU
+computes one state per thread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from psdmc.backends.c.kernel_view import KernelView, VectorView
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.self_test import SelfCheck
+from psdmc.backends.cuda.names import identifier
+from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
+from psdmc.backends.protocol import Emission
+from psdmc.backends.self_test import given_name
+from psdmc.errors import InternalError
+from psdmc.program.kernel import Kernel
+from psdmc.target.presets import SCALAR
+
+TAKEN = frozenset({"stride", "state", "states", "status", "stream", "tile", "here", "first"})
+"""Names of the CUDA code's own; no input or output may have one."""
+
+LONGEST = 12_000
+"""Operations of the longest straight-line body where there is another form."""
+
+ARRAYS = (
+    "Arrays of one state: as in C, matrices row-major. A kernel computes one state per thread. Its arrays lie in the GPU's",
+    "memory and must not overlap:",
+    "  _states  entry i of the state s is at [i * states + s]; neighbouring threads read neighbouring numbers",
+    "  _rows    one state after the other: entry i of the state s is at [s * size + i]",
+    "  _theta   with the base parameters theta_b as an input, one theta_b for all states",
+    "Quaternions, and cosine and sine of an angle, are of length one.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFunction:
+    """One `__device__` function, and the two kernels that call it, as C text.
+
+    robot  identifier of the robot, with which all names begin
+    """
+
+    view: KernelView
+    robot: str
+
+    @property
+    def symbol(self) -> str:
+        """Name of the function; the names of its kernels end in _states and _rows."""
+        return f"{self.robot}_{self.view.name}"
+
+    @property
+    def is_apart(self) -> bool:
+        """Return whether entries of its arrays may lie `stride` numbers apart. Those of a function with loops or calls
+        are neighbours, because it passes parts of its arrays on."""
+        return self.view.regions is None and not self.view.single_body.parts
+
+    @property
+    def returns(self) -> str:
+        return "int" if self.view.positive else "void"
+
+    @property
+    def vectors(self) -> tuple[VectorView, ...]:
+        """Inputs and outputs of which each state has its own."""
+        return (*self.view.inputs, *self.view.outputs)
+
+    @property
+    def parameters(self) -> str:
+        """Parameters of the `__device__` function."""
+        return ", ".join(self._arrays("real", ""))
+
+    @property
+    def kernel_parameters(self) -> str:
+        return ", ".join([*self._arrays("real", "__restrict__ "), *self._status, "long long states"])
+
+    def launch_parameters(self, real: str) -> str:
+        """Parameters of the host function that starts a kernel."""
+        return ", ".join([*self._arrays(real, ""), *self._status, "long long states, cudaStream_t stream"])
+
+    @property
+    def launch_arguments(self) -> str:
+        """Addresses of the kernel's arguments."""
+        names = [*self._names("", ""), *(["status"] if self.view.positive else []), "states"]
+        return ", ".join(f"&{name}" for name in names)
+
+    @property
+    def call_apart(self) -> str:
+        """Call in the kernel for arrays [entry][state]."""
+        return self._call([*self._names("", " + state"), "states"])
+
+    @property
+    def call_own(self) -> str:
+        """Call with arrays of the thread's own."""
+        return self._call(self._names("own_", ""))
+
+    def _call(self, arguments: list[str]) -> str:
+        call = f"{self.symbol}({', '.join(arguments)})"
+        return f"const int failed = {call}" if self.view.positive else call
+
+    def _names(self, before: str, after: str) -> list[str]:
+        inputs, outputs = (
+            [f"{before}{vector.name}{after}" for vector in vectors]
+            for vectors in (self.view.inputs, self.view.outputs)
+        )
+        return [*inputs, *(["theta_b"] if self.view.theta else []), *outputs]
+
+    def _arrays(self, real: str, qualifier: str) -> list[str]:
+        inputs = [*(vector.name for vector in self.view.inputs), *(["theta_b"] if self.view.theta else [])]
+        outputs = (f"{real} *{qualifier}{vector.name}" for vector in self.view.outputs)
+        return [*(f"const {real} *{qualifier}{name}" for name in inputs), *outputs]
+
+    @property
+    def _status(self) -> list[str]:
+        return ["int *status"] if self.view.positive else []
+
+    @property
+    def pivots_declaration(self) -> str:
+        """Declaration of the array of pivots."""
+        assert self.view.positive is not None
+        name, size = self.view.positive.name, self.view.positive.size
+        return f"{self.robot}_pivots<{size}> {name}" if self.is_apart else f"real {name}[{size}]"
+
+    @property
+    def pivots(self) -> tuple[tuple[str, int], ...]:
+        """Pivots and their numbers, the last computed first: of several that fail, the first one counts."""
+        if self.view.positive is None:
+            return ()
+        name = f"{self.view.positive.name}{'.at' if self.is_apart else ''}"
+        return tuple((f"{name}[{k}]", k + 1) for k in reversed(self.view.pivot_order))
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One comparison of the self-test: the launch of a function's kernels, of which one output is compared.
+
+    symbol     name of the function
+    arrays     C text that makes each of its arrays
+    compared   number of the array that is compared
+    arguments  C text of the arguments
+    """
+
+    check: SelfCheck
+    symbol: str
+    arrays: tuple[str, ...]
+    compared: int
+    arguments: str
+
+
+@dataclass(frozen=True, slots=True)
+class CudaPackage:
+    """One CUDA package. `package` is what the C back end would write for a plain processor."""
+
+    package: PackageView
+    description: tuple[str, ...]
+
+    @property
+    def functions(self) -> tuple[tuple[str, tuple[DeviceFunction, ...]], ...]:
+        """Descriptions of the functions, and their variants."""
+        robot = self.package.robot
+        return tuple(
+            (
+                f"{each.meaning}; {each.shape}",
+                tuple(DeviceFunction(kernel, robot) for kernel in each.kernels),
+            )
+            for each in self.package.functions
+        )
+
+    @property
+    def kernels(self) -> tuple[DeviceFunction, ...]:
+        return tuple(kernel for _, kernels in self.functions for kernel in kernels)
+
+    @property
+    def macros(self) -> tuple[str, ...]:
+        """Macros of the bodies, which the header puts back at its end."""
+        names = ["real", "V", "LOAD", "STORE", "STORE_GROUP", "STORE_ZERO", "STORE_ZEROS", "CLEAR", "SPLAT"]
+        names += ["SINCOS", "APART", "PART", "NOT_INLINE", "spoil", "KEPT", "KEEP", "NAME"]
+        names += [f"MINUS_PRODUCT_{shape.zero}" for shape in self.package.products]
+        return (*names, *(call.macro for call in self.package.calls))
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """Return what the self-test compares."""
+        kernels = {kernel.view.name: kernel for kernel in self.kernels}
+        return tuple(self._trial(check, kernels[check.kernel]) for check in self.package.self_test.checks)
+
+    def _trial(self, check: SelfCheck, kernel: DeviceFunction) -> Trial:
+        view = kernel.view
+        given = ((given_name(vector.name, view.variant), vector.size) for vector in view.inputs)
+        arrays = [f"given({name}_given[0], {size}, by_entry)" for name, size in given]
+        arrays += ["(real *)on_device(theta_b_given, sizeof theta_b_given)"] if view.theta else []
+        names = [view.function.label(output, view.theta) for output in view.function.outputs]
+        compared = len(arrays) + names.index(check.name)
+        arrays += [f"place({output.size})" for output in view.outputs]
+        arguments = [f"arrays[{k}]" for k in range(len(arrays))]
+        arguments += ["numbers"] if view.positive else []
+        return Trial(check, kernel.symbol, tuple(arrays), compared, ", ".join(arguments))
+
+
+def cuda_package(given: Emission) -> CudaPackage:
+    """Return the data of a CUDA package. Raises InputError if there are no functions."""
+    info = replace(given.info, name=identifier(given.info.name))
+    options = replace(given.options, target=SCALAR)
+    kernels = {name: _one_form(kernel) for name, kernel in given.kernels.items()}
+    package = replace(package_view(info, kernels, options, given.references), info=given.info)
+    signatures = [function.signature for function in package.functions]
+    for kernel in package.kernels:
+        if wrong := TAKEN.intersection(vector.name for vector in (*kernel.inputs, *kernel.outputs)):
+            raise InternalError(f"{kernel.name}: CUDA takes {min(wrong)!r} for something else")
+    description = (
+        *facts(given.info, given.options),
+        *ARRAYS,
+        *(frame_lines(given.info) if package.uses_frames else ()),
+        *(contact_lines(given.info) if uses_contacts(signatures) else ()),
+    )
+    return CudaPackage(package, description)
+
+
+def _one_form(kernel: Kernel) -> Kernel:
+    """The kernel in one form: without lanes, and without matrix products behind the other operations."""
+    is_straight = kernel.regions is None or (not kernel.is_loop_of_calls and len(kernel.single) <= LONGEST)
+    regions = None if is_straight else kernel.regions
+    return replace(kernel, batch=kernel.single, before=None, limbs=None, regions=regions)
