@@ -71,9 +71,11 @@ class DeviceFunction:
     def kernel_parameters(self) -> str:
         return ", ".join([*self._arrays("real", "__restrict__ "), *self._status, "long long states"])
 
-    def launch_parameters(self, real: str) -> str:
+    @property
+    def launch_parameters(self) -> str:
         """Parameters of the host function that starts a kernel."""
-        return ", ".join([*self._arrays(real, ""), *self._status, "long long states, cudaStream_t stream"])
+        arrays = self._arrays(f"{self.robot}_real", "")
+        return ", ".join([*arrays, *self._status, "long long states, cudaStream_t stream"])
 
     @property
     def launch_arguments(self) -> str:
@@ -169,7 +171,7 @@ class CudaPackage:
 
     @property
     def macros(self) -> tuple[str, ...]:
-        """Macros of the bodies, which the header puts back at its end."""
+        """Macros of the bodies, which the header undefines at its end."""
         names = ["real", "V", "LOAD", "STORE", "STORE_GROUP", "STORE_ZERO", "STORE_ZEROS", "CLEAR", "SPLAT"]
         names += ["SINCOS", "APART", "PART", "NOT_INLINE", "spoil", "KEPT", "KEEP", "NAME"]
         names += [f"MINUS_PRODUCT_{shape.zero}" for shape in self.package.products]
