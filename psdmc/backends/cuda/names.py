@@ -5,7 +5,9 @@ from __future__ import annotations
 from psdmc.backends.c.names import is_reserved
 from psdmc.backends.names import identifier_of
 
-LIBRARIES = frozenset({"cuda", "cudart", "cudart_static", "cudadevrt", "culibos", "nvrtc", "nvptxcompiler_static"})
+LIBRARIES = frozenset(
+    {"cuda", "cudart", "cudart_static", "cudadevrt", "culibos", "nvrtc", "nvptxcompiler_static"}
+)
 """Libraries that nvcc and CMake link: a package's own library must not hide one of them."""
 
 

@@ -172,7 +172,7 @@ class CudaPackage:
     @property
     def macros(self) -> tuple[str, ...]:
         """Macros of the bodies, which the header undefines at its end."""
-        names = ["real", "V", "LOAD", "STORE", "STORE_GROUP", "STORE_ZERO", "STORE_ZEROS", "CLEAR", "SPLAT"]
+        names = ["real", "V", "LOAD", "STORE", "STORE_ZERO", "STORE_ZEROS", "CLEAR", "SPLAT"]
         names += ["SINCOS", "APART", "PART", "NOT_INLINE", "spoil", "KEPT", "KEEP", "NAME"]
         names += [f"MINUS_PRODUCT_{shape.zero}" for shape in self.package.products]
         return (*names, *(call.macro for call in self.package.calls))
@@ -199,7 +199,8 @@ class CudaPackage:
 def cuda_package(given: Emission) -> CudaPackage:
     """Return the data of a CUDA package. Raises InputError if there are no functions."""
     info = replace(given.info, name=identifier(given.info.name))
-    options = replace(given.options, target=SCALAR)
+    plain = replace(SCALAR, forms=SCALAR.forms[:1])
+    options = replace(given.options, target=plain)
     kernels = {name: _one_form(kernel) for name, kernel in given.kernels.items()}
     package = replace(package_view(info, kernels, options, given.references), info=given.info)
     signatures = [function.signature for function in package.functions]
@@ -216,7 +217,7 @@ def cuda_package(given: Emission) -> CudaPackage:
 
 
 def _one_form(kernel: Kernel) -> Kernel:
-    """The kernel in one form: without lanes, and without matrix products behind the other operations."""
-    is_straight = kernel.regions is None or (not kernel.is_loop_of_calls and len(kernel.single) <= LONGEST)
-    regions = None if is_straight else kernel.regions
-    return replace(kernel, batch=kernel.single, before=None, limbs=None, regions=regions)
+    """The kernel in one form, for one state: straight-line code unless that is long and there is another form."""
+    kernel = replace(kernel, batch=kernel.single, limbs=None)
+    is_straight = not kernel.is_loop_of_calls and len(kernel.single) <= LONGEST
+    return replace(kernel, before=None, regions=None) if is_straight else kernel
