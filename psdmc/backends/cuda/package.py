@@ -16,7 +16,7 @@ from psdmc.errors import InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.target.presets import SCALAR
 
-TAKEN = frozenset({"stride", "state", "states", "status", "stream", "tile", "here", "first"})
+TAKEN = frozenset({"state", "states", "status", "stream", "tile", "here", "first"})
 """Names of the CUDA code's own; no input or output may have one."""
 
 LONGEST = 12_000
@@ -48,10 +48,9 @@ class DeviceFunction:
         return f"{self.robot}_{self.view.name}"
 
     @property
-    def is_apart(self) -> bool:
-        """Return whether entries of its arrays may lie `stride` numbers apart. Those of a function with loops or calls
-        are neighbours, because it passes parts of its arrays on."""
-        return self.view.regions is None and not self.view.single_body.parts
+    def inlined(self) -> str:
+        """Return the qualifier of a function that becomes part of its kernels. Arrays of the thread are then registers."""
+        return "" if self.view.regions or self.view.single_body.parts else "__forceinline__ "
 
     @property
     def returns(self) -> str:
@@ -80,29 +79,20 @@ class DeviceFunction:
     @property
     def launch_arguments(self) -> str:
         """Addresses of the kernel's arguments."""
-        names = [*self._names("", ""), *(["status"] if self.view.positive else []), "states"]
-        return ", ".join(f"&{name}" for name in names)
+        names = [vector.name for vector in (*self.view.inputs, *self.view.outputs)]
+        names[len(self.view.inputs) : len(self.view.inputs)] = ["theta_b"] if self.view.theta else []
+        names += ["status"] if self.view.positive else []
+        return ", ".join(f"&{name}" for name in (*names, "states"))
 
     @property
-    def call_apart(self) -> str:
-        """Call in the kernel for arrays [entry][state]."""
-        return self._call([*self._names("", " + state"), "states"])
-
-    @property
-    def call_own(self) -> str:
+    def call(self) -> str:
         """Call with arrays of the thread's own."""
-        return self._call(self._names("own_", ""))
-
-    def _call(self, arguments: list[str]) -> str:
+        inputs, outputs = (
+            [f"own_{vector.name}" for vector in vectors] for vectors in (self.view.inputs, self.view.outputs)
+        )
+        arguments = [*inputs, *(["theta_b"] if self.view.theta else []), *outputs]
         call = f"{self.symbol}({', '.join(arguments)})"
         return f"const int failed = {call}" if self.view.positive else call
-
-    def _names(self, before: str, after: str) -> list[str]:
-        inputs, outputs = (
-            [f"{before}{vector.name}{after}" for vector in vectors]
-            for vectors in (self.view.inputs, self.view.outputs)
-        )
-        return [*inputs, *(["theta_b"] if self.view.theta else []), *outputs]
 
     def _arrays(self, real: str, qualifier: str) -> list[str]:
         inputs = [*(vector.name for vector in self.view.inputs), *(["theta_b"] if self.view.theta else [])]
@@ -114,19 +104,10 @@ class DeviceFunction:
         return ["int *status"] if self.view.positive else []
 
     @property
-    def pivots_declaration(self) -> str:
-        """Declaration of the array of pivots."""
-        assert self.view.positive is not None
-        name, size = self.view.positive.name, self.view.positive.size
-        return f"{self.robot}_pivots<{size}> {name}" if self.is_apart else f"real {name}[{size}]"
-
-    @property
     def pivots(self) -> tuple[tuple[str, int], ...]:
-        """Pivots and their numbers, the last computed first: of several that fail, the first one counts."""
-        if self.view.positive is None:
-            return ()
-        name = f"{self.view.positive.name}{'.at' if self.is_apart else ''}"
-        return tuple((f"{name}[{k}]", k + 1) for k in reversed(self.view.pivot_order))
+        """Pivots and their numbers, the last one first: of several that fail, the first one counts."""
+        order = reversed(self.view.pivot_order)
+        return tuple((f"{self.view.positive.name}[{k}]", k + 1) for k in order) if self.view.positive else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +154,7 @@ class CudaPackage:
     def macros(self) -> tuple[str, ...]:
         """Macros of the bodies, which the header undefines at its end."""
         names = ["real", "V", "LOAD", "STORE", "STORE_ZERO", "STORE_ZEROS", "CLEAR", "SPLAT"]
-        names += ["SINCOS", "APART", "PART", "NOT_INLINE", "spoil", "KEPT", "KEEP", "NAME"]
+        names += ["SINCOS", "PART", "NOT_INLINE", "spoil", "KEPT", "KEEP", "NAME"]
         names += [f"MINUS_PRODUCT_{shape.zero}" for shape in self.package.products]
         return (*names, *(call.macro for call in self.package.calls))
 
