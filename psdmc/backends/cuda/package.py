@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from psdmc.backends.c.body import make_body
 from psdmc.backends.c.kernel_view import KernelView, VectorView
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.self_test import SelfCheck
@@ -19,8 +20,9 @@ from psdmc.target.presets import SCALAR
 TAKEN = frozenset({"state", "states", "status", "stream", "tile", "here", "first"})
 """Names of the CUDA code's own; no input or output may have one."""
 
-LONGEST = 12_000
-"""Operations of the longest straight-line body where there is another form."""
+LONGEST = 9000
+"""Operations and outputs of the longest body in one piece. Shorter pieces pass values on in memory, which takes longer than
+spills; longer bodies take ptxas minutes."""
 
 ARRAYS = (
     "Arrays of one state: as in C, matrices row-major. A kernel computes one state per thread. Its arrays lie in the GPU's",
@@ -79,20 +81,20 @@ class DeviceFunction:
     @property
     def launch_arguments(self) -> str:
         """Addresses of the kernel's arguments."""
-        names = [vector.name for vector in (*self.view.inputs, *self.view.outputs)]
-        names[len(self.view.inputs) : len(self.view.inputs)] = ["theta_b"] if self.view.theta else []
-        names += ["status"] if self.view.positive else []
-        return ", ".join(f"&{name}" for name in (*names, "states"))
+        names = [*self._names(""), *(["status"] if self.view.positive else []), "states"]
+        return ", ".join(f"&{name}" for name in names)
 
     @property
     def call(self) -> str:
         """Call with arrays of the thread's own."""
-        inputs, outputs = (
-            [f"own_{vector.name}" for vector in vectors] for vectors in (self.view.inputs, self.view.outputs)
-        )
-        arguments = [*inputs, *(["theta_b"] if self.view.theta else []), *outputs]
-        call = f"{self.symbol}({', '.join(arguments)})"
+        call = f"{self.symbol}({', '.join(self._names('own_'))})"
         return f"const int failed = {call}" if self.view.positive else call
+
+    def _names(self, before: str) -> list[str]:
+        inputs, outputs = (
+            [before + vector.name for vector in vectors] for vectors in (self.view.inputs, self.view.outputs)
+        )
+        return [*inputs, *(["theta_b"] if self.view.theta else []), *outputs]
 
     def _arrays(self, real: str, qualifier: str) -> list[str]:
         inputs = [*(vector.name for vector in self.view.inputs), *(["theta_b"] if self.view.theta else [])]
@@ -183,7 +185,12 @@ def cuda_package(given: Emission) -> CudaPackage:
     plain = replace(SCALAR, forms=SCALAR.forms[:1])
     options = replace(given.options, target=plain)
     kernels = {name: _one_form(kernel) for name, kernel in given.kernels.items()}
-    package = replace(package_view(info, kernels, options, given.references), info=given.info)
+    package = package_view(info, kernels, options, given.references)
+    functions = tuple(
+        replace(each, kernels=tuple(_whole(view, kernels[view.name], package) for view in each.kernels))
+        for each in package.functions
+    )
+    package = replace(package, info=given.info, functions=functions)
     signatures = [function.signature for function in package.functions]
     for kernel in package.kernels:
         if wrong := TAKEN.intersection(vector.name for vector in (*kernel.inputs, *kernel.outputs)):
@@ -202,3 +209,15 @@ def _one_form(kernel: Kernel) -> Kernel:
     kernel = replace(kernel, batch=kernel.single, limbs=None)
     is_straight = not kernel.is_loop_of_calls and len(kernel.single) <= LONGEST
     return replace(kernel, before=None, regions=None) if is_straight else kernel
+
+
+def _whole(view: KernelView, kernel: Kernel, package: PackageView) -> KernelView:
+    """The view with its body in one piece unless that is long."""
+    program = kernel.before or kernel.single
+    sizes = {output.name: output.size for output in view.outputs}
+    if not view.single_body.parts or len(program) + sum(sizes.values()) > LONGEST:
+        return view
+    products = kernel.function.products if kernel.before else ()
+    has_matrix = any(output.is_matrix for output in kernel.function.outputs)
+    body = make_body(program, kernel.inputs, sizes, package.suffix, has_matrix, (), products)
+    return replace(view, single_body=body)
