@@ -1,5 +1,8 @@
-"""Machine code of CUDA packages, by NVRTC and ptxas, which need no GPU. `python tests/backends/cuda/machine_code.py` writes
-what registers.json states for the installed compiler."""
+"""Machine code of CUDA packages, by NVRTC and ptxas, which need no GPU.
+
+`python tests/backends/cuda/machine_code.py` writes the counts of the installed compiler into registers.json, and prints how
+long each function takes to compile.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,17 @@ import sys
 import tempfile
 import time
 from importlib import metadata
+from itertools import product
 from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[2]))
+
+from bundled import bundled_model
+from pinocchio_robots import path_of
 
 import psdmc
 from psdmc.compiler import emit
+from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE
 
 FILE = Path(__file__).parent / "registers.json"
 DERIVATIVES = ("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "forward_dynamics_vjp")
@@ -23,6 +33,18 @@ FAILED = "compute_{arch}: {log}"
 
 Counts = dict[str, list[int]]
 """Of each kernel: registers, and bytes that are stored to and read from memory for want of registers."""
+
+Records = dict[str, dict[str, Counts]]
+"""By version of the compiler, then by robot, precision and generation of GPUs."""
+
+
+def robots() -> dict[str, tuple[psdmc.DynamicsModel, tuple[str, ...]]]:
+    """The robots of which counts are recorded, and their functions."""
+    hyq = psdmc.derive(path_of("hyq"), floating=True)
+    return {
+        "kr6": (bundled_model("kr6"), (*DEFAULT, *DERIVATIVES)),
+        "hyq": (hyq, (*DEFAULT_WHERE_WIDE, *DERIVATIVES)),
+    }
 
 
 def wheel_file(wheel: str, name: str) -> Path | None:
@@ -111,3 +133,26 @@ def kernels_in(folder: Path) -> set[str]:
     functions = json.loads((folder / "manifest.json").read_text())["functions"]
     names = [kernel["name"] for each in functions for kernel in each["kernels"]]
     return {f"{name}_{layout}" for name in names for layout in ("states", "rows")}
+
+
+def text_of(records: Records) -> str:
+    """JSON with one kernel in a line."""
+    lines = json.dumps(records, indent=1)
+    return re.sub(r"\[\s+(\d+),\s+(\d+),\s+(\d+)\s+\]", r"[\1, \2, \3]", lines) + "\n"
+
+
+def main() -> None:
+    """Record the counts, robot by robot."""
+    records: Records = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    own = records.setdefault(version(), {})
+    for (robot, (model, names)), arch, real in product(robots().items(), (90, 80), ("float32", "float64")):
+        found: Counts = {}
+        for name in names:
+            with tempfile.TemporaryDirectory() as folder:
+                found |= counts(model, Path(folder), real, arch, (name,))
+        own[f"{robot} {real} sm_{arch}"] = found
+        FILE.write_text(text_of(records), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -20,7 +20,6 @@
 #define __noinline__ __attribute__((noinline))
 #define __launch_bounds__(threads)
 #define __shared__ static
-#define __threadfence_block() ((void)0)
 
 struct dim3 {
     unsigned x, y, z;
