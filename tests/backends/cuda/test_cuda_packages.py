@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 from bundled import bundled_model
 from command_line import typed
-from on_a_cpu import Library, passed, self_test
+from on_a_cpu import Library, compiled, passed, self_test
 from pinocchio_robots import path_of
 
 import psdmc
@@ -212,6 +212,19 @@ def test_what_is_refused(words: tuple[str, ...], said: str, tmp_path: Path) -> N
     assert re.search(said, done.stderr)
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_the_program_of_the_page(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "cuda.md").read_text(encoding="utf-8")
+    emit(bundled_model("scara"), tmp_path, "cuda", name="arm")
+    (program,) = re.findall(r"```cpp file=app.cu\n(.*?)```", page, re.DOTALL)
+    (kernel,) = re.findall(r"```cpp\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "app.cu").write_text(f"{program}\n{kernel}")
+
+    app = compiled(tmp_path, [tmp_path / "src" / "arm.cu", tmp_path / "app.cu"], "app", "-O1")
+
+    printed = subprocess.run([app], capture_output=True, text=True, check=True).stdout.strip()
+    assert f"It prints `{printed}`." in page
 
 
 @pytest.mark.slow
