@@ -82,7 +82,7 @@ def ptx(source: str, robot: str, arch: int) -> bytes:
         return text.value
 
     log = read("ProgramLog").decode()
-    assert not failed and not log.strip(), FAILED.format(arch=arch, log=log[:2000])
+    assert (failed, log.strip("\0 \n")) == (0, ""), FAILED.format(arch=arch, log=log[:2000])
     code = read("PTX")
     nvrtc.nvrtcDestroyProgram(ctypes.byref(program))
     return code
