@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from psdmc.backends.c.body import make_body
 from psdmc.backends.c.kernel_view import KernelView, VectorView
+from psdmc.backends.c.make_kernel_view import is_long, sizes_of
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.self_test import SelfCheck
 from psdmc.backends.cuda.names import identifier
@@ -15,14 +15,11 @@ from psdmc.backends.protocol import Emission
 from psdmc.backends.self_test import given_name
 from psdmc.errors import InternalError
 from psdmc.program.kernel import Kernel
+from psdmc.program.signature import Sizes
 from psdmc.target.presets import SCALAR
 
 TAKEN = frozenset({"state", "states", "status", "stream", "tile", "here", "first"})
 """Names of the CUDA code's own; no input or output may have one."""
-
-LONGEST = 9000
-"""Operations and outputs of the longest body in one piece. Shorter pieces pass values on in memory, which takes longer than
-spills; longer bodies take ptxas minutes."""
 
 ARRAYS = (
     "Arrays of one state: as in C, matrices row-major. A kernel computes one state per thread. Its arrays lie in the GPU's",
@@ -184,13 +181,9 @@ def cuda_package(given: Emission) -> CudaPackage:
     info = replace(given.info, name=identifier(given.info.name))
     plain = replace(SCALAR, forms=SCALAR.forms[:1])
     options = replace(given.options, target=plain)
-    kernels = {name: _one_form(kernel) for name, kernel in given.kernels.items()}
+    kernels = {name: _one_form(kernel, info.sizes) for name, kernel in given.kernels.items()}
     package = package_view(info, kernels, options, given.references)
-    functions = tuple(
-        replace(each, kernels=tuple(_whole(view, kernels[view.name], package) for view in each.kernels))
-        for each in package.functions
-    )
-    package = replace(package, info=given.info, functions=functions)
+    package = replace(package, info=given.info)
     signatures = [function.signature for function in package.functions]
     for kernel in package.kernels:
         if wrong := TAKEN.intersection(vector.name for vector in (*kernel.inputs, *kernel.outputs)):
@@ -204,20 +197,9 @@ def cuda_package(given: Emission) -> CudaPackage:
     return CudaPackage(package, description)
 
 
-def _one_form(kernel: Kernel) -> Kernel:
+def _one_form(kernel: Kernel, sizes: Sizes) -> Kernel:
     """The kernel in one form, for one state: straight-line code unless that is long and there is another form."""
-    kernel = replace(kernel, batch=kernel.single, limbs=None)
-    is_straight = not kernel.is_loop_of_calls and len(kernel.single) <= LONGEST
-    return replace(kernel, before=None, regions=None) if is_straight else kernel
-
-
-def _whole(view: KernelView, kernel: Kernel, package: PackageView) -> KernelView:
-    """The view with its body in one piece unless that is long."""
-    program = kernel.before or kernel.single
-    sizes = {output.name: output.size for output in view.outputs}
-    if not view.single_body.parts or len(program) + sum(sizes.values()) > LONGEST:
-        return view
-    products = kernel.function.products if kernel.before else ()
-    has_matrix = any(output.is_matrix for output in kernel.function.outputs)
-    body = make_body(program, kernel.inputs, sizes, package.suffix, has_matrix, (), products)
-    return replace(view, single_body=body)
+    kernel, own = replace(kernel, batch=kernel.single, limbs=None), sizes_of(kernel, sizes)
+    outputs = {q.name: own.size(q) for q in kernel.function.outputs}
+    is_other = kernel.is_loop_of_calls or is_long(kernel.single, outputs)
+    return kernel if is_other else replace(kernel, before=None, regions=None)

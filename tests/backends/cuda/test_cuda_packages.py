@@ -17,7 +17,6 @@ from pinocchio_robots import path_of
 
 import psdmc
 from psdmc.backends.c import make_kernel_view
-from psdmc.backends.cuda import package
 from psdmc.backends.cuda.names import identifier
 from psdmc.compiler import compare_emitted, emit
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, OF_TREES, RECIPES
@@ -60,7 +59,6 @@ def test_every_function_of_a_small_robot(tmp_path: Path) -> None:
 
 def test_loops_calls_and_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Forms that long functions have, of an arm."""
-    monkeypatch.setattr(package, "LONGEST", 0)
     monkeypatch.setattr(make_kernel_view, "LONG", 300)
     monkeypatch.setattr(make_kernel_view, "PART", 100)
     names = ("forward_dynamics_derivatives", "rk4_step_derivatives")

@@ -48,11 +48,11 @@ def test_of_an_arm(real: str, arch: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arch", [90, 80])
 @pytest.mark.parametrize("real", ["float32", "float64"])
-def test_of_a_quadruped(real: str, arch: int, tmp_path: Path) -> None:
+def test_of_a_quadruped(real: str, tmp_path: Path) -> None:
+    """For one generation of GPUs: ptxas takes minutes."""
     model = psdmc.derive(path_of("hyq"), floating=True)
-    check(model, "hyq", real, arch, (*DEFAULT_WHERE_WIDE, *DERIVATIVES), tmp_path)
+    check(model, "hyq", real, 90, (*DEFAULT_WHERE_WIDE, *DERIVATIVES), tmp_path)
 
 
 def test_more_than_recorded_is_noticed() -> None:
