@@ -27,6 +27,8 @@ ARRAYS = (
     "  _states  entry i of the state s is at [i * states + s]; neighbouring threads read neighbouring numbers",
     "  _rows    one state after the other: entry i of the state s is at [s * size + i]",
     "  _theta   with the base parameters theta_b as an input, one theta_b for all states",
+    "A function that returns int returns 0, or 1 + the number of the first pivot that is not positive. The outputs of such",
+    "a state are NaN. Its kernels write these numbers into status, one per state; status may be null.",
     "Quaternions, and cosine and sine of an angle, are of length one.",
 )
 
