@@ -103,11 +103,11 @@ $(ADAPTERS)/ready: pyproject.toml
 	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check '$(TORCH)' 2>/dev/null \
 	  || $(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url $(TORCH_INDEX) '$(TORCH)'
 	$(ADAPTERS)/bin/python -m pip install --quiet --disable-pip-version-check \
-	  --editable '.[jax,torch,fmu]' pytest pytest-xdist hypothesis example-robot-data mpmath
+	  --editable '.[jax,torch,fmu,cuda]' pytest pytest-xdist hypothesis example-robot-data mpmath
 	@touch $@
 
-test-adapters: $(ADAPTERS)/ready ## test robots inside JAX, PyTorch, FMPy and pip's wheels, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
-	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks tests/backends/adapters
+test-adapters: $(ADAPTERS)/ready ## test robots inside JAX, PyTorch, FMPy and pip's wheels, and compile CUDA packages, in a separate environment; TORCH=torch takes the newest PyTorch with CUDA
+	$(ADAPTERS)/bin/python -m pytest -q -rs -n $(JOBS) --dist loadfile tests/frameworks tests/backends/adapters tests/backends/cuda/test_machine_code.py
 
 EXAMPLES := .venv-examples
 EXAMPLE_TESTS = $(shell grep -o 'tests/[a-z_/]*\.py' examples/README.md)

@@ -52,6 +52,7 @@ MENU = {
     "How to use the code": (
         "how-to/cmake",
         "how-to/rust",
+        "how-to/cuda",
         "how-to/embedded",
         "how-to/precision-and-simd",
         "how-to/batch",

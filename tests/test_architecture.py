@@ -115,7 +115,10 @@ ROOMS = {
         },  # paths that it is given: 0117
     },
     "lower": {"expanded": set()},
-    "backends": {room: {path.stem for path in (PACKAGE / "backends").glob("*.py")} for room in ("c", "rust")},
+    "backends": {
+        room: {path.stem for path in (PACKAGE / "backends").glob("*.py")} | more
+        for room, more in {"c": set(), "rust": set(), "cuda": {"c"}}.items()
+    },
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
@@ -376,6 +379,7 @@ C_TEXT = re.compile(
 )
 WRITE_C = {
     "backends/c": "the back end of C",
+    "backends/cuda": "CUDA is C++ around the bodies of C",
     "toolchain": "compiles",
     "bench/rivals": "other programs' C and C++ around theirs and psdmc's",
     "calibration/identify/state_friction.py": "compiles the simulation of a friction law with a state",

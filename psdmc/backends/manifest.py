@@ -128,7 +128,7 @@ LARGEST_LIST = 16 << 20
 
 OWN_NAME = re.compile(
     r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi(?:_(?:theta|hessian))? | wheel | fmu2? | mex | ros2 )
-              / [A-Za-z_]\w* \. (?: c | cpp | h | hpp | inc )
+              / [A-Za-z_]\w* \. (?: c | cpp | h | hpp | inc | cu | cuh )
           | cmake / [A-Za-z_]\w* \.cmake\.in
           | [A-Za-z_]\w* \.pc\.in
           | (?: src | tests ) / [a-z_]\w* \.rs

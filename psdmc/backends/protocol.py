@@ -19,7 +19,7 @@ from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Signature, in_order
 from psdmc.robot.mechanism import BASE_FRAME
 
-BACK_ENDS = ("c", "rust")
+BACK_ENDS = ("c", "rust", "cuda")
 """By name, the rooms of this folder."""
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from psdmc.export.read_back import Reading
     from psdmc.model.dynamics_model import DynamicsModel
 
-BACK_ENDS = ("c", "rust")
+BACK_ENDS = ("c", "rust", "cuda")
 """Those of psdmc.backends.protocol, which loads slowly; a test compares."""
 
 
@@ -52,7 +52,7 @@ def emit(
         str,
         typer.Option(
             metavar="NAME",
-            help=f"language of the package: {' or '.join(BACK_ENDS)}",
+            help=f"language of the package: {', '.join(BACK_ENDS)}",
             autocompletion=lambda: list(BACK_ENDS),
         ),
     ] = BACK_ENDS[0],

@@ -60,7 +60,7 @@ def _function(function: FunctionView) -> dict[str, Any]:
     }
 
 
-C_SUFFIXES = (".c", ".cpp", ".h", ".hpp", ".inc")
+C_SUFFIXES = (".c", ".cpp", ".h", ".hpp", ".inc", ".cu", ".cuh")
 SPDX = "SPDX-License-Identifier"
 LICENCE = f"/* {SPDX}: 0BSD */\n"
 """First line of each C file: the code is its user's, without any obligation."""

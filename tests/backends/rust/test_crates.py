@@ -202,7 +202,7 @@ def test_a_package_of_another_language_is_replaced_and_foreign_files_are_not(tmp
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--backend", "fortran"), "no back end 'fortran'.*\n.*choose one of c, rust"),
+        (("--backend", "fortran"), "no back end 'fortran'.*\n.*choose one of c, rust, cuda"),
         (("--backend", "rust", "--payload"), "rust has no --payload.*\n.*emit-c"),
         (("--backend", "rust", "--with", "casadi"), "rust has no --with"),
         (("--backend", "rust", "--target", "cortex-m7"), "rust has no --target"),
