@@ -249,7 +249,7 @@ def run(name: str, real: str, options: argparse.Namespace, folder: Path) -> dict
         "OMP_NUM_THREADS": "1",
         "JAX_ENABLE_X64": str(int(real == "float64")),
     }
-    python = options.adam if name == "adam (JAX)" and options.adam else sys.executable
+    python = str(options.adam) if name == "adam (JAX)" and options.adam else sys.executable
     command = ["taskset", "-c", str(options.core), python, str(Path(__file__).resolve())]
     command += ["--child", name, "--real", real, "--known", str(folder / "known.npz")]
     try:
@@ -259,7 +259,7 @@ def run(name: str, real: str, options: argparse.Namespace, folder: Path) -> dict
     except subprocess.TimeoutExpired:
         return {"failed": f"took more than {10 * LONGEST:.0f} s"}
     if ran.returncode:
-        told = [line for line in ran.stderr.splitlines() if "Error" in line] or ["no message"]
+        told = [line for line in ran.stderr.splitlines() if "Error" in line] or [f"status {ran.returncode}"]
         return {"failed": told[-1].strip()[:200]}
     return dict(json.loads(ran.stdout.strip().splitlines()[-1]))
 
@@ -270,7 +270,11 @@ def main() -> None:
     parser.add_argument("--real", help=argparse.SUPPRESS)
     parser.add_argument("--known", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--only", default="", help="names of contestants, separated by commas")
-    parser.add_argument("--adam", help="the Python that has adam and the JAX that adam asks for")
+    parser.add_argument(
+        "--adam",
+        type=lambda text: Path(text).absolute(),
+        help="the Python that has adam and the JAX that adam asks for",
+    )
     parser.add_argument("--core", type=int, default=max(os.sched_getaffinity(0)))
     options = parser.parse_args()
     if options.child:
