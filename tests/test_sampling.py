@@ -33,7 +33,10 @@ from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError, ToolchainError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import file_bytes
+from psdmc.program.signature import QD, Q
+from psdmc.robot.load import load_robot
 from psdmc.sampling import Motion, Sampled, Sampling, parts
+from psdmc.sampling.limits import WithinLimits
 from psdmc.sampling.plan import Plan
 
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -84,6 +87,21 @@ def whole(arm: DynamicsModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_a_range_that_is_given_and_the_limits_hold_together() -> None:
+    """A speed below the file's limits narrows the range; positions that no limit allows are refused."""
+    robot = load_robot(Path(__file__).parents[1] / "examples/robots/kr6.toml").mechanism
+    joints = tuple(
+        replace(joint, limits=replace(joint.limits, lower=1.0, upper=2.0, speed=3.0))
+        for joint in robot.joints
+    )
+    robot = replace(robot, joints=joints)
+    found = WithinLimits.of(robot, [Q, QD], {"position": 1.5, "speed": 0.5}).ranges
+    assert np.array_equal(found["q"], [[1.0] * 6, [1.5] * 6])
+    assert np.array_equal(found["qd"], [[-0.5] * 6, [0.5] * 6])
+    with pytest.raises(InputError, match=r"no position within its limits is from -0\.9 to 0\.9"):
+        WithinLimits.of(robot, [Q], {"position": 0.9})
+
+
 def test_values_are_pinocchios_at_states_within_the_limits(arm: DynamicsModel, whole: Path) -> None:
     own, pinocchio = columns(whole), subject("two_link").pinocchio
     assert len(own["q"]) == 500
@@ -92,7 +110,7 @@ def test_values_are_pinocchios_at_states_within_the_limits(arm: DynamicsModel, w
     for name, word in (("q", "position"), ("qd", "speed"), ("qdd", "acceleration")):
         limits = [joint.limits for joint in arm.mechanism.joints]
         upper = [{"q": each.upper, "qd": each.speed, "qdd": each.acceleration}[name] for each in limits]
-        upper = np.where(np.isfinite(upper), upper, GIVEN[word])
+        upper = np.minimum(upper, GIVEN[word])
         assert (own[name] < upper).all()
         assert (own[name].max(axis=0) > 0.95 * upper).all()
         assert (np.abs(own[name].mean(axis=0)) < 0.1 * upper).all() or name == "q"

@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
@@ -160,6 +161,9 @@ def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Di
         raise
     for path in stale:
         (root / path).unlink(missing_ok=True)
+        for folder in list(Path(path).parents)[:-1]:
+            with suppress(OSError):  # it is not empty
+                (root / folder).rmdir()  # make would take an empty folder for a target that is up to date
 
 
 def _tidy(root: Path, files: Mapping[str, str]) -> None:

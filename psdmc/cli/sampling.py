@@ -36,7 +36,8 @@ def sample(
     position: Annotated[
         float | None,
         typer.Option(
-            metavar="RAD", help="positions are within plus or minus this, rad or m, if the file has no limit"
+            metavar="RAD",
+            help="positions are within plus or minus this, rad or m, and within the file's limits",
         ),
     ] = None,
     speed: Annotated[

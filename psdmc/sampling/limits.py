@@ -13,7 +13,7 @@ from scipy.special import ndtri
 
 from psdmc.errors import InputError
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity
-from psdmc.robot.limits import listed
+from psdmc.robot.limits import listed, shown
 from psdmc.robot.mechanism import Limits, Mechanism
 from psdmc.robot.unit_lengths import units_of
 
@@ -49,9 +49,10 @@ class WithinLimits:
 
     @classmethod
     def of(cls, robot: Mechanism, reads: Sequence[Quantity], given: Mapping[str, float]) -> WithinLimits:
-        """Return what draws these quantities of a robot. Raises InputError if a joint has no limits.
+        """Return what draws these quantities of a robot. Raises InputError if a joint has no limits, or none of
+        its values is within a range.
 
-        given  ranges, plus and minus, for joints without a limit in the robot file: word of LIMITS -> range
+        given  ranges, plus and minus, beside the limits in the robot file: word of LIMITS -> range
         """
         found, lacking = {}, {}
         for quantity in reads:
@@ -104,7 +105,13 @@ def _bounds(robot: Mechanism, quantity: str, given: float | None) -> tuple[Array
     for joint in (robot.joints[i] for i in robot.own_joints):
         low, high = _limits(joint.limits, quantity)
         if given is not None:
-            low, high = (low if math.isfinite(low) else -given), (high if math.isfinite(high) else given)
+            if low > given or high < -given:
+                word = LIMITS[quantity][0]
+                raise InputError(
+                    f"{robot.name}: joint {shown(joint.name)}: no {word} within its limits is from {-given:g} to {given:g}",
+                    f"give a larger number for --{word}",
+                )
+            low, high = max(low, -given), min(high, given)
         size = joint.type.nq if quantity == Q.name else joint.type.nv
         own = [(low, high)] * size
         if quantity == Q.name:

@@ -63,6 +63,20 @@ def test_files_of_another_function_set_are_removed(tmp_path: Path) -> None:
     assert not (tmp_path / "src/old.c").exists()
 
 
+def test_folders_that_become_empty_are_removed(tmp_path: Path) -> None:
+    """`make fmu` would take a folder of that name for a target that is up to date."""
+    old = {"fmu/old.c": "int x;\n", "wheel/old.c": "int x;\n"}
+    listed = json.loads(FILES["manifest.json"])
+    listed["files"] |= {path: digest(text) for path, text in old.items()}
+    write_package(tmp_path, {**FILES, **old, "manifest.json": json.dumps(listed)})
+    (tmp_path / "wheel/own.c").write_text("int y;\n", encoding="utf-8")
+
+    write_package(tmp_path, FILES)
+
+    assert not (tmp_path / "fmu").exists()
+    assert [path.name for path in (tmp_path / "wheel").iterdir()] == ["own.c"]
+
+
 def _with(files: dict[str, str], path: str, text: str) -> str:
     content = json.loads(files["manifest.json"])
     content["files"][path] = digest(text)
