@@ -30,7 +30,7 @@ class Sampling:
     real       precision of states and values
     spread     0 to 1: for each state, the mass and inertia of each link are multiplied by a random factor between 1 -
                spread and 1 + spread
-    given      ranges, plus and minus, for joints without a limit in the robot file: word of LIMITS -> range
+    given      ranges, plus and minus, beside the limits in the robot file: word of LIMITS -> range
     along      the motion at whose times the states are drawn; None: the states are drawn within the limits
     noise      standard deviation of noise on states of a motion, as a share of each value's standard deviation
     rows       number of states per part; None: as many as PART_BYTES and PART_STATES allow

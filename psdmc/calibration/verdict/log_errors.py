@@ -328,9 +328,9 @@ def _tilts(model: DynamicsModel, motion: Sequence[Array]) -> Array:
     return np.concatenate(parts, axis=2)
 
 
-def _solution(matrix: Array, right: Array) -> Array:
-    """The solution of a symmetric system without directions whose eigenvalue is too small. If there is none of these, as
-    LAPACK's estimate of the condition number tells, Cholesky's method takes a twentieth of the time."""
+def solution(matrix: Array, right: Array) -> Array:
+    """Return the solution (p,) of a symmetric system (p, p) without directions whose eigenvalue is below RANK_TOLERANCE**2
+    of the largest. If LAPACK's estimate of the condition number says that there are none, Cholesky's method is faster."""
     factor, fails = lapack.dpotrf(matrix)
     if not fails and lapack.dpocon(factor, np.abs(matrix).sum(axis=0).max())[0] > 10.0 * RANK_TOLERANCE**2:
         return np.asarray(lapack.dpotrs(factor, right)[0])
@@ -375,7 +375,7 @@ class Sums:
         a, b = gram[np.ix_(columns, columns)], gram[columns, -1]
         norms = np.sqrt(np.diag(a))
         scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
-        return columns, _solution(a * np.outer(scale, scale), b * scale) * scale
+        return columns, solution(a * np.outer(scale, scale), b * scale) * scale
 
     def values(self, which: Sequence[int], weights: Array) -> Array:
         """Return the values of all fitted columns in their own units."""

@@ -15,7 +15,7 @@ from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import bridged, geared, scaled, stuck
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
-from psdmc.calibration.verdict.log_errors import log_errors, unstated_load
+from psdmc.calibration.verdict.log_errors import log_errors, solution, unstated_load
 from psdmc.errors import InputError
 
 ELBOW = 1
@@ -103,3 +103,18 @@ def test_rows_that_were_interpolated_are_counted(arm, plant_log):
     said = next(note for note in notes if "look interpolated" in note)
     assert f"{share:.0%}" in said or f"{share - 0.01:.0%}" in said
     assert not checked(plant_log, arm.model.mechanism, 8.0).notes
+
+
+@pytest.mark.parametrize("apart", [1.0, 3e-2, 1e-5])
+def test_systems_are_solved_without_directions_that_the_samples_do_not_show(apart: float) -> None:
+    """Columns of which two differ little or hardly: the truncated sum over NumPy's eigenvectors."""
+    rng = np.random.default_rng(4)
+    columns = rng.normal(size=(300, 12))
+    columns[:, -1] = columns[:, 0] + apart * columns[:, -1]
+    columns /= np.linalg.norm(columns, axis=0)
+    gram, right = columns.T @ columns, rng.normal(size=12)
+    sizes, vectors = np.linalg.eigh(gram)
+    shown = sizes > 1e-6 * sizes[-1]
+    expected = vectors[:, shown] @ ((vectors[:, shown].T @ right) / sizes[shown])
+    assert shown.all() == (apart > 1e-3)
+    np.testing.assert_allclose(solution(gram, right), expected, rtol=0, atol=1e-11 * np.abs(expected).max())
