@@ -43,7 +43,8 @@ SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 SINGLE = (*(("scara", "kr6") if WHOLE else ()), "sliding")
 """Robots that are compiled in float32 too."""
 
-COMPILED = {("scara", "float64"), (ARM, "float64"), ("sliding", "float64"), ("sliding", "float32")}
+SINGLE_TOO = [("sliding", "float32")] if WHOLE else []
+COMPILED = {("scara", "float64"), (ARM, "float64"), ("sliding", "float64"), *SINGLE_TOO}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
 OPTIMISED = COMPILED if WHOLE else {("two_link", "float64")}
