@@ -31,7 +31,7 @@ from psdmc.frameworks.differentiation import (
     refuse_constant,
     require_rule,
 )
-from psdmc.functions import SIGNATURES
+from psdmc.functions import SIGNATURES, no_function
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
@@ -67,7 +67,8 @@ def jax_robot(
             f"{compiled.name}: the precision is float64, and JAX's option jax_enable_x64 is off",
             'call jax.config.update("jax_enable_x64", True) first, or give real="float32"',
         )
-    key = repr((found.content_hash, lowering, real, trig, target, gravity_input))
+    options = (lowering, real, trig, target, gravity_input)
+    key = repr((found.content_hash, *options))
     robot, chain = compiled, found.mechanism
     sizes = Sizes(
         robot.n,
@@ -78,7 +79,8 @@ def jax_robot(
         rows_of_contacts=chain.rows_of_contacts,
         rows_of_loops=chain.rows_of_loops,
     )
-    return _MADE.setdefault(key, JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes))
+    made = JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes, (found, *options))
+    return _MADE.setdefault(key, made)
 
 
 class JaxRobot:
@@ -94,17 +96,33 @@ class JaxRobot:
     """
 
     def __init__(
-        self, compiled: CompiledRobot[Any], key: str, coordinates: Coordinates, sizes: Sizes
+        self,
+        compiled: CompiledRobot[Any],
+        key: str,
+        coordinates: Coordinates,
+        sizes: Sizes,
+        request: tuple[Any, ...],
     ) -> None:
         self.compiled = compiled
         """The same robot for NumPy arrays, with the names, sizes, limits and theta_b of the robot."""
         self._key = key
-        self._coordinates, self._sizes = coordinates, sizes
+        self._coordinates, self._sizes, self._request = coordinates, sizes, request
         self._kernels: dict[tuple[str, bool], Kernel] = {}
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    else:
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_function(self, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return jax_robot, self._request
+
+    def __deepcopy__(self, memo: object) -> JaxRobot:
+        return self
 
     def __repr__(self) -> str:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"

@@ -27,7 +27,7 @@ from psdmc.frameworks.differentiation import (
     require_rule,
     rule_of,
 )
-from psdmc.functions import SIGNATURES
+from psdmc.functions import SIGNATURES, no_function
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import for_every_gravity
@@ -169,6 +169,11 @@ class TorchRobot:
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    else:
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_function(self, name)
 
 
 def _method(function: Signature) -> Callable[..., Any]:

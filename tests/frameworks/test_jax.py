@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -414,8 +416,13 @@ def test_float64_needs_jax_enable_x64() -> None:
 
 def test_an_equal_robot_is_the_same_one() -> None:
     model = differentiated("scara").model
-    assert psdmc.jax(model) is psdmc.jax(model)
+    robot = psdmc.jax(model)
+    assert psdmc.jax(model) is robot
+    assert copy.copy(robot) is copy.deepcopy(robot) is pickle.loads(pickle.dumps(robot)) is robot
     assert repr(psdmc.jax(model)) == "JaxRobot 'scara': 4 joints, float64"
+    with pytest.raises(AttributeError, match=r"^JaxRobot has no function 'grvity'; do you mean gravity"):
+        robot.grvity  # noqa: B018
+    assert not hasattr(robot, "__zzz__")
     assert "Compute the gravity torques" in psdmc.jax(model).gravity.__doc__
 
 

@@ -426,6 +426,10 @@ def test_a_robot_is_one_object() -> None:
     assert psdmc.torch(differentiated("scara").model) is robot
     assert copy.deepcopy(robot) is robot
     assert pickle.loads(pickle.dumps(robot)) is robot
+    assert copy.copy(robot) is robot
+    with pytest.raises(AttributeError, match=r"^TorchRobot has no function 'grvity'; do you mean gravity"):
+        robot.grvity  # noqa: B018
+    assert not hasattr(robot, "__zzz__")
     assert repr(robot) == "TorchRobot 'scara': 4 joints"
     assert robot.neutral().tolist() == [0.0] * 4
     assert robot.neutral(torch.float32).dtype == torch.float32
