@@ -23,6 +23,7 @@ from psdmc.frameworks.coordinates import Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
     Rule,
+    no_derivatives,
     refuse_constant,
     require_rule,
     rule_of,
@@ -396,10 +397,8 @@ class _Operator:
         name = self.function.name
         first = name.partition("_vjp")[0].removesuffix("_jvp")
         if rule_of(name) is None and first != name:
-            raise ArgumentError(
-                f"{first} has no second derivatives",
-                "leave out create_graph=True, or take differences of first derivatives",
-            )
+            error = no_derivatives(first, 2)
+            raise ArgumentError(error.message, f"leave out create_graph=True, or {error.hint}")
         gravity = [moved for each, moved in zip(self.function.inputs, moves, strict=False) if each is GRAVITY]
         rule = require_rule(name, bool(gravity), any(gravity))
         for given, moved in zip(arguments(self.function), moves, strict=True):

@@ -382,9 +382,26 @@ def test_what_has_no_derivative_is_refused_by_name() -> None:
         "^jacobian has no derivatives",
         "inverse_dynamics",
     )
+    seconds = {
+        "gravity": "call robot.inverse_dynamics_second_derivatives with zero rates and accelerations",
+        "mass_matrix": "take differences of first derivatives",
+        "forward_kinematics": "take differences",
+    }
+    for name, remedy in seconds.items():
+        for twice in (jax.hessian, lambda f: jax.jacrev(jax.jit(jax.jacrev(f)))):
+            call = getattr(robot, name)
+            refused(
+                lambda: twice(lambda q: call(q)[0].sum())(q), f"^{name} has no second derivatives", remedy
+            )  # noqa: B023
+    energy = jax.jacfwd(jax.hessian(robot.potential_energy))
+    refused(lambda: energy(q), "^potential_energy has no third derivatives", "take differences")
+    forward = jax.hessian(lambda tau: robot.forward_dynamics(q, q, tau).sum())
     refused(
-        lambda: jax.hessian(lambda q: robot.gravity(q).sum())(q),
-        "^inverse_dynamics has no second derivatives",
+        lambda: forward(q), "^forward_dynamics has no second", "robot.forward_dynamics_second_derivatives: it"
+    )
+    by_vjp = jax.grad(lambda q: robot.inverse_dynamics_vjp(q, q, q, q).tau.sum())
+    refused(
+        lambda: by_vjp(q), "^inverse_dynamics_vjp has no derivatives", "inverse_dynamics_second_derivatives"
     )
     step = jax.jacfwd(lambda dt: robot.semi_implicit_euler(q, q, q, dt).q_next)
     refused(lambda: step(0.01), "^semi_implicit_euler has no derivative by dt", "forward_dynamics")
