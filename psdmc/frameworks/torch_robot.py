@@ -87,7 +87,7 @@ class TorchRobot:
     robots.
 
     The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64,
-    or all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
+    or all are float32. Inputs with one number per state, such as a time step dt, can also be numbers of Python. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
     definite, the results of this state are NaN. A method with several results returns a named tuple.
 
     The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
@@ -180,14 +180,17 @@ class TorchRobot:
 def _method(function: Signature) -> Callable[..., Any]:
     names, result = arguments(function), results(function)
     required = len(function.inputs)
+    scalars = [k for k, quantity in enumerate(function.inputs) if not quantity.axes]
 
-    def method(self: TorchRobot, *given: Tensor, **named: Tensor) -> Any:
+    def method(self: TorchRobot, *given: Any, **named: Any) -> Any:
         gravity = named.pop(GRAVITY.name, None)
         missing = [name for name in names[len(given) : required] if name not in named]
         if missing or len(given) > len(names) or any(name not in names[len(given) :] for name in named):
             got = ", ".join([f"{len(given)} tensors", *named])
             raise TypeError(f"{function.name}({', '.join(names)}): got {got}")
         tensors = [*given, *(named.get(name) for name in names[len(given) :])]
+        for k in scalars:
+            tensors[k] = _as_scalar(tensors[k], like=tensors[0])
         for name, tensor in zip(names, tensors, strict=True):
             _refuse_elsewhere(f"{function.name}: {name}", tensor, is_optional=name == "theta_b")
         _refuse_elsewhere(f"{function.name}: {GRAVITY.name}", gravity, is_optional=True)
@@ -200,6 +203,12 @@ def _method(function: Signature) -> Callable[..., Any]:
     method.__name__, method.__qualname__ = function.name, f"{TorchRobot.__name__}.{function.name}"
     method.__doc__ = f"{function.summary}\n\nSee `psdmc.CompiledRobot.{function.name}` for shapes and units."
     return method
+
+
+def _as_scalar(given: Any, like: Any) -> Any:
+    """A number as a tensor () of the type of `like`; anything else as it is."""
+    is_number = isinstance(given, (int, float)) and isinstance(like, torch.Tensor)
+    return torch.full((), given, dtype=like.dtype) if is_number else given
 
 
 def _refuse_elsewhere(what: str, tensor: Any, is_optional: bool) -> None:

@@ -315,6 +315,34 @@ def test_second_derivatives_are_refused() -> None:
         func.hessian(lambda q: robot.forward_dynamics(q, *given[1:]).sum())(given[0])
 
 
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_time_steps_take_numbers(real: str) -> None:
+    """dt as a number of Python, by place and by name, gives what a tensor gives, and gradients by the other inputs."""
+    robot, dtype = robot_of("scara"), getattr(torch, real)
+    q, qd, tau, _ = (x.to(dtype) for x in drawn("scara", "semi_implicit_euler"))
+    dt = torch.tensor(0.25, dtype=dtype)
+    for step in (robot.semi_implicit_euler, robot.rk4_step):
+        expected = step(q, qd, tau, dt)
+        for found in (step(q, qd, tau, 0.25), step(q, qd, tau, dt=0.25), step(q, qd, tau, np.float64(0.25))):
+            assert found.q_next.dtype == dtype
+            assert torch.equal(found.q_next, expected.q_next)
+            assert torch.equal(found.qd_next, expected.qd_next)
+        slopes = [
+            torch.autograd.grad(step(q, qd, given, each).q_next.sum(), given)[0]
+            for given, each in ((tau.clone().requires_grad_(), 0.25), (tau.clone().requires_grad_(), dt))
+        ]
+        assert torch.equal(*slopes)
+        assert slopes[0].abs().max() > 0.0
+    assert torch.equal(robot.rk4_step(q, qd, tau, 0).q_next, q)
+    compiled = torch.compile(lambda dt: robot.semi_implicit_euler(q, qd, tau, dt).q_next, fullgraph=True)
+    for each in (0.25, 0.5):
+        assert same(compiled(each), robot.semi_implicit_euler(q, qd, tau, each).q_next, 1e-6)
+    with pytest.raises(TypeError, match="tau is a float, expected a torch.Tensor"):
+        robot.semi_implicit_euler(q, qd, 0.1, 0.25)
+    with pytest.raises(TypeError, match="dt is a str"):
+        robot.semi_implicit_euler(q, qd, tau, "0.25")
+
+
 def test_what_has_no_derivative_is_named() -> None:
     robot = robot_of("hopper")
     q, qd, tau, dt = drawn("hopper", "semi_implicit_euler")
