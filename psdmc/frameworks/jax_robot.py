@@ -23,7 +23,7 @@ from jax.interpreters import ad, batching, mlir
 from psdmc.compiler import compile
 from psdmc.errors import InputError
 from psdmc.frameworks import xla
-from psdmc.frameworks.coordinates import Coordinates
+from psdmc.frameworks.coordinates import ON_COORDINATES, Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
     Arrays,
@@ -180,9 +180,6 @@ class JaxRobot:
 
 
 THETA = Quantity("theta_b", ("l",))
-
-ON_COORDINATES = {"integrate": "integrated", "difference": "difference"}
-"""Functions that JAX computes itself, so that it differentiates them as often as wanted, and the methods of Coordinates."""
 
 
 def _method(function: Signature) -> Callable[..., Any]:

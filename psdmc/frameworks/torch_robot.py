@@ -19,7 +19,7 @@ from torch._functorch.utils import enable_single_level_autograd_function
 from torch.autograd.function import _SingleLevelFunction
 
 from psdmc.compiler import compile as compiled
-from psdmc.frameworks.coordinates import Coordinates
+from psdmc.frameworks.coordinates import ON_COORDINATES, Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
     Rule,
@@ -54,9 +54,6 @@ ARRAYS = SimpleNamespace(**(vars(torch) | {"moveaxis": torch.movedim}))
 
 THETA_B = Quantity("theta_b", ("l",))
 
-ON_COORDINATES = {"integrate": "integrated", "difference": "difference"}
-"""Functions that PyTorch computes itself, so that it differentiates them as often as wanted, and methods of Coordinates."""
-
 _LIBRARY = torch.library.Library("psdmc", "FRAGMENT")
 """Operators are registered as long as this lives."""
 
@@ -87,8 +84,9 @@ class TorchRobot:
     robots.
 
     The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64,
-    or all are float32. Inputs with one number per state, such as a time step dt, can also be numbers of Python. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
-    definite, the results of this state are NaN. A method with several results returns a named tuple.
+    or all are float32. Inputs with one number per state, such as a time step dt, can also be numbers of Python. Leading
+    axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite, the results of this
+    state are NaN. A method with several results returns a named tuple.
 
     The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
     derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is

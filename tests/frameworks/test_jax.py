@@ -7,7 +7,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -388,11 +388,9 @@ def test_what_has_no_derivative_is_refused_by_name() -> None:
         "forward_kinematics": "take differences",
     }
     for name, remedy in seconds.items():
-        for twice in (jax.hessian, lambda f: jax.jacrev(jax.jit(jax.jacrev(f)))):
-            call = getattr(robot, name)
-            refused(
-                lambda: twice(lambda q: call(q)[0].sum())(q), f"^{name} has no second derivatives", remedy
-            )  # noqa: B023
+        first = partial(lambda call, q: call(q)[0].sum(), getattr(robot, name))
+        for second in (jax.hessian(first), jax.jacrev(jax.jit(jax.jacrev(first)))):
+            refused(partial(second, q), f"^{name} has no second derivatives", remedy)
     energy = jax.jacfwd(jax.hessian(robot.potential_energy))
     refused(lambda: energy(q), "^potential_energy has no third derivatives", "take differences")
     forward = jax.hessian(lambda tau: robot.forward_dynamics(q, q, tau).sum())

@@ -337,7 +337,7 @@ def test_time_steps_take_numbers(real: str) -> None:
     compiled = torch.compile(lambda dt: robot.semi_implicit_euler(q, qd, tau, dt).q_next, fullgraph=True)
     for each in (0.25, 0.5):
         assert same(compiled(each), robot.semi_implicit_euler(q, qd, tau, each).q_next, 1e-6)
-    with pytest.raises(TypeError, match="tau is a float, expected a torch.Tensor"):
+    with pytest.raises(TypeError, match=r"tau is a float, expected a torch\.Tensor"):
         robot.semi_implicit_euler(q, qd, 0.1, 0.25)
     with pytest.raises(TypeError, match="dt is a str"):
         robot.semi_implicit_euler(q, qd, tau, "0.25")
