@@ -28,7 +28,7 @@ from psdmc.backends.manifest import MANIFEST
 from psdmc.backends.protocol import back_end
 from psdmc.backends.recorded import Differences, differences, recorded_options
 from psdmc.backends.write import Changes, require_own_folder, write_package
-from psdmc.emission import emission, emit_options, functions_of, listed, package_of
+from psdmc.emission import cuda_source, emission, emit_options, functions_of, listed, package_of
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
@@ -42,6 +42,8 @@ from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compiled_once
+from psdmc.toolchain.cuda_driver import Driver
+from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
 from psdmc.toolchain.interface import Origin
 
 if TYPE_CHECKING:
@@ -331,6 +333,18 @@ def _files(
 
 
 @overload
+def compile(  # type: ignore[overload-overlap]
+    model: DynamicsModel | str | Path,
+    lowering: Lowering = ...,
+    functions: Sequence[str] | str | None = ...,
+    real: Real | None = ...,
+    *,
+    progress: Progress = ...,
+    target: Literal["cuda", "cuda:0", "cuda:1", "cuda:2", "cuda:3"],
+) -> CudaRobot: ...
+
+
+@overload
 def compile(
     model: DynamicsModel | str | Path,
     lowering: Lowering = ...,
@@ -387,7 +401,7 @@ def compile(
     friction: bool = False,
     smoothing_speed: float | None = None,
     gravity_input: bool = False,
-) -> CompiledRobot[Any]:
+) -> CompiledRobot[Any] | CudaRobot:
     """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
 
     psdmc keeps the compiled library in a cache, so a second call for the same model and options is fast.
@@ -409,6 +423,10 @@ def compile(
     dtype('float32')
     """
     found = model_of(model)
+    if isinstance(target, str) and target.partition(":")[0] == "cuda":
+        others = {"trig": trig, "friction": friction, "smoothing_speed": smoothing_speed}
+        refused = [name for name, given in (others | {"gravity_input": gravity_input}).items() if given]
+        return _on_gpu(found, lowering, functions, real, progress, target, refused)
     names = (functions,) if isinstance(functions, str) else functions
     kept = None if names is None else tuple(names)
     chosen_names = wanted(kept, found.mechanism)
@@ -416,6 +434,33 @@ def compile(
     known = (found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
     request = _Request(*known, law, smoothing_speed, gravity_input)
     return request.compiled(progress)
+
+
+def _on_gpu(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    real: Real | None,
+    progress: Progress,
+    target: str,
+    refused: Sequence[str],
+) -> CudaRobot:
+    """The robot of a target "cuda", the first GPU, or "cuda:N"."""
+    if refused:
+        raise InputError(
+            f"target {target!r} has no option {refused[0]}", "leave it out, or compile for the CPU"
+        )
+    number = target.partition(":")[2] or "0"
+    if not number.isdecimal():
+        raise InputError(f"target is {target!r}", 'write "cuda", or "cuda:1" for the second GPU')
+    driver = Driver(int(number))
+
+    def source(names: Sequence[str] | str | None) -> CudaSource:
+        return cuda_source(model, lowering, names, real, progress)
+
+    made = source(functions)
+    progress("compiling")
+    return CudaRobot(made, driver, source if functions is None else None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 from psdmc.backends.c.adapters import with_needed
 from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.render import render
+from psdmc.backends.cuda.package import cuda_package
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
 from psdmc.backends.protocol import Emission
@@ -25,6 +27,8 @@ from psdmc.target.native import NATIVE
 from psdmc.target.presets import preset
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.compile import lowered_once
+from psdmc.toolchain.cuda_robot import CudaSource
+from psdmc.toolchain.interface import interface_of
 
 
 @collecting_rarely()
@@ -32,6 +36,21 @@ def package_of(*given: Any) -> PackageView:
     """Return the C package of what `emission` takes."""
     made = emission(*given)
     return package_view(made.info, made.kernels, made.options, made.references, made.adapters)
+
+
+def cuda_source(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    real: Real | None,
+    progress: Progress,
+) -> CudaSource:
+    """Return the CUDA source of a model's functions, for `compile` with the target "cuda"."""
+    made = emission(model, lowering, functions, emit_options(lowering, real), None, progress)
+    cuda = cuda_package(replace(made, references=None))
+    text = render("cuda/robot.cuh.jinja", cuda=cuda, package=cuda.package)
+    failing = frozenset(kernel.view.name for kernel in cuda.kernels if kernel.view.positive)
+    return CudaSource(text, cuda.package.robot, interface_of(cuda.package), failing)
 
 
 def emission(
