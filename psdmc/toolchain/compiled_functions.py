@@ -60,6 +60,11 @@ class RobotFacts:
     def __init__(self, interface: Interface) -> None:
         self._interface = interface
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_function(self, name)
+
     @property
     def name(self) -> str:
         """Return the name of the robot in C. The names of all C functions of the robot begin with this name."""
@@ -169,7 +174,7 @@ class RobotFacts:
 
     @property
     def _title(self) -> str:
-        return f"CompiledRobot {self.name!r}: {self.n} joints, {self._interface.dtype}"
+        return f"{type(self).__name__} {self.name!r}: {self.n} joints, {self._interface.dtype}"
 
     def _facts(self) -> list[str]:
         lengths = [] if self.nq == self.nv == self.n else [f"nq = {self.nq}, nv = {self.nv}"]
@@ -252,11 +257,6 @@ class CompiledFunctions(RobotFacts):
     def __deepcopy__(self, memo: object) -> Self:
         """Itself: nothing about a compiled robot can be changed."""
         return self
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            raise no_function(self, name)
 
     def __dask_tokenize__(self) -> tuple[str, str]:
         """Return the key by which Dask recognises equal robots."""

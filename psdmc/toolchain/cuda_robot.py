@@ -5,13 +5,13 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.functions import SIGNATURES, no_function
+from psdmc.functions import SIGNATURES
 from psdmc.program.signature import Quantity, Signature
 from psdmc.toolchain.call_arguments import THETA_B, bound_arguments
 from psdmc.toolchain.compiled_functions import RobotFacts, results
@@ -23,9 +23,6 @@ from psdmc.toolchain.stubs import documentation
 
 BLOCK = 128
 """Threads of a block, as templates/cuda/sizes.jinja says."""
-
-MOST_BLOCKS = 2**31 - 1
-"""Blocks that a grid of CUDA can have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,38 +59,26 @@ class CudaRobot(RobotFacts):
     def __init__(self, source: CudaSource, driver: Driver, more: Callable[[str], CudaSource] | None) -> None:
         super().__init__(source.interface)
         self._driver, self._more = driver, more
-        self._kernels: dict[str, _Kernel] = {}
+        self._kernels: dict[str, tuple[ctypes.c_void_p, bool]] = {}
         self._add(source)
 
     def _add(self, source: CudaSource) -> None:
-        driver = self._driver
-        module = driver.module(machine_code(source.text, f"{source.robot}_KERNELS", driver.arch))
-        for name, tails in source.interface.kernels.items():
-            handle = driver.kernel(module, f"{source.robot}_{name}_rows")
-            self._kernels.setdefault(name, _Kernel(handle, tails, name in source.failing))
+        """Compile further functions. A kernel has a handle, and may have the argument `status`."""
+        own = source.interface.kernels
+        code = machine_code(source.text, f"{source.robot}_KERNELS", self._driver.arch)
+        handles = self._driver.kernels(code, [f"{source.robot}_{name}_rows" for name in own])
+        pairs = zip(own, handles, strict=True)
+        self._kernels |= {name: (handle, name in source.failing) for name, handle in pairs}
+        self._interface = replace(source.interface, kernels={**self._interface.kernels, **own})
 
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            raise no_function(self, name)
-
-    else:
+    if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
 
     def __reduce__(self) -> Any:
         raise TypeError(
-            'robots on a GPU cannot be pickled: call psdmc.compile(model, target="cuda") in each process'
+            'a CudaRobot cannot be pickled: call psdmc.compile(model, target="cuda") in each process'
         )
-
-    @property
-    def _title(self) -> str:
-        return f"CudaRobot {self.name!r}: {self.n} joints, {self.dtype}, GPU {self._driver.ordinal}"
-
-    @property
-    def functions(self) -> tuple[str, ...]:
-        """Return the names of the functions that are compiled so far, such as 'inverse_dynamics'."""
-        return tuple(dict.fromkeys(name.removesuffix("_theta") for name in self._kernels))
 
     def call(
         self,
@@ -104,29 +89,23 @@ class CudaRobot(RobotFacts):
         stream: Any = None,
     ) -> Any:
         """Call a generated function; `function` is an entry of `psdmc.functions.SIGNATURES`."""
-        kernel = self._kernel(function.name + ("" if theta_b is None else "_theta"))
         handle = handle_of(stream)
+        name = function.name + ("" if theta_b is None else "_theta")
+        kernel, has_status = self._kernel(name)
         named = [
             *zip(function.inputs, inputs, strict=True),
             *([] if theta_b is None else [(THETA_B, theta_b)]),
         ]
         lead, arrays, copies = self._arrays(function, named, handle)
-        states = math.prod(lead)
-        blocks = -(-states // BLOCK)
-        if blocks > MOST_BLOCKS:
-            raise InputError(
-                f"{function.name}: {states} states, expected at most {BLOCK * MOST_BLOCKS}", "use parts"
-            )
-        shapes = [lead + tail for tail in kernel.tails]
-        outs = self._results(function, shapes, out, handle)
+        outs = self._results(function, [lead + tail for tail in self._interface.kernels[name]], out, handle)
         places = [each.place for each in (*arrays, *(seen("", each, handle) for each in outs))]
-        words: list[Any] = [
-            ctypes.c_uint64(place) for place in (*places, *([0] if kernel.has_status else []))
-        ]
+        words: list[Any] = [ctypes.c_uint64(place) for place in (*places, *([0] if has_status else []))]
+        states = math.prod(lead)
         if states:
-            self._driver.launch(kernel.handle, blocks, BLOCK, handle, [*words, ctypes.c_longlong(states)])
+            words.append(ctypes.c_longlong(states))
+            self._driver.launch(kernel, -(-states // BLOCK), BLOCK, handle, words)
         if out is None:
-            outs[0]._kept = copies
+            outs[0].kept = copies
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
     def _arrays(
@@ -204,7 +183,7 @@ class CudaRobot(RobotFacts):
                 raise InputError(f"{what} is read-only", "give an array that can be written")
         return given
 
-    def _kernel(self, name: str) -> _Kernel:
+    def _kernel(self, name: str) -> tuple[ctypes.c_void_p, bool]:
         stem = name.removesuffix("_theta")
         if stem not in self._kernels and f"{stem}_theta" not in self._kernels and self._more is not None:
             self._add(self._more(stem))
@@ -212,15 +191,6 @@ class CudaRobot(RobotFacts):
             hint = f"compiled are {', '.join(self._kernels)}: add names to the argument functions, or give theta_b"
             raise InputError(f"{self.name}: {name} was not compiled for the GPU", hint)
         return self._kernels[name]
-
-
-@dataclass(frozen=True, slots=True)
-class _Kernel:
-    """A kernel on the GPU, and the trailing axes of its results."""
-
-    handle: ctypes.c_void_p
-    tails: tuple[tuple[int, ...], ...]
-    has_status: bool
 
 
 def _is_of_cpu(quantity: Quantity, given: Any) -> bool:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from psdmc.errors import InputError
@@ -22,7 +24,7 @@ LETTERS = {0: "i", 1: "u", 2: "f", 5: "c", 6: "b"}
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """An array of another library. `kept` must live as long as the array is used; `strides` counts bytes."""
+    """An array of another library. `strides` counts bytes; `kept` must live as long as the array is used."""
 
     place: int
     shape: tuple[int, ...]
@@ -34,11 +36,8 @@ class Seen:
 
     @property
     def is_contiguous(self) -> bool:
-        if self.strides is None or 0 in self.shape:
-            return True
-        steps = [self.dtype.itemsize * math.prod(self.shape[k + 1 :]) for k in range(len(self.shape))]
-        triples = zip(self.shape, self.strides, steps, strict=True)
-        return all(size == 1 or own == step for size, own, step in triples)
+        """Return whether the entries lie one after the other. NumPy judges it by shape and strides alone."""
+        return bool(as_strided(np.empty((), self.dtype), self.shape, self.strides).flags.c_contiguous)
 
 
 def seen(what: str, given: Any, stream: int) -> Seen:
@@ -51,10 +50,8 @@ def seen(what: str, given: Any, stream: int) -> Seen:
         (place, is_fixed), strides = face["data"], face.get("strides")
         own = (tuple(face["shape"]), np.dtype(face["typestr"]), strides and tuple(strides), bool(is_fixed))
         return Seen(place or 0, *own, face.get("stream"))
-    if hasattr(given, "__dlpack__"):
-        device, _ = given.__dlpack_device__()
-        if device in ON_CUDA:
-            return _of_capsule(given.__dlpack__(stream=stream))
+    if hasattr(given, "__dlpack__") and given.__dlpack_device__()[0] in ON_CUDA:
+        return _of_capsule(given.__dlpack__(stream=stream))
     raise InputError(
         f"{what} is a {type(given).__name__} in the CPU's memory, expected an array in the memory of the GPU",
         'move it there, for example with cupy.asarray, torch.Tensor.to("cuda") or jax.device_put',
@@ -82,11 +79,10 @@ def _of_capsule(capsule: Any) -> Seen:
     read.restype, read.argtypes = ctypes.c_void_p, (ctypes.py_object, ctypes.c_char_p)
     tensor = _Tensor.from_address(read(capsule, b"dltensor"))
     dtype = np.dtype(f"{LETTERS.get(tensor.kind, 'V')}{tensor.bits // 8}")
-    shape = tuple(tensor.shape[: tensor.ndim])
-    strides = (
-        tuple(dtype.itemsize * step for step in tensor.strides[: tensor.ndim]) if tensor.strides else None
-    )
-    return Seen(tensor.data + tensor.offset, shape, dtype, strides, is_fixed=False, kept=capsule)
+    steps = tensor.strides[: tensor.ndim] if tensor.strides else None
+    strides = None if steps is None else tuple(dtype.itemsize * step for step in steps)
+    place, shape = tensor.data + tensor.offset, tuple(tensor.shape[: tensor.ndim])
+    return Seen(place, shape, dtype, strides, is_fixed=False, kept=capsule)
 
 
 class DeviceArray:
@@ -95,17 +91,19 @@ class DeviceArray:
 
     shape, dtype  as of a NumPy array
     stream        handle of the stream on which it is computed
+    kept          arrays that live as long as this one
     """
 
     def __init__(
         self, driver: Driver, shape: tuple[int, ...], dtype: np.dtype[Any], stream: int = DEFAULT_STREAM
     ) -> None:
         self.shape, self.dtype, self.stream = shape, dtype, stream
+        self.kept: Any = None
         self._driver = driver
         self._place = driver.allocated(math.prod(shape) * dtype.itemsize)
 
     def __del__(self) -> None:
-        if hasattr(self, "_place"):
+        with suppress(Exception):  # at the end of a program, the driver may be gone before
             self._driver.free(self._place)
 
     @classmethod

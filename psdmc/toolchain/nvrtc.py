@@ -22,41 +22,40 @@ def machine_code(source: str, definition: str, arch: int) -> bytes:
     definition  name of a macro that is defined
     arch        kind of GPU, ten times its compute capability: 90 for an H100
 
-    Raises ToolchainError if NVRTC is not installed, or does not know a GPU so old.
+    Raises ToolchainError if NVRTC is not installed, or knows no GPU so old.
     """
-    nvrtc = _opened()
-    known = _architectures(nvrtc)
-    older = [each for each in known if each <= arch]
-    if not older:
+    count, program = ctypes.c_int(), ctypes.c_void_p()
+    _call("GetNumSupportedArchs", ctypes.byref(count))
+    known = (ctypes.c_int * count.value)()
+    _call("GetSupportedArchs", known)
+    usable = [each for each in known if each <= arch]
+    if not usable:
         raise ToolchainError(
-            f"NVRTC knows no GPU as old as compute capability {arch / 10}", "use an older NVRTC"
+            f"NVRTC knows no GPU as old as compute capability {arch / 10}", "install an older NVRTC"
         )
-    kind, what = ("sm", "CUBIN") if arch in known else ("compute", "PTX")
-    program = ctypes.c_void_p()
-    _checked(
-        nvrtc, nvrtc.nvrtcCreateProgram(ctypes.byref(program), source.encode(), b"robot.cuh", 0, None, None)
-    )
+    kind, what = ("sm", "CUBIN") if arch in usable else ("compute", "PTX")
+    given = (f"--gpu-architecture={kind}_{max(usable)}".encode(), f"-D{definition}".encode())
+    _call("CreateProgram", ctypes.byref(program), source.encode(), b"robot.cuh", 0, None, None)
     try:
-        words = (f"--gpu-architecture={kind}_{max(older)}".encode(), f"-D{definition}".encode())
-        if nvrtc.nvrtcCompileProgram(program, len(words), (ctypes.c_char_p * len(words))(*words)):
-            log = _read(nvrtc, program, "ProgramLog").decode(errors="replace")
+        words = (ctypes.c_char_p * len(given))(*given)
+        if opened().nvrtcCompileProgram(program, len(given), words):
+            log = _read(program, "ProgramLog").decode(errors="replace")
             raise InternalError(f"NVRTC refuses generated code: {' '.join(log.split())[:500]}")
-        return _read(nvrtc, program, what)
+        return _read(program, what)
     finally:
-        nvrtc.nvrtcDestroyProgram(ctypes.byref(program))
+        opened().nvrtcDestroyProgram(ctypes.byref(program))
 
 
 @cache
-def _opened() -> Any:
+def opened() -> Any:
+    """Return the library NVRTC. Raises ToolchainError if it is not installed."""
     for name in _candidates():
         try:
             return ctypes.CDLL(name)
         except OSError:
             continue
-    raise ToolchainError(
-        'target "cuda" needs NVRTC, which is not installed',
-        "pip install nvidia-cuda-nvrtc-cu12, or install CUDA",
-    )
+    hint = "pip install nvidia-cuda-nvrtc-cu12, or install CUDA"
+    raise ToolchainError('target "cuda" needs NVRTC, which is not installed', hint)
 
 
 def _candidates() -> Iterator[str]:
@@ -67,23 +66,14 @@ def _candidates() -> Iterator[str]:
     yield from NAMES
 
 
-def _architectures(nvrtc: Any) -> list[int]:
-    count = ctypes.c_int()
-    _checked(nvrtc, nvrtc.nvrtcGetNumSupportedArchs(ctypes.byref(count)))
-    found = (ctypes.c_int * count.value)()
-    _checked(nvrtc, nvrtc.nvrtcGetSupportedArchs(found))
-    return list(found)
-
-
-def _read(nvrtc: Any, program: ctypes.c_void_p, what: str) -> bytes:
+def _read(program: ctypes.c_void_p, what: str) -> bytes:
     size = ctypes.c_size_t()
-    _checked(nvrtc, getattr(nvrtc, f"nvrtcGet{what}Size")(program, ctypes.byref(size)))
+    _call(f"Get{what}Size", program, ctypes.byref(size))
     text = ctypes.create_string_buffer(size.value)
-    _checked(nvrtc, getattr(nvrtc, f"nvrtcGet{what}")(program, text))
+    _call(f"Get{what}", program, text)
     return text.raw
 
 
-def _checked(nvrtc: Any, status: int) -> None:
-    if status:
-        nvrtc.nvrtcGetErrorString.restype = ctypes.c_char_p
-        raise ToolchainError(f"NVRTC: {nvrtc.nvrtcGetErrorString(status).decode()}", "install NVRTC again")
+def _call(name: str, *given: Any) -> None:
+    if status := getattr(opened(), f"nvrtc{name}")(*given):
+        raise ToolchainError(f"nvrtc{name} failed with status {status}", "install NVRTC again")

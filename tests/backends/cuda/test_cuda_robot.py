@@ -48,7 +48,7 @@ def gpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def forget() -> None:
-    for opened in (cuda_driver._opened, nvrtc._opened):
+    for opened in (cuda_driver.opened, nvrtc.opened):
         opened.cache_clear()
 
 
@@ -181,7 +181,7 @@ def test_others_are_compiled_later_and_in_float32(gpus: None) -> None:
     mass = psdmc.compile(model).mass_matrix(q)
     assert near(found.numpy(), np.einsum("si,sij,sj->s", q, mass, q) / 2, 1e-5)
     assert found.dtype == np.float32
-    assert repr(robot).startswith("CudaRobot 'two_link': 2 joints, float32, GPU 1")
+    assert repr(robot).startswith("CudaRobot 'two_link': 2 joints, float32")
     assert repr(found) == "DeviceArray (3,) float32 on GPU 1"
 
 
