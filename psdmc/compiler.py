@@ -42,12 +42,12 @@ from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compiled_once
-from psdmc.toolchain.cuda_driver import Driver
-from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
 from psdmc.toolchain.interface import Origin
 
 if TYPE_CHECKING:
     import numpy as np
+
+    from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
 
 
 def derive(
@@ -404,6 +404,9 @@ def compile(
 ) -> CompiledRobot[Any] | CudaRobot:
     """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
 
+    With the target "cuda", psdmc compiles for an NVIDIA GPU, and returns a CudaRobot, whose methods take arrays of CuPy,
+    PyTorch or JAX. "cuda:1" is the second GPU. This was run on no GPU yet.
+
     psdmc keeps the compiled library in a cache, so a second call for the same model and options is fast.
 
     model      a model, or the path of a model file
@@ -416,7 +419,7 @@ def compile(
 
     `emit_c` explains the other options. Raises InputError if `friction` is True and the model has no calibrated friction.
     Raises InputError also if the target is a microcontroller, because its code lacks the batch functions that Python calls.
-    Raises ToolchainError if the compiler or the CPU does not support the target.
+    Raises ToolchainError if the compiler or the CPU does not support the target, or if there is no GPU or no NVRTC.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP
@@ -446,6 +449,9 @@ def _on_gpu(
     refused: Sequence[str],
 ) -> CudaRobot:
     """The robot of a target "cuda", the first GPU, or "cuda:N"."""
+    from psdmc.toolchain.cuda_driver import Driver
+    from psdmc.toolchain.cuda_robot import CudaRobot
+
     if refused:
         raise InputError(
             f"target {target!r} has no option {refused[0]}", "leave it out, or compile for the CPU"

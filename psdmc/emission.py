@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from psdmc.backends.c.adapters import with_needed
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.render import render
-from psdmc.backends.cuda.package import cuda_package
 from psdmc.backends.info import package_info
 from psdmc.backends.options import EmitOptions
 from psdmc.backends.protocol import Emission
@@ -27,8 +25,10 @@ from psdmc.target.native import NATIVE
 from psdmc.target.presets import preset
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.compile import lowered_once
-from psdmc.toolchain.cuda_robot import CudaSource
 from psdmc.toolchain.interface import interface_of
+
+if TYPE_CHECKING:
+    from psdmc.toolchain.cuda_robot import CudaSource
 
 
 @collecting_rarely()
@@ -46,6 +46,10 @@ def cuda_source(
     progress: Progress,
 ) -> CudaSource:
     """Return the CUDA source of a model's functions, for `compile` with the target "cuda"."""
+    from psdmc.backends.c.render import render
+    from psdmc.backends.cuda.package import cuda_package
+    from psdmc.toolchain.cuda_robot import CudaSource  # it makes a method for each function, which takes time
+
     made = emission(model, lowering, functions, emit_options(lowering, real), None, progress)
     cuda = cuda_package(replace(made, references=None))
     text = render("cuda/robot.cuh.jinja", cuda=cuda, package=cuda.package)

@@ -49,7 +49,8 @@ class CudaRobot(RobotFacts):
 
     All methods have two more arguments:
 
-    out     array of the GPU into which psdmc writes the result, or a tuple of arrays; without it, results are DeviceArrays
+    out     array of the GPU into which psdmc writes the result, or a tuple of arrays, which overlap no input. Without it,
+            results are DeviceArrays
     stream  stream on which the function runs, of CuPy or PyTorch, or its handle; None: the default stream
 
     The methods return without waiting for the GPU. If a matrix such as the mass matrix is not positive definite, the results
@@ -195,7 +196,7 @@ class CudaRobot(RobotFacts):
 
 def _is_of_cpu(quantity: Quantity, given: Any) -> bool:
     """Whether an input is numbers of the CPU, which a call copies."""
-    return isinstance(given, (int, float)) or (quantity is THETA_B and isinstance(given, (np.ndarray, list)))
+    return np.isscalar(given) or (quantity is THETA_B and isinstance(given, (np.ndarray, list)))
 
 
 def handle_of(stream: Any) -> int:

@@ -54,7 +54,7 @@ def opened() -> Any:
             return ctypes.CDLL(name)
         except OSError:
             continue
-    hint = "pip install nvidia-cuda-nvrtc-cu12, or install CUDA"
+    hint = "pip install 'psdmc[cuda]', or install CUDA"
     raise ToolchainError('target "cuda" needs NVRTC, which is not installed', hint)
 
 
