@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -56,6 +57,9 @@ THETA_B = Quantity("theta_b", ("l",))
 
 _LIBRARY = torch.library.Library("psdmc", "FRAGMENT")
 """Operators are registered as long as this lives."""
+
+_ASKED: ContextVar[str | None] = ContextVar("_ASKED", default=None)
+"""While a rule calls an operator: the name of the function that the user called and that the rule differentiates."""
 
 _ROBOTS: dict[str, TorchRobot] = {}
 """Robots of this process by their requests. They stay, because operators of PyTorch do."""
@@ -237,9 +241,10 @@ for _function in SIGNATURES.values():
 
 @dataclass(frozen=True, slots=True)
 class _Calls:
-    """What rules call: operators of one robot, with the caller's theta_b."""
+    """What rules call: operators of one robot, with the caller's theta_b, for the function that the user asked for."""
 
     robot: TorchRobot
+    asked: str
     theta_b: Tensor
     gravity: Tensor | None = None
     arrays: ClassVar[Any] = ARRAYS
@@ -254,7 +259,11 @@ class _Calls:
         )  # zero where its effects cancel
         gravity = (none,) if GRAVITY in signature.inputs else ()
         theta = (self.theta_b,) if SIGNATURES[function].theta else ()
-        found = self.robot.operator(function)(*inputs, *gravity, *theta)
+        token = _ASKED.set(self.asked)
+        try:
+            found = self.robot.operator(function)(*inputs, *gravity, *theta)
+        finally:
+            _ASKED.reset(token)
         return found if isinstance(found, tuple) else (found,)
 
 
@@ -359,13 +368,14 @@ class _Operator:
         context.save_for_forward(*kept)
         context.set_materialize_grads(False)
         context.shapes = [tensor.shape for tensor in outputs]
+        context.asked = _ASKED.get() or self.function.name
 
     def _back(self, context: Any, *cotangents: Tensor) -> Any:
         """Return the gradients by the operator's arguments."""
         needed, coordinates = context.needs_input_grad, self.robot.coordinates
         if all(cotangent is None for cotangent in cotangents):
             return (None,) * len(needed)
-        rule = self._rule(needed)
+        rule = self._rule(needed, context.asked)
         inputs, theta_b, positions = self._kept(context)
         weights = []
         for quantity, cotangent, shape in zip(self.function.outputs, cotangents, context.shapes, strict=True):
@@ -374,7 +384,9 @@ class _Operator:
                 weight = coordinates.pulled_back(positions.pop(0), weight)
             weights.append(weight)
         by_theta = theta_b is not None and needed[-1]
-        found, theta = rule.back(_Calls(self.robot, theta_b), tuple(inputs), tuple(weights), by_theta)
+        found, theta = rule.back(
+            _Calls(self.robot, context.asked, theta_b), tuple(inputs), tuple(weights), by_theta
+        )
         gradients = [
             coordinates.gradient(tensor, gradient) if self._is_wide(quantity) else gradient
             for quantity, tensor, gradient in zip(self.function.inputs, inputs, found, strict=True)
@@ -385,26 +397,25 @@ class _Operator:
     def _along(self, context: Any, *tangents: Tensor) -> Any:
         """Return the results' derivatives along tangents of the operator's arguments."""
         coordinates, moves = self.robot.coordinates, [tangent is not None for tangent in tangents]
-        rule = self._rule(moves)
+        rule = self._rule(moves, context.asked)
         inputs, theta_b, positions = self._kept(context)
         along = []
         for quantity, tensor, tangent in zip(self.function.inputs, inputs, tangents, strict=False):
             moved = torch.zeros_like(tensor) if tangent is None else tangent
             along.append(coordinates.tangent(tensor, moved) if self._is_wide(quantity) else moved)
         dtheta = tangents[-1] if self.function.theta else None
-        found = rule.along(_Calls(self.robot, theta_b), tuple(inputs), tuple(along), dtheta)
+        found = rule.along(_Calls(self.robot, context.asked, theta_b), tuple(inputs), tuple(along), dtheta)
         made = tuple(
             coordinates.rates(positions.pop(0), tangent) if self._is_wide(quantity) else tangent
             for quantity, tangent in zip(self.function.outputs, found, strict=True)
         )
         return made[0] if len(made) == 1 else made
 
-    def _rule(self, moves: Sequence[bool]) -> Rule:
+    def _rule(self, moves: Sequence[bool], asked: str) -> Rule:
         """Return the function's rule; ArgumentError if it has none, or none by an argument that is differentiated."""
         name = self.function.name
-        first = name.partition("_vjp")[0].removesuffix("_jvp")
-        if rule_of(name) is None and first != name:
-            error = no_derivatives(first, 2)
+        if rule_of(name) is None and asked != name:
+            error = no_derivatives(asked, 2)
             raise ArgumentError(error.message, f"leave out create_graph=True, or {error.hint}")
         gravity = [moved for each, moved in zip(self.function.inputs, moves, strict=False) if each is GRAVITY]
         rule = require_rule(name, bool(gravity), any(gravity))
