@@ -28,7 +28,7 @@ from psdmc.backends.manifest import MANIFEST
 from psdmc.backends.protocol import back_end
 from psdmc.backends.recorded import Differences, differences, recorded_options
 from psdmc.backends.write import Changes, require_own_folder, write_package
-from psdmc.emission import cuda_source, emission, emit_options, functions_of, listed, package_of
+from psdmc.emission import cuda_robot, emission, emit_options, functions_of, listed, package_of
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
@@ -47,7 +47,7 @@ from psdmc.toolchain.interface import Origin
 if TYPE_CHECKING:
     import numpy as np
 
-    from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
+    from psdmc.toolchain.cuda_robot import CudaRobot
 
 
 def derive(
@@ -427,9 +427,9 @@ def compile(
     """
     found = model_of(model)
     if isinstance(target, str) and target.partition(":")[0] == "cuda":
-        others = {"trig": trig, "friction": friction, "smoothing_speed": smoothing_speed}
-        refused = [name for name, given in (others | {"gravity_input": gravity_input}).items() if given]
-        return _on_gpu(found, lowering, functions, real, progress, target, refused)
+        absent = {"trig": trig, "friction": friction, "smoothing_speed": smoothing_speed}
+        absent["gravity_input"] = gravity_input
+        return cuda_robot(found, lowering, functions, real, progress, target, absent)
     names = (functions,) if isinstance(functions, str) else functions
     kept = None if names is None else tuple(names)
     chosen_names = wanted(kept, found.mechanism)
@@ -437,36 +437,6 @@ def compile(
     known = (found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
     request = _Request(*known, law, smoothing_speed, gravity_input)
     return request.compiled(progress)
-
-
-def _on_gpu(
-    model: DynamicsModel,
-    lowering: Lowering,
-    functions: Sequence[str] | str | None,
-    real: Real | None,
-    progress: Progress,
-    target: str,
-    refused: Sequence[str],
-) -> CudaRobot:
-    """The robot of a target "cuda", the first GPU, or "cuda:N"."""
-    from psdmc.toolchain.cuda_driver import Driver
-    from psdmc.toolchain.cuda_robot import CudaRobot
-
-    if refused:
-        raise InputError(
-            f"target {target!r} has no option {refused[0]}", "leave it out, or compile for the CPU"
-        )
-    number = target.partition(":")[2] or "0"
-    if not number.isdecimal():
-        raise InputError(f"target is {target!r}", 'write "cuda", or "cuda:1" for the second GPU')
-    driver = Driver(int(number))
-
-    def source(names: Sequence[str] | str | None) -> CudaSource:
-        return cuda_source(model, lowering, names, real, progress)
-
-    made = source(functions)
-    progress("compiling")
-    return CudaRobot(made, driver, source if functions is None else None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -28,7 +28,7 @@ from psdmc.toolchain.compile import lowered_once
 from psdmc.toolchain.interface import interface_of
 
 if TYPE_CHECKING:
-    from psdmc.toolchain.cuda_robot import CudaSource
+    from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
 
 
 @collecting_rarely()
@@ -55,6 +55,37 @@ def cuda_source(
     text = render("cuda/robot.cuh.jinja", cuda=cuda, package=cuda.package)
     failing = frozenset(kernel.view.name for kernel in cuda.kernels if kernel.view.positive)
     return CudaSource(text, cuda.package.robot, interface_of(cuda.package), failing)
+
+
+def cuda_robot(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    real: Real | None,
+    progress: Progress,
+    target: str,
+    absent: Mapping[str, object],
+) -> CudaRobot:
+    """Return the robot of a target "cuda", the first GPU, or "cuda:N". Raises InputError if the caller chose one of the
+    options that are absent there."""
+    from psdmc.toolchain.cuda_driver import Driver
+    from psdmc.toolchain.cuda_robot import CudaRobot
+
+    if refused := [name for name, given in absent.items() if given]:
+        raise InputError(
+            f"target {target!r} has no option {refused[0]}", "leave it out, or compile for the CPU"
+        )
+    number = target.partition(":")[2] or "0"
+    if not number.isdecimal():
+        raise InputError(f"target is {target!r}", 'write "cuda", or "cuda:1" for the second GPU')
+    driver = Driver(int(number))
+
+    def source(names: Sequence[str] | str | None) -> CudaSource:
+        return cuda_source(model, lowering, names, real, progress)
+
+    made = source(functions)
+    progress("compiling")
+    return CudaRobot(made, driver, source if functions is None else None)
 
 
 def emission(
