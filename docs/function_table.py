@@ -107,10 +107,15 @@ def _shape(quantity: Quantity) -> str:
 
 def with_table(text: str) -> str:
     """The page with this table in the place of its own."""
-    before, _, rest = text.partition("| function |")
+    return with_rows(text, "| function |", table())
+
+
+def with_rows(text: str, head: str, rows: str) -> str:
+    """The page with these lines in the place of its table that begins with `head`."""
+    before, _, rest = text.partition(head)
     lines = rest.splitlines(keepends=True)
     behind = next(i for i, line in enumerate(lines) if i and not line.startswith("|"))
-    return before + table() + "".join(lines[behind:])
+    return before + rows + "".join(lines[behind:])
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from psdmc.backends.manifest import MANIFEST
 from psdmc.backends.protocol import back_end
 from psdmc.backends.recorded import Differences, differences, recorded_options
 from psdmc.backends.write import Changes, require_own_folder, write_package
-from psdmc.emission import emission, emit_options, functions_of, listed, package_of
+from psdmc.emission import cuda_robot, emission, emit_options, functions_of, listed, package_of
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
@@ -46,6 +46,8 @@ from psdmc.toolchain.interface import Origin
 
 if TYPE_CHECKING:
     import numpy as np
+
+    from psdmc.toolchain.cuda_robot import CudaRobot
 
 
 def derive(
@@ -331,6 +333,18 @@ def _files(
 
 
 @overload
+def compile(  # type: ignore[overload-overlap]
+    model: DynamicsModel | str | Path,
+    lowering: Lowering = ...,
+    functions: Sequence[str] | str | None = ...,
+    real: Real | None = ...,
+    *,
+    progress: Progress = ...,
+    target: Literal["cuda", "cuda:0", "cuda:1", "cuda:2", "cuda:3"],
+) -> CudaRobot: ...
+
+
+@overload
 def compile(
     model: DynamicsModel | str | Path,
     lowering: Lowering = ...,
@@ -387,8 +401,11 @@ def compile(
     friction: bool = False,
     smoothing_speed: float | None = None,
     gravity_input: bool = False,
-) -> CompiledRobot[Any]:
+) -> CompiledRobot[Any] | CudaRobot:
     """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
+
+    With the target "cuda", psdmc compiles for an NVIDIA GPU, and returns a CudaRobot, whose methods take arrays of CuPy,
+    PyTorch or JAX. "cuda:1" is the second GPU. This was run on no GPU yet.
 
     psdmc keeps the compiled library in a cache, so a second call for the same model and options is fast.
 
@@ -402,13 +419,17 @@ def compile(
 
     `emit_c` explains the other options. Raises InputError if `friction` is True and the model has no calibrated friction.
     Raises InputError also if the target is a microcontroller, because its code lacks the batch functions that Python calls.
-    Raises ToolchainError if the compiler or the CPU does not support the target.
+    Raises ToolchainError if the compiler or the CPU does not support the target, or if there is no GPU or no NVRTC.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP
     dtype('float32')
     """
     found = model_of(model)
+    if isinstance(target, str) and target.partition(":")[0] == "cuda":
+        absent = {"trig": trig, "friction": friction, "smoothing_speed": smoothing_speed}
+        absent["gravity_input"] = gravity_input
+        return cuda_robot(found, lowering, functions, real, progress, target, absent)
     names = (functions,) if isinstance(functions, str) else functions
     kept = None if names is None else tuple(names)
     chosen_names = wanted(kept, found.mechanism)

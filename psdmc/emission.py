@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from psdmc.backends.c.adapters import with_needed
 from psdmc.backends.c.package import PackageView, package_view
@@ -25,6 +25,10 @@ from psdmc.target.native import NATIVE
 from psdmc.target.presets import preset
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.compile import lowered_once
+from psdmc.toolchain.interface import interface_of
+
+if TYPE_CHECKING:
+    from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
 
 
 @collecting_rarely()
@@ -32,6 +36,56 @@ def package_of(*given: Any) -> PackageView:
     """Return the C package of what `emission` takes."""
     made = emission(*given)
     return package_view(made.info, made.kernels, made.options, made.references, made.adapters)
+
+
+def cuda_source(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    real: Real | None,
+    progress: Progress,
+) -> CudaSource:
+    """Return the CUDA source of a model's functions, for `compile` with the target "cuda"."""
+    from psdmc.backends.c.render import render
+    from psdmc.backends.cuda.package import cuda_package
+    from psdmc.toolchain.cuda_robot import CudaSource  # it makes a method for each function, which takes time
+
+    made = emission(model, lowering, functions, emit_options(lowering, real), None, progress)
+    cuda = cuda_package(replace(made, references=None))
+    text = render("cuda/robot.cuh.jinja", cuda=cuda, package=cuda.package)
+    failing = frozenset(kernel.view.name for kernel in cuda.kernels if kernel.view.positive)
+    return CudaSource(text, cuda.package.robot, interface_of(cuda.package), failing)
+
+
+def cuda_robot(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | str | None,
+    real: Real | None,
+    progress: Progress,
+    target: str,
+    absent: Mapping[str, object],
+) -> CudaRobot:
+    """Return the robot of a target "cuda", the first GPU, or "cuda:N". Raises InputError if the caller chose one of the
+    options that are absent there."""
+    from psdmc.toolchain.cuda_driver import Driver
+    from psdmc.toolchain.cuda_robot import CudaRobot
+
+    if refused := [name for name, given in absent.items() if given]:
+        raise InputError(
+            f"target {target!r} has no option {refused[0]}", "leave it out, or compile for the CPU"
+        )
+    number = target.partition(":")[2] or "0"
+    if not number.isdecimal():
+        raise InputError(f"target is {target!r}", 'write "cuda", or "cuda:1" for the second GPU')
+    driver = Driver(int(number))
+
+    def source(names: Sequence[str] | str | None) -> CudaSource:
+        return cuda_source(model, lowering, names, real, progress)
+
+    made = source(functions)
+    progress("compiling")
+    return CudaRobot(made, driver, source if functions is None else None)
 
 
 def emission(

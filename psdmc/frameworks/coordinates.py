@@ -14,6 +14,10 @@ from psdmc.robot.mechanism import Mechanism
 Array = Any
 """An array of the framework's, with leading axes (...) for states."""
 
+ON_COORDINATES = {"integrate": "integrated", "difference": "difference"}
+"""Functions that JAX and PyTorch compute themselves, so that they differentiate them as often as wanted, and the methods of
+Coordinates that compute them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Coordinates:

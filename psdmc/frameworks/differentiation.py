@@ -7,6 +7,7 @@ contains quaternions, the derivative is that of f(q with normalized quaternions)
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -75,21 +76,44 @@ def rule_of(function: str) -> Rule | None:
     return _OTHERS.get(function)
 
 
-def require_rule(function: str, gravity: bool = False, moves: bool = True) -> Rule:
+def require_rule(
+    function: str, gravity: bool = False, moves: bool = True, asked: str | None = None, order: int = 1
+) -> Rule:
     """Return the rule that differentiates a generated function. Raises ArgumentError if psdmc has none.
 
     gravity  whether the function's last input is gravity
     moves    whether derivatives by gravity are wanted
+    asked    name of the function that the user called, if other rules call this one; the error names it
+    order    number of times that the user's function is differentiated
     """
     rule = rule_of(function)
-    if rule is not None:
-        return _with_gravity(function, rule, moves) if gravity else rule
-    known = ", ".join(name for name in SIGNATURES if rule_of(name))
-    what = f"{function} has no derivatives"
-    for ending in ("_vjp", "_jvp", "_vjp_parameters"):
-        if function.endswith(ending):
-            what = f"{function.removesuffix(ending)} has no second derivatives"
-    raise ArgumentError(what, f"these functions have first derivatives: {known}")
+    if rule is None:
+        raise no_derivatives(asked or function, order)
+    return _with_gravity(function, rule, moves) if gravity else rule
+
+
+SECOND = {
+    "gravity": "inverse_dynamics_second_derivatives with zero rates and accelerations",
+    "nonlinear_effects": "inverse_dynamics_second_derivatives with zero accelerations",
+}
+"""Functions whose second derivatives are those of another one."""
+
+
+def no_derivatives(function: str, order: int) -> ArgumentError:
+    """Return the error that says: the function that the user called has no derivatives of this order."""
+    stem = re.sub("_(vjp_parameters|vjp|jvp|derivatives)$", "", function)
+    own = f"{stem}_second_derivatives"
+    if order == 1 and stem == function:
+        known = ", ".join(name for name in SIGNATURES if rule_of(name))
+        return ArgumentError(
+            f"{function} has no derivatives", f"these functions have first derivatives: {known}"
+        )
+    which = {1: "", 2: "second ", 3: "third "}.get(order, "such high ")
+    other = own if own in SIGNATURES else SECOND.get(stem)
+    remedy = "take differences of first derivatives"
+    if other and order + (stem != function) == 2:
+        remedy = f"call robot.{other}: it returns those of a weighted sum of the results"
+    return ArgumentError(f"{function} has no {which}derivatives", remedy)
 
 
 def refuse_constant(function: str, given: str) -> ArgumentError:

@@ -23,7 +23,7 @@ from jax.interpreters import ad, batching, mlir
 from psdmc.compiler import compile
 from psdmc.errors import InputError
 from psdmc.frameworks import xla
-from psdmc.frameworks.coordinates import Coordinates
+from psdmc.frameworks.coordinates import ON_COORDINATES, Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
     Arrays,
@@ -31,7 +31,7 @@ from psdmc.frameworks.differentiation import (
     refuse_constant,
     require_rule,
 )
-from psdmc.functions import SIGNATURES
+from psdmc.functions import SIGNATURES, no_function
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
@@ -67,7 +67,8 @@ def jax_robot(
             f"{compiled.name}: the precision is float64, and JAX's option jax_enable_x64 is off",
             'call jax.config.update("jax_enable_x64", True) first, or give real="float32"',
         )
-    key = repr((found.content_hash, lowering, real, trig, target, gravity_input))
+    options = (lowering, real, trig, target, gravity_input)
+    key = repr((found.content_hash, *options))
     robot, chain = compiled, found.mechanism
     sizes = Sizes(
         robot.n,
@@ -78,7 +79,8 @@ def jax_robot(
         rows_of_contacts=chain.rows_of_contacts,
         rows_of_loops=chain.rows_of_loops,
     )
-    return _MADE.setdefault(key, JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes))
+    made = JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes, (found, *options))
+    return _MADE.setdefault(key, made)
 
 
 class JaxRobot:
@@ -94,17 +96,33 @@ class JaxRobot:
     """
 
     def __init__(
-        self, compiled: CompiledRobot[Any], key: str, coordinates: Coordinates, sizes: Sizes
+        self,
+        compiled: CompiledRobot[Any],
+        key: str,
+        coordinates: Coordinates,
+        sizes: Sizes,
+        request: tuple[Any, ...],
     ) -> None:
         self.compiled = compiled
         """The same robot for NumPy arrays, with the names, sizes, limits and theta_b of the robot."""
         self._key = key
-        self._coordinates, self._sizes = coordinates, sizes
-        self._kernels: dict[tuple[str, bool], Kernel] = {}
+        self._coordinates, self._sizes, self._request = coordinates, sizes, request
+        self._kernels: dict[tuple[str, bool, str, int], Kernel] = {}
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    else:
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_function(self, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return jax_robot, self._request
+
+    def __deepcopy__(self, memo: object) -> JaxRobot:
+        return self
 
     def __repr__(self) -> str:
         return f"JaxRobot {self.compiled.name!r}: {self.compiled.n} joints, {self.compiled.dtype}"
@@ -154,15 +172,14 @@ class JaxRobot:
         is_wide = quantity.axes == Q.axes and not self._coordinates.are_plain
         return self._coordinates.normalized(array) if is_wide else array
 
-    def _kernel(self, function: Signature, theta: bool) -> Kernel:
+    def _kernel(self, function: Signature, theta: bool, asked: str = "", order: int = 0) -> Kernel:
         """The same object for the same function: JAX compares the parameters of its primitives."""
-        return self._kernels.setdefault((function.name, theta), Kernel(self, function, theta))
+        asked = asked or function.name
+        key = (function.name, theta, asked, order)
+        return self._kernels.setdefault(key, Kernel(self, function, theta, asked, order))
 
 
 THETA = Quantity("theta_b", ("l",))
-
-ON_COORDINATES = {"integrate": "integrated", "difference": "difference"}
-"""Functions that JAX computes itself, so that it differentiates them as often as wanted, and the methods of Coordinates."""
 
 
 def _method(function: Signature) -> Callable[..., Any]:
@@ -187,11 +204,15 @@ class Kernel:
     """The generated function that JAX's primitives call.
 
     theta  whether theta_b is the last argument
+    asked  name of the function that the user called: this one, or one of which JAX takes a derivative
+    order  number of times that JAX has differentiated the user's function
     """
 
     robot: JaxRobot
     function: Signature
     theta: bool
+    asked: str
+    order: int
 
     def with_tail(self, lead: tuple[int, ...], quantity: Quantity) -> tuple[int, ...]:
         """Return the shape of an input or output: the leading axes `lead`, then the axes of one state."""
@@ -227,7 +248,8 @@ class Kernel:
     @property
     def rule(self) -> Rule:
         """Return the rule that differentiates the function. Raises ArgumentError if psdmc has none."""
-        return require_rule(self.function.name, GRAVITY in self.function.inputs)
+        has_gravity = GRAVITY in self.function.inputs
+        return require_rule(self.function.name, has_gravity, asked=self.asked, order=self.order + 1)
 
     def number(self, by_rows: bool) -> int:
         """Return the number under which XLA finds the compiled function. If the function is not compiled yet, psdmc
@@ -254,11 +276,12 @@ class Kernel:
 class _Rules:
     """JAX as the rules of differentiation.py see it.
 
+    kernel   the function that is differentiated
     theta_b  (l,) or (..., l); None: the robot's own
     gravity  (..., 3), for functions with this input; None: zero, where its effects cancel
     """
 
-    robot: JaxRobot
+    kernel: Kernel
     theta_b: Array | None
     gravity: Array | None = None
     arrays: Any = jnp
@@ -267,11 +290,12 @@ class _Rules:
         return replace(self, gravity=gravity)
 
     def call(self, name: str, *inputs: Array) -> Arrays:
-        function, inputs = self.robot.compiled.with_gravity(SIGNATURES[name], inputs)
+        robot, asked, order = self.kernel.robot, self.kernel.asked, self.kernel.order + 1
+        function, inputs = robot.compiled.with_gravity(SIGNATURES[name], inputs)
         if GRAVITY in function.inputs:
             own_gravity = jnp.zeros(3, inputs[0].dtype) if self.gravity is None else self.gravity
             inputs = (*inputs[:-1], own_gravity)
-        kernel = self.robot._kernel(function, self.theta_b is not None and function.theta)
+        kernel = robot._kernel(function, self.theta_b is not None and function.theta, asked, order)
         own = self.theta_b if kernel.theta else None
         return tuple(_call.bind(*kernel.given(inputs, own), kernel=kernel))
 
@@ -355,14 +379,14 @@ def _differentiated(
     for quantity, q, tangent, moved in zip(function.inputs, primals, tangents, moves, strict=False):
         if quantity.name in rule.constant:
             if moved:
-                raise refuse_constant(function.name, quantity.name)
+                raise refuse_constant(kernel.asked, quantity.name)
             continue
         along = ad.instantiate_zeros(tangent)
         is_wide = quantity.axes == Q.axes and not coordinates.are_plain
         linear.append(coordinates.tangent(q, along) if is_wide else along)
     by_theta = kernel.theta and moves[count]
     if by_theta and not rule.parameters:
-        raise refuse_constant(function.name, THETA.name)
+        raise refuse_constant(kernel.asked, THETA.name)
     linear += [tangents[count]] if by_theta else []
     found = _linear.bind(*primals, *linear, kernel=kernel, by_theta=by_theta)
     return outs, [
@@ -401,7 +425,7 @@ class _Parts:
         at = iter(range(count + kernel.theta, len(given)))
         places = tuple(None if quantity.name in constant else next(at) for quantity in kernel.function.inputs)
         theta_b = given[count] if kernel.theta else None
-        return cls(_Rules(kernel.robot, theta_b), tuple(given[:count]), places)
+        return cls(_Rules(kernel, theta_b), tuple(given[:count]), places)
 
 
 def _tangents(*given: Array, kernel: Kernel, by_theta: bool) -> list[Array]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,15 +20,16 @@ from torch._functorch.utils import enable_single_level_autograd_function
 from torch.autograd.function import _SingleLevelFunction
 
 from psdmc.compiler import compile as compiled
-from psdmc.frameworks.coordinates import Coordinates
+from psdmc.frameworks.coordinates import ON_COORDINATES, Coordinates
 from psdmc.frameworks.differentiation import (
     ArgumentError,
     Rule,
+    no_derivatives,
     refuse_constant,
     require_rule,
     rule_of,
 )
-from psdmc.functions import SIGNATURES
+from psdmc.functions import SIGNATURES, no_function
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import for_every_gravity
@@ -53,11 +55,11 @@ ARRAYS = SimpleNamespace(**(vars(torch) | {"moveaxis": torch.movedim}))
 
 THETA_B = Quantity("theta_b", ("l",))
 
-ON_COORDINATES = {"integrate": "integrated", "difference": "difference"}
-"""Functions that PyTorch computes itself, so that it differentiates them as often as wanted, and methods of Coordinates."""
-
 _LIBRARY = torch.library.Library("psdmc", "FRAGMENT")
 """Operators are registered as long as this lives."""
+
+_ASKED: ContextVar[str | None] = ContextVar("_ASKED", default=None)
+"""While a rule calls an operator: the name of the function that the user called and that the rule differentiates."""
 
 _ROBOTS: dict[str, TorchRobot] = {}
 """Robots of this process by their requests. They stay, because operators of PyTorch do."""
@@ -86,8 +88,9 @@ class TorchRobot:
     robots.
 
     The methods have the arguments of the methods of a CompiledRobot, without `out`. All tensors of a call are float64,
-    or all are float32. Leading axes broadcast, those of theta_b too. If the mass matrix of a state is not positive
-    definite, the results of this state are NaN. A method with several results returns a named tuple.
+    or all are float32. Inputs with one number per state, such as a time step dt, can also be numbers of Python. Leading
+    axes broadcast, those of theta_b too. If the mass matrix of a state is not positive definite, the results of this
+    state are NaN. A method with several results returns a named tuple.
 
     The quaternions in q can have any length but zero: the methods normalize q first. A derivative by q is the
     derivative by its nq entries. In the direction of a quaternion, which only changes the length, the derivative is
@@ -170,18 +173,26 @@ class TorchRobot:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
 
+    else:
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_function(self, name)
+
 
 def _method(function: Signature) -> Callable[..., Any]:
     names, result = arguments(function), results(function)
     required = len(function.inputs)
+    scalars = [k for k, quantity in enumerate(function.inputs) if not quantity.axes]
 
-    def method(self: TorchRobot, *given: Tensor, **named: Tensor) -> Any:
+    def method(self: TorchRobot, *given: Any, **named: Any) -> Any:
         gravity = named.pop(GRAVITY.name, None)
         missing = [name for name in names[len(given) : required] if name not in named]
         if missing or len(given) > len(names) or any(name not in names[len(given) :] for name in named):
             got = ", ".join([f"{len(given)} tensors", *named])
             raise TypeError(f"{function.name}({', '.join(names)}): got {got}")
         tensors = [*given, *(named.get(name) for name in names[len(given) :])]
+        for k in scalars:
+            tensors[k] = _as_scalar(tensors[k], like=tensors[0])
         for name, tensor in zip(names, tensors, strict=True):
             _refuse_elsewhere(f"{function.name}: {name}", tensor, is_optional=name == "theta_b")
         _refuse_elsewhere(f"{function.name}: {GRAVITY.name}", gravity, is_optional=True)
@@ -194,6 +205,12 @@ def _method(function: Signature) -> Callable[..., Any]:
     method.__name__, method.__qualname__ = function.name, f"{TorchRobot.__name__}.{function.name}"
     method.__doc__ = f"{function.summary}\n\nSee `psdmc.CompiledRobot.{function.name}` for shapes and units."
     return method
+
+
+def _as_scalar(given: Any, like: Any) -> Any:
+    """A number as a tensor () of the type of `like`; anything else as it is."""
+    is_number = isinstance(given, (int, float)) and isinstance(like, torch.Tensor)
+    return torch.full((), given, dtype=like.dtype) if is_number else given
 
 
 def _refuse_elsewhere(what: str, tensor: Any, is_optional: bool) -> None:
@@ -224,9 +241,10 @@ for _function in SIGNATURES.values():
 
 @dataclass(frozen=True, slots=True)
 class _Calls:
-    """What rules call: operators of one robot, with the caller's theta_b."""
+    """What rules call: operators of one robot, with the caller's theta_b, for the function that the user asked for."""
 
     robot: TorchRobot
+    asked: str
     theta_b: Tensor
     gravity: Tensor | None = None
     arrays: ClassVar[Any] = ARRAYS
@@ -241,7 +259,11 @@ class _Calls:
         )  # zero where its effects cancel
         gravity = (none,) if GRAVITY in signature.inputs else ()
         theta = (self.theta_b,) if SIGNATURES[function].theta else ()
-        found = self.robot.operator(function)(*inputs, *gravity, *theta)
+        token = _ASKED.set(self.asked)
+        try:
+            found = self.robot.operator(function)(*inputs, *gravity, *theta)
+        finally:
+            _ASKED.reset(token)
         return found if isinstance(found, tuple) else (found,)
 
 
@@ -346,13 +368,14 @@ class _Operator:
         context.save_for_forward(*kept)
         context.set_materialize_grads(False)
         context.shapes = [tensor.shape for tensor in outputs]
+        context.asked = _ASKED.get() or self.function.name
 
     def _back(self, context: Any, *cotangents: Tensor) -> Any:
         """Return the gradients by the operator's arguments."""
         needed, coordinates = context.needs_input_grad, self.robot.coordinates
         if all(cotangent is None for cotangent in cotangents):
             return (None,) * len(needed)
-        rule = self._rule(needed)
+        rule = self._rule(needed, context.asked)
         inputs, theta_b, positions = self._kept(context)
         weights = []
         for quantity, cotangent, shape in zip(self.function.outputs, cotangents, context.shapes, strict=True):
@@ -361,7 +384,9 @@ class _Operator:
                 weight = coordinates.pulled_back(positions.pop(0), weight)
             weights.append(weight)
         by_theta = theta_b is not None and needed[-1]
-        found, theta = rule.back(_Calls(self.robot, theta_b), tuple(inputs), tuple(weights), by_theta)
+        found, theta = rule.back(
+            _Calls(self.robot, context.asked, theta_b), tuple(inputs), tuple(weights), by_theta
+        )
         gradients = [
             coordinates.gradient(tensor, gradient) if self._is_wide(quantity) else gradient
             for quantity, tensor, gradient in zip(self.function.inputs, inputs, found, strict=True)
@@ -372,29 +397,26 @@ class _Operator:
     def _along(self, context: Any, *tangents: Tensor) -> Any:
         """Return the results' derivatives along tangents of the operator's arguments."""
         coordinates, moves = self.robot.coordinates, [tangent is not None for tangent in tangents]
-        rule = self._rule(moves)
+        rule = self._rule(moves, context.asked)
         inputs, theta_b, positions = self._kept(context)
         along = []
         for quantity, tensor, tangent in zip(self.function.inputs, inputs, tangents, strict=False):
             moved = torch.zeros_like(tensor) if tangent is None else tangent
             along.append(coordinates.tangent(tensor, moved) if self._is_wide(quantity) else moved)
         dtheta = tangents[-1] if self.function.theta else None
-        found = rule.along(_Calls(self.robot, theta_b), tuple(inputs), tuple(along), dtheta)
+        found = rule.along(_Calls(self.robot, context.asked, theta_b), tuple(inputs), tuple(along), dtheta)
         made = tuple(
             coordinates.rates(positions.pop(0), tangent) if self._is_wide(quantity) else tangent
             for quantity, tangent in zip(self.function.outputs, found, strict=True)
         )
         return made[0] if len(made) == 1 else made
 
-    def _rule(self, moves: Sequence[bool]) -> Rule:
+    def _rule(self, moves: Sequence[bool], asked: str) -> Rule:
         """Return the function's rule; ArgumentError if it has none, or none by an argument that is differentiated."""
         name = self.function.name
-        first = name.partition("_vjp")[0].removesuffix("_jvp")
-        if rule_of(name) is None and first != name:
-            raise ArgumentError(
-                f"{first} has no second derivatives",
-                "leave out create_graph=True, or take differences of first derivatives",
-            )
+        if rule_of(name) is None and asked != name:
+            error = no_derivatives(asked, 2)
+            raise ArgumentError(error.message, f"leave out create_graph=True, or {error.hint}")
         gravity = [moved for each, moved in zip(self.function.inputs, moves, strict=False) if each is GRAVITY]
         rule = require_rule(name, bool(gravity), any(gravity))
         for given, moved in zip(arguments(self.function), moves, strict=True):

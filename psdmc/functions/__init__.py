@@ -3,6 +3,8 @@ outputs and the computation."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -54,3 +56,20 @@ def recipe_of(name: str) -> Recipe:
 def default_of(robot: Mechanism) -> tuple[str, ...]:
     """Return the names of the functions that psdmc generates for a robot if the user names none."""
     return DEFAULT if all(joint.type.about_z for joint in robot.joints) else DEFAULT_WHERE_WIDE
+
+
+def near_names(word: str, names: Sequence[str], otherwise: str | None = None) -> str:
+    """Return the hint for a word that is none of the names: similar names, or `otherwise`, or else all names."""
+    alike = get_close_matches(word.lower().replace("-", "_"), names, n=3)
+    return (
+        f"do you mean {' or '.join(alike)}?" if alike else otherwise or f"psdmc generates {', '.join(names)}"
+    )
+
+
+def no_function(robot: object, name: str) -> AttributeError:
+    """Return the error for an attribute that a robot object does not have. It says which public names are similar."""
+    if name.startswith("_"):
+        return AttributeError(f"{type(robot).__name__} has no attribute {name!r}")
+    public = [each for each in dir(robot) if not each.startswith("_")]
+    hint = near_names(name, public, "dir(robot) lists all")
+    return AttributeError(f"{type(robot).__name__} has no function {name!r}; {hint}", name=name)

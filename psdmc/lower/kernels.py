@@ -6,13 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
 from psdmc.friction.in_dynamics import FrictionInDynamics
-from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, recipe_of
+from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, near_names, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.dimension_check import check_dimensions
@@ -156,18 +155,12 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
     known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
+        raise InputError(f"function {unknown[0]!r} is not known", near_names(unknown[0], (*RECIPES, *groups)))
     if not names:
         raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
     calling = [name for name in names if robot is None or robot.nv > recipe_of(name).straight]
     called = {other for name in calling for other in known[name].calls}
     return tuple(name for name in known if name in names or name in called)
-
-
-def _near(word: str, names: Sequence[str]) -> str:
-    """The hint for a name that is none: those that look like it, else all."""
-    alike = get_close_matches(word.lower().replace("-", "_"), names, n=3)
-    return f"do you mean {' or '.join(alike)}?" if alike else f"psdmc generates {', '.join(names)}"
 
 
 def _refusal(model: DynamicsModel, function: Signature, singular: SingularMatrix) -> InputError:

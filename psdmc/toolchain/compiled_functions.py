@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import cffi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
+from psdmc.functions import no_function
 from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
@@ -58,6 +59,11 @@ class RobotFacts:
 
     def __init__(self, interface: Interface) -> None:
         self._interface = interface
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_function(self, name)
 
     @property
     def name(self) -> str:
@@ -168,7 +174,7 @@ class RobotFacts:
 
     @property
     def _title(self) -> str:
-        return f"CompiledRobot {self.name!r}: {self.n} joints, {self._interface.dtype}"
+        return f"{type(self).__name__} {self.name!r}: {self.n} joints, {self._interface.dtype}"
 
     def _facts(self) -> list[str]:
         lengths = [] if self.nq == self.nv == self.n else [f"nq = {self.nq}, nv = {self.nv}"]
@@ -365,21 +371,24 @@ class CompiledFunctions(RobotFacts):
 
     def _kernel(self, name: str) -> _Kernel:
         found = self._kernels.get(name)
-        if found is None and f"{name}_theta" in self._kernels:
-            raise InputError(
-                f"{self._robot}: {name} wants parameters, and this model's theta_b is unknown",
-                f"give theta_b=, {self._sizes.l} numbers; psdmc calibrate finds them from logs",
-            )
-        if found is None and self._more is not None:
+        if found is None and f"{name}_theta" not in self._kernels and self._more is not None:
             other = self._more(name.removesuffix("_theta"))
             self._others.append(other)
             self._kernels = other._kernels | self._kernels
             self._patterns = other._patterns | self._patterns
             self._bind(other)
             found = self._kernels.get(name)
+        if found is None and f"{name}_theta" in self._kernels:
+            raise InputError(
+                f"{self._robot}: {name} wants parameters, and this model's theta_b is unknown",
+                f"give theta_b=, {self._sizes.l} numbers; psdmc calibrate finds them from logs",
+            )
         if found is None:
             compiled = ", ".join(self._kernels)
-            raise InputError(f"{self._robot}: {name} was not compiled", f"compiled are {compiled}")
+            raise InputError(
+                f"{self._robot}: {name} was not compiled",
+                f"add {name.removesuffix('_theta')!r} to the argument functions of psdmc.compile; compiled are {compiled}",
+            )
         return found
 
     def _bind(self, compiled: CompiledFunctions) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -380,9 +382,24 @@ def test_what_has_no_derivative_is_refused_by_name() -> None:
         "^jacobian has no derivatives",
         "inverse_dynamics",
     )
+    seconds = {
+        "gravity": "call robot.inverse_dynamics_second_derivatives with zero rates and accelerations",
+        "mass_matrix": "take differences of first derivatives",
+        "forward_kinematics": "take differences",
+    }
+    for name, remedy in seconds.items():
+        first = partial(lambda call, q: call(q)[0].sum(), getattr(robot, name))
+        for second in (jax.hessian(first), jax.jacrev(jax.jit(jax.jacrev(first)))):
+            refused(partial(second, q), f"^{name} has no second derivatives", remedy)
+    energy = jax.jacfwd(jax.hessian(robot.potential_energy))
+    refused(lambda: energy(q), "^potential_energy has no third derivatives", "take differences")
+    forward = jax.hessian(lambda tau: robot.forward_dynamics(q, q, tau).sum())
     refused(
-        lambda: jax.hessian(lambda q: robot.gravity(q).sum())(q),
-        "^inverse_dynamics has no second derivatives",
+        lambda: forward(q), "^forward_dynamics has no second", "robot.forward_dynamics_second_derivatives: it"
+    )
+    by_vjp = jax.grad(lambda q: robot.inverse_dynamics_vjp(q, q, q, q).tau.sum())
+    refused(
+        lambda: by_vjp(q), "^inverse_dynamics_vjp has no derivatives", "inverse_dynamics_second_derivatives"
     )
     step = jax.jacfwd(lambda dt: robot.semi_implicit_euler(q, q, q, dt).q_next)
     refused(lambda: step(0.01), "^semi_implicit_euler has no derivative by dt", "forward_dynamics")
@@ -414,8 +431,13 @@ def test_float64_needs_jax_enable_x64() -> None:
 
 def test_an_equal_robot_is_the_same_one() -> None:
     model = differentiated("scara").model
-    assert psdmc.jax(model) is psdmc.jax(model)
+    robot = psdmc.jax(model)
+    assert psdmc.jax(model) is robot
+    assert copy.copy(robot) is copy.deepcopy(robot) is pickle.loads(pickle.dumps(robot)) is robot
     assert repr(psdmc.jax(model)) == "JaxRobot 'scara': 4 joints, float64"
+    with pytest.raises(AttributeError, match=r"^JaxRobot has no function 'grvity'; do you mean gravity"):
+        robot.grvity  # noqa: B018
+    assert not hasattr(robot, "__zzz__")
     assert "Compute the gravity torques" in psdmc.jax(model).gravity.__doc__
 
 

@@ -203,8 +203,7 @@ def test_functions_without_derivatives_are_operators_too(function: str) -> None:
     assert getattr(found, "_fields", None) == getattr(expected, "_fields", None)
     torch.library.opcheck(robot.operator(function), given)
     last = getattr(robot, function)(*[x.requires_grad_() for x in given])
-    named = function.removesuffix("_vjp")
-    with pytest.raises(ArgumentError, match=rf"^{named} has no (second )?derivatives"):
+    with pytest.raises(ArgumentError, match=rf"^{function} has no derivatives"):
         (last[0] if isinstance(last, tuple) else last).sum().backward()
 
 
@@ -311,8 +310,42 @@ def test_second_derivatives_are_refused() -> None:
     with pytest.raises(ArgumentError, match=r"^inverse_dynamics has no second derivatives") as caught:
         slope.sum().backward()
     assert "create_graph" in caught.value.hint
-    with pytest.raises(ArgumentError, match="second derivatives"):
+    (slope,) = torch.autograd.grad(robot.gravity(given[0]).sum(), given[:1], create_graph=True)
+    with pytest.raises(ArgumentError, match=r"^gravity has no second derivatives") as caught:
+        slope.sum().backward()
+    assert "robot.inverse_dynamics_second_derivatives with zero rates" in caught.value.hint
+    with pytest.raises(ArgumentError, match=r"^inverse_dynamics_vjp has no derivatives"):
+        robot.inverse_dynamics_vjp(*given, given[1]).tau.sum().backward()
+    with pytest.raises(ArgumentError, match=r"^forward_dynamics has no second derivatives"):
         func.hessian(lambda q: robot.forward_dynamics(q, *given[1:]).sum())(given[0])
+
+
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_time_steps_take_numbers(real: str) -> None:
+    """dt as a number of Python, by place and by name, gives what a tensor gives, and gradients by the other inputs."""
+    robot, dtype = robot_of("scara"), getattr(torch, real)
+    q, qd, tau, _ = (x.to(dtype) for x in drawn("scara", "semi_implicit_euler"))
+    dt = torch.tensor(0.25, dtype=dtype)
+    for step in (robot.semi_implicit_euler, robot.rk4_step):
+        expected = step(q, qd, tau, dt)
+        for found in (step(q, qd, tau, 0.25), step(q, qd, tau, dt=0.25), step(q, qd, tau, np.float64(0.25))):
+            assert found.q_next.dtype == dtype
+            assert torch.equal(found.q_next, expected.q_next)
+            assert torch.equal(found.qd_next, expected.qd_next)
+        slopes = [
+            torch.autograd.grad(step(q, qd, given, each).q_next.sum(), given)[0]
+            for given, each in ((tau.clone().requires_grad_(), 0.25), (tau.clone().requires_grad_(), dt))
+        ]
+        assert torch.equal(*slopes)
+        assert slopes[0].abs().max() > 0.0
+    assert torch.equal(robot.rk4_step(q, qd, tau, 0).q_next, q)
+    compiled = torch.compile(lambda dt: robot.semi_implicit_euler(q, qd, tau, dt).q_next, fullgraph=True)
+    for each in (0.25, 0.5):
+        assert same(compiled(each), robot.semi_implicit_euler(q, qd, tau, each).q_next, 1e-6)
+    with pytest.raises(TypeError, match=r"tau is a float, expected a torch\.Tensor"):
+        robot.semi_implicit_euler(q, qd, 0.1, 0.25)
+    with pytest.raises(TypeError, match="dt is a str"):
+        robot.semi_implicit_euler(q, qd, tau, "0.25")
 
 
 def test_what_has_no_derivative_is_named() -> None:
@@ -426,6 +459,10 @@ def test_a_robot_is_one_object() -> None:
     assert psdmc.torch(differentiated("scara").model) is robot
     assert copy.deepcopy(robot) is robot
     assert pickle.loads(pickle.dumps(robot)) is robot
+    assert copy.copy(robot) is robot
+    with pytest.raises(AttributeError, match=r"^TorchRobot has no function 'grvity'; do you mean gravity"):
+        robot.grvity  # noqa: B018
+    assert not hasattr(robot, "__zzz__")
     assert repr(robot) == "TorchRobot 'scara': 4 joints"
     assert robot.neutral().tolist() == [0.0] * 4
     assert robot.neutral(torch.float32).dtype == torch.float32

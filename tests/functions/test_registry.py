@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import psdmc.functions
+from psdmc.frameworks.differentiation import rule_of
 from psdmc.functions import DEFAULT, RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.signature import WORDS
@@ -20,6 +21,7 @@ from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.stubs import ANSWERS, STUB, answers_stub, own_methods, stub
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
+import derivative_table
 import function_table
 
 PACKAGE = Path(psdmc.functions.__file__).parents[1]
@@ -36,9 +38,8 @@ NAMES_SEVERAL = {
     "model_functions.py": "what is computed from E and P where a model has them",
     "backends/c/adapters/ros2.py": "what the two controllers call",
     "backends/c/adapters/fmu.py": "what an FMU simulates, and its optional outputs",
+    "frameworks/coordinates.py": "which functions JAX and PyTorch compute themselves",
     "frameworks/differentiation.py": "which function gives the derivatives of which",
-    "frameworks/jax_robot.py": "what JAX reads of functions that need help",
-    "frameworks/torch_robot.py": "what PyTorch reads of functions that need help",
     "bench/legged.py": "the rows of the table of legged robots, and what rivals compute in their place",
     "report/bench_markdown.py": "the columns of README's table",
 }
@@ -111,6 +112,16 @@ def test_the_documents_table_is_of_the_declarations() -> None:
     text = function_table.PAGE.read_text(encoding="utf-8")
 
     assert function_table.with_table(text) == text, "run python docs/function_table.py"
+
+
+@pytest.mark.parametrize("page", derivative_table.PAGES, ids=lambda page: page.stem)
+def test_tables_of_derivatives_are_of_the_rules(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+
+    assert derivative_table.with_table(text) == text, "run python docs/derivative_table.py"
+    for name in SIGNATURES:
+        if rule_of(name):
+            assert f"`{name}`" in derivative_table.table()
 
 
 def test_sizes_have_one_meaning_each_and_quantities_are_explained() -> None:

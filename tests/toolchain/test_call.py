@@ -126,6 +126,17 @@ def test_a_wrong_number_of_parameters_is_said(robot: CompiledRobot) -> None:
 def test_a_function_that_was_not_compiled_is_said() -> None:
     package = arm_package(names=["gravity"])
     robot = CompiledRobot(interface_of(package), compile_library(package))
+    with pytest.raises(AttributeError) as unknown:
+        robot.mass_matrx  # noqa: B018
+    assert str(unknown.value) == (
+        "CompiledRobot has no function 'mass_matrx'; do you mean mass_matrix or mass_matrix_packed or mass_matrix_inverse?"
+    )
+    assert "mass_matrix" in dir(robot)
+    assert not hasattr(robot, "zzz")
+    with pytest.raises(AttributeError, match=r"has no function 'zzz'; dir\(robot\) lists all$"):
+        robot.zzz  # noqa: B018
     with pytest.raises(InputError, match="mass_matrix was not compiled") as caught:
         robot.mass_matrix(np.zeros(N))
-    assert caught.value.hint == "compiled are gravity, gravity_theta"
+    assert caught.value.hint == (
+        "add 'mass_matrix' to the argument functions of psdmc.compile; compiled are gravity, gravity_theta"
+    )

@@ -185,6 +185,9 @@ numpy.savez(
 
 
 WRONG = {
+    "arm.inverse_dynamic": "AttributeError: arm has no function 'inverse_dynamic'; do you mean inverse_dynamics? psdmc",
+    "arm.regressor": "AttributeError: arm has no function 'regressor'; it has inverse_dynamics, forward_dynamics, ",
+    "arm._regressor": "AttributeError: arm has no attribute '_regressor'",
     "arm.gravity([0.0] * 5)": "ValueError: q has shape (5,), expected ('...', 6)",
     "arm.gravity(0.0)": "ValueError: q has shape (), expected ('...', 6)",
     "arm.gravity([1j] * 6)": "TypeError: q has dtype complex128, expected real numbers",

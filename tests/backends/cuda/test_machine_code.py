@@ -12,7 +12,11 @@ from machine_code import DERIVATIVES, FILE, counts, kernels_in, version
 from pinocchio_robots import path_of
 
 import psdmc
+from psdmc.emission import cuda_source
+from psdmc.errors import ToolchainError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE
+from psdmc.progress import silent
+from psdmc.toolchain import nvrtc
 
 pytestmark = pytest.mark.skipif(
     not machine_code.are_installed(), reason="the extra cuda (NVRTC and ptxas) is not installed"
@@ -60,3 +64,18 @@ def test_more_than_recorded_is_noticed() -> None:
 
     assert not worse({"a": [32, 0, 0], "b": [40, 0, 16]}, recorded)
     assert len(worse({"a": [33, 0, 0], "b": [255, 8, 17], "c": [1, 0, 0]}, recorded)) == 3
+
+
+@pytest.mark.parametrize(("arch", "begin"), [(90, b"\x7fELF"), (999, b"//")])
+def test_compile_at_run_time(arch: int, begin: bytes) -> None:
+    """What psdmc.compile(target="cuda") loads: machine code of a GPU that NVRTC knows, and PTX for a newer one."""
+    names = ("inverse_dynamics", "forward_dynamics")
+    source = cuda_source(bundled_model("two_link"), "auto", names, "float32", silent)
+
+    code = nvrtc.machine_code(source.text, f"{source.robot}_KERNELS", arch)
+
+    assert code.startswith(begin)
+    for name in source.interface.kernels:
+        assert f"two_link_{name}_rows".encode() in code
+    with pytest.raises(ToolchainError, match=r"no GPU as old as compute capability 2\.0"):
+        nvrtc.machine_code(source.text, "x", 20)

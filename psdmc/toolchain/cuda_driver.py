@@ -1,0 +1,133 @@
+"""Calls the driver of NVIDIA's GPUs: memory, machine code and launches on one GPU. It uses the GPU's primary context, as
+CuPy, PyTorch and JAX do."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.errors import InputError, ToolchainError
+
+NAMES = ("libcuda.so.1", "nvcuda.dll")
+"""Names of the driver's library on Linux and Windows."""
+
+MAJOR, MINOR = 75, 76
+"""Numbers of two attributes of a device: its compute capability."""
+
+POINTERS_DEVICE, NO_VALUE = 9, 1
+"""Number of the attribute of an address that names its GPU, and status if the address belongs to no GPU."""
+
+DEFAULT_STREAM = 1
+"""Handle of the stream on which work without another stream runs."""
+
+
+class Driver:
+    """One GPU. Raises ToolchainError if the driver is missing or fails, InputError if there is no GPU of this number."""
+
+    def __init__(self, ordinal: int) -> None:
+        self.ordinal, self._cuda = ordinal, opened()
+        count, device = ctypes.c_int(), ctypes.c_int()
+        self._context = ctypes.c_void_p()
+        self._check("cuInit", 0)
+        self._check("cuDeviceGetCount", ctypes.byref(count))
+        if not 0 <= ordinal < count.value:
+            raise InputError(
+                f"there is no GPU {ordinal}: the driver finds {count.value}", "numbers begin with 0"
+            )
+        self._check("cuDeviceGet", ctypes.byref(device), ordinal)
+        self._check("cuDevicePrimaryCtxRetain", ctypes.byref(self._context), device)
+        self.arch = sum(
+            scale * self._attribute(number, device) for scale, number in ((10, MAJOR), (1, MINOR))
+        )
+        """Ten times the compute capability of the GPU, such as 90."""
+
+    def kernels(self, code: bytes, symbols: Sequence[str]) -> list[ctypes.c_void_p]:
+        """Load machine code, and return the handles of its kernels by their names."""
+        module, found = ctypes.c_void_p(), [ctypes.c_void_p() for _ in symbols]
+        self._call("cuModuleLoadData", ctypes.byref(module), code)
+        for handle, symbol in zip(found, symbols, strict=True):
+            self._call("cuModuleGetFunction", ctypes.byref(handle), module, symbol.encode())
+        return found
+
+    def launch(
+        self, kernel: ctypes.c_void_p, blocks: int, threads: int, stream: int, given: list[Any]
+    ) -> None:
+        """Start a kernel on a stream, and return without waiting. The arguments are ctypes objects."""
+        places = (ctypes.c_void_p * len(given))(*map(ctypes.addressof, given))
+        grid = map(ctypes.c_uint, (blocks, 1, 1, threads, 1, 1, 0))
+        self._call("cuLaunchKernel", kernel, *grid, ctypes.c_void_p(stream), places, None)
+
+    def wait(self, stream: int) -> None:
+        """Wait until all work on a stream is done."""
+        self._call("cuStreamSynchronize", ctypes.c_void_p(stream))
+
+    def allocated(self, size: int) -> int:
+        """Return the address of new memory of this number of bytes."""
+        place = ctypes.c_uint64()
+        self._call("cuMemAlloc_v2", ctypes.byref(place), ctypes.c_size_t(max(size, 1)))
+        return place.value
+
+    def free(self, place: int) -> None:
+        """Wait until the GPU is idle, and free memory."""
+        self._call("cuCtxSynchronize")
+        self._call("cuMemFree_v2", ctypes.c_uint64(place))
+
+    def copy_in(self, place: int, array: NDArray[Any]) -> None:
+        """Copy a contiguous array of the CPU to the GPU."""
+        size = ctypes.c_size_t(array.nbytes)
+        self._call("cuMemcpyHtoD_v2", ctypes.c_uint64(place), ctypes.c_void_p(array.ctypes.data), size)
+
+    def copy_out(self, place: int, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+        """Return memory of the GPU as a new array of the CPU."""
+        array = np.empty(shape, dtype)
+        size = ctypes.c_size_t(array.nbytes)
+        self._call("cuMemcpyDtoH_v2", ctypes.c_void_p(array.ctypes.data), ctypes.c_uint64(place), size)
+        return array
+
+    def device_of(self, place: int) -> int | None:
+        """Return the number of the GPU that has memory at this address; None: it is memory of the CPU."""
+        found = ctypes.c_int()
+        words = ctypes.byref(found), POINTERS_DEVICE, ctypes.c_uint64(place)
+        is_known = self._call("cuPointerGetAttribute", *words, allowed=NO_VALUE) == 0
+        return found.value if is_known else None
+
+    def _attribute(self, number: int, device: ctypes.c_int) -> int:
+        value = ctypes.c_int()
+        self._check("cuDeviceGetAttribute", ctypes.byref(value), number, device)
+        return value.value
+
+    def _call(self, name: str, *given: Any, allowed: int = 0) -> int:
+        """Call a function of the driver for this GPU, whatever GPU the thread used before."""
+        self._check("cuCtxPushCurrent_v2", self._context)
+        try:
+            return self._check(name, *given, allowed=allowed)
+        finally:
+            self._cuda.cuCtxPopCurrent_v2(ctypes.byref(ctypes.c_void_p()))
+
+    def _check(self, name: str, *given: Any, allowed: int = 0) -> int:
+        status = int(getattr(self._cuda, name)(*given))
+        if status not in (0, allowed):
+            text = ctypes.c_char_p()
+            self._cuda.cuGetErrorString(status, ctypes.byref(text))
+            said = (text.value or b"unknown error").decode()
+            raise ToolchainError(
+                f"{name}: the driver of the GPU says: {said}", "nvidia-smi shows the GPU's state"
+            )
+        return status
+
+
+@cache
+def opened() -> Any:
+    """Return the library of the driver. Raises ToolchainError if it is not installed."""
+    for name in NAMES:
+        try:
+            return ctypes.CDLL(name)
+        except OSError:
+            continue
+    hint = "psdmc emit --backend cuda writes the source without a GPU"
+    raise ToolchainError('target "cuda" needs an NVIDIA GPU: its driver (libcuda) is not installed', hint)

@@ -1,0 +1,225 @@
+"""A robot whose functions run on an NVIDIA GPU. `psdmc.compile(model, target="cuda")` makes such robots."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.functions import SIGNATURES
+from psdmc.program.signature import Quantity, Signature
+from psdmc.toolchain.call_arguments import THETA_B, bound_arguments
+from psdmc.toolchain.compiled_functions import RobotFacts, results
+from psdmc.toolchain.cuda_driver import DEFAULT_STREAM, Driver
+from psdmc.toolchain.device_arrays import DeviceArray, Seen, seen
+from psdmc.toolchain.interface import Interface
+from psdmc.toolchain.nvrtc import machine_code
+from psdmc.toolchain.stubs import documentation
+
+BLOCK = 128
+"""Threads of a block, as templates/cuda/sizes.jinja says."""
+
+
+@dataclass(frozen=True, slots=True)
+class CudaSource:
+    """The CUDA source of some functions of a robot, of which the kernels are R_NAME_rows.
+
+    robot      prefix of all its names, R
+    interface  names, sizes and results of the functions
+    failing    functions whose kernels have the argument `status`
+    """
+
+    text: str
+    robot: str
+    interface: Interface
+    failing: frozenset[str]
+
+
+class CudaRobot(RobotFacts):
+    """A robot whose methods, one for each generated function, compute on an NVIDIA GPU, a state in each thread.
+
+    Inputs are arrays in the memory of the GPU, of CuPy, PyTorch, JAX or another library with the CUDA array interface or
+    DLPack. They are not copied. All inputs have the same axes in front of those of one state, and the robot's dtype. Inputs
+    with one number per state, such as a time step, and theta_b (l,) can also be numbers or NumPy arrays, which are copied.
+
+    All methods have two more arguments:
+
+    out     array of the GPU into which psdmc writes the result, or a tuple of arrays, which overlap no input. Without it,
+            results are DeviceArrays
+    stream  stream on which the function runs, of CuPy or PyTorch, or its handle; None: the default stream
+
+    The methods return without waiting for the GPU. If a matrix such as the mass matrix is not positive definite, the results
+    of this state are NaN. Quaternions in q must have length one: psdmc does not check them.
+    """
+
+    def __init__(self, source: CudaSource, driver: Driver, more: Callable[[str], CudaSource] | None) -> None:
+        super().__init__(source.interface)
+        self._driver, self._more = driver, more
+        self._kernels: dict[str, tuple[ctypes.c_void_p, bool]] = {}
+        self._add(source)
+
+    def _add(self, source: CudaSource) -> None:
+        """Compile further functions. A kernel has a handle, and may have the argument `status`."""
+        own = source.interface.kernels
+        code = machine_code(source.text, f"{source.robot}_KERNELS", self._driver.arch)
+        handles = self._driver.kernels(code, [f"{source.robot}_{name}_rows" for name in own])
+        pairs = zip(own, handles, strict=True)
+        self._kernels |= {name: (handle, name in source.failing) for name, handle in pairs}
+        self._interface = replace(source.interface, kernels={**self._interface.kernels, **own})
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            'a CudaRobot cannot be pickled: call psdmc.compile(model, target="cuda") in each process'
+        )
+
+    def call(
+        self,
+        function: Signature,
+        inputs: Sequence[Any],
+        theta_b: Any = None,
+        out: Any = None,
+        stream: Any = None,
+    ) -> Any:
+        """Call a generated function; `function` is an entry of `psdmc.functions.SIGNATURES`."""
+        handle = handle_of(stream)
+        name = function.name + ("" if theta_b is None else "_theta")
+        kernel, has_status = self._kernel(name)
+        named = [
+            *zip(function.inputs, inputs, strict=True),
+            *([] if theta_b is None else [(THETA_B, theta_b)]),
+        ]
+        lead, arrays, copies = self._arrays(function, named, handle)
+        outs = self._results(function, [lead + tail for tail in self._interface.kernels[name]], out, handle)
+        places = [each.place for each in (*arrays, *(seen("", each, handle) for each in outs))]
+        words: list[Any] = [ctypes.c_uint64(place) for place in (*places, *([0] if has_status else []))]
+        states = math.prod(lead)
+        if states:
+            words.append(ctypes.c_longlong(states))
+            self._driver.launch(kernel, -(-states // BLOCK), BLOCK, handle, words)
+        if out is None:
+            outs[0].kept = copies
+        return outs[0] if len(outs) == 1 else results(function)(*outs)
+
+    def _arrays(
+        self, function: Signature, named: Sequence[tuple[Quantity, Any]], stream: int
+    ) -> tuple[tuple[int, ...], list[Seen], list[DeviceArray]]:
+        """The states' leading axes, the inputs, and those that are copies."""
+        what = [f"{function.name}: {quantity.name}" for quantity, _ in named]
+        found = [
+            None if _is_of_cpu(quantity, given) else seen(name, given, stream)
+            for name, (quantity, given) in zip(what, named, strict=True)
+        ]
+        leads = [
+            each.shape[: max(len(each.shape) - len(quantity.axes), 0)]
+            for each, (quantity, _) in zip(found, named, strict=True)
+            if each is not None and quantity is not THETA_B
+        ]
+        lead = leads[0] if leads else ()
+        copies: list[DeviceArray] = []
+        for k, (quantity, given) in enumerate(named):
+            tail = self._interface.sizes.shape(quantity.axes)
+            whole = tail if quantity is THETA_B else lead + tail
+            array = found[k]
+            if array is None:
+                copies.append(DeviceArray.of(self._driver, self._copied(what[k], quantity, given, whole)))
+                array = seen(what[k], copies[-1], stream)
+            found[k] = self._checked(what[k], array, whole, stream)
+        return lead, [each for each in found if each is not None], copies
+
+    def _copied(self, what: str, quantity: Quantity, given: Any, shape: tuple[int, ...]) -> Any:
+        """Numbers of the CPU as an array of this shape, and of the robot's dtype."""
+        array = np.asarray(given, self.dtype)
+        if array.shape != shape and (array.shape or (quantity.axes and quantity.default is None)):
+            raise InputError(f"{what} has shape {array.shape}, expected {shape}", "give an array")
+        return np.full(shape, array)
+
+    def _checked(self, what: str, array: Seen, shape: tuple[int, ...], stream: int) -> Seen:
+        """An array of the right shape, type and place. Work of its library on another stream is waited for."""
+        if array.dtype != self.dtype:
+            raise InputError(
+                f"{what} has dtype {array.dtype}, expected {self.dtype}", f'compile with real="{array.dtype}"'
+            )
+        if array.shape != shape:
+            raise InputError(
+                f"{what} has shape {array.shape}, expected {shape}", "all inputs have the same leading axes"
+            )
+        if not array.is_contiguous:
+            raise InputError(
+                f"{what} has strides {array.strides}, expected contiguous rows", "copy the array first"
+            )
+        where = self._driver.device_of(array.place) if 0 not in shape else self._driver.ordinal
+        if where != self._driver.ordinal:
+            place = "in the CPU's memory" if where is None else f"on GPU {where}"
+            raise InputError(
+                f"{what} is {place}, expected GPU {self._driver.ordinal}",
+                'move the array, or compile for target "cuda:N"',
+            )
+        if array.stream not in (None, stream):
+            self._driver.wait(array.stream or DEFAULT_STREAM)
+        return array
+
+    def _results(
+        self, function: Signature, shapes: Sequence[tuple[int, ...]], out: Any, stream: int
+    ) -> list[Any]:
+        """New arrays, or those that the caller gives."""
+        if out is None:
+            return [DeviceArray(self._driver, shape, self.dtype, stream) for shape in shapes]
+        given = list(out) if isinstance(out, tuple) else [out]
+        if len(given) != len(shapes):
+            raise InputError(
+                f"{function.name}: out has {len(given)} arrays, expected {len(shapes)}", "give a tuple"
+            )
+        for array, shape in zip(given, shapes, strict=True):
+            what = f"{function.name}: out"
+            if self._checked(what, seen(what, array, stream), shape, stream).is_fixed:
+                raise InputError(f"{what} is read-only", "give an array that can be written")
+        return given
+
+    def _kernel(self, name: str) -> tuple[ctypes.c_void_p, bool]:
+        stem = name.removesuffix("_theta")
+        if stem not in self._kernels and f"{stem}_theta" not in self._kernels and self._more is not None:
+            self._add(self._more(stem))
+        if name not in self._kernels:
+            hint = f"compiled are {', '.join(self._kernels)}: add names to the argument functions, or give theta_b"
+            raise InputError(f"{self.name}: {name} was not compiled for the GPU", hint)
+        return self._kernels[name]
+
+
+def _is_of_cpu(quantity: Quantity, given: Any) -> bool:
+    """Whether an input is numbers of the CPU, which a call copies."""
+    return np.isscalar(given) or (quantity is THETA_B and isinstance(given, (np.ndarray, list)))
+
+
+def handle_of(stream: Any) -> int:
+    """Return the handle of a stream: an integer, or a stream object of CuPy or PyTorch. Raises InputError for others."""
+    found = DEFAULT_STREAM if stream is None else stream
+    for name in ("ptr", "cuda_stream"):
+        found = getattr(found, name, found)
+    if not isinstance(found, int):
+        raise InputError(
+            f"stream is a {type(stream).__name__}", "give a stream of CuPy or PyTorch, or its handle"
+        )
+    return found or DEFAULT_STREAM
+
+
+def _method(function: Signature) -> Callable[..., Any]:
+    def method(self: CudaRobot, *given: Any, stream: Any = None, **named: Any) -> Any:
+        inputs, theta_b, out = bound_arguments(function, given, named)
+        return self.call(function, inputs, theta_b, out, stream)
+
+    method.__name__, method.__doc__ = function.name, documentation(function)
+    method.__qualname__ = f"{CudaRobot.__name__}.{function.name}"
+    return method
+
+
+for _function in SIGNATURES.values():
+    setattr(CudaRobot, _function.name, _method(_function))
