@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import refuse_foreign_folder, write_together
-from psdmc.calibration.campaign_file import is_campaign
-from psdmc.calibration.description.description import is_description
-from psdmc.calibration.verdict.delivered import delivered_quality
+from psdmc.calibration.campaign_file import plain_logs
+from psdmc.calibration.sources import LogNaming, campaign_of
+from psdmc.calibration.validation import opened_logs
+from psdmc.calibration.verdict.delivered import delivered, delivered_quality
 from psdmc.errors import InputError
 from psdmc.friction.joints import rows_of
 from psdmc.friction.law import Array, At, Row, total
@@ -51,7 +52,7 @@ def write_figures(
 
     log   a log, log description or campaign, from which measured and predicted torque are drawn too
 
-    Raise InputError if the model is not calibrated, the log does not suit it, or the folder has files that are not
+    Raise InputError if the model is not calibrated, the log cannot be used, or the folder has files that are not
     psdmc's.
     """
     known = model.calibrated
@@ -59,7 +60,7 @@ def write_figures(
         raise InputError(f"{shown(model.mechanism.name)}: not calibrated", "run `psdmc calibrate` first")
     require_own_folder(folder)
     progress("reading the log")
-    torque = None if log is None else _torque(model, known, log)
+    torque = None if log is None else _torque(model, log, progress)
     progress("drawing")
     files: dict[str, str | bytes] = dict(tables(model, known))
     high = 1.2 * len({row.unit for row in known.parameters}) + LINE * len(known.parameters)
@@ -90,18 +91,15 @@ def require_own_folder(folder: str | Path) -> None:
         refuse_foreign_folder(folder, "choose a new or empty folder with -o DIR")
 
 
-def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQuality:
-    """Measured and predicted torque of a log, or of a campaign's fast motion."""
-    path = Path(log)
-    has_runs = is_campaign(path) and not is_description(path)
-    by_runs = known.prediction is not None and not known.prediction.is_linear
-    if has_runs is not by_runs:
-        kinds = ("a campaign", "plain logs")
-        raise InputError(
-            f"{path}: {kinds[not has_runs]}, and the model was calibrated from {kinds[not by_runs]}",
-            "give the folder of a campaign" if by_runs else "give a log or a log description",
-        )
-    return next(step for step in delivered_quality(model, path) if step.step == WHOLE)
+def _torque(model: DynamicsModel, log: str | Path, progress: Progress) -> StepQuality:
+    """Measured and predicted torque of the logs that `psdmc validate` would read; of a model from a campaign of four steps
+    and such a campaign, those of its exciting motion."""
+    found, path = delivered(model), Path(log)
+    is_runs = not found.prediction.is_linear and campaign_of([path]) is not None
+    if is_runs and plain_logs(path, found.model.v_names) is None:
+        return next(step for step in delivered_quality(model, path) if step.step == WHOLE)
+    logs, _ = opened_logs(found, path, LogNaming(), progress)
+    return next(iter(delivered_quality(model, logs)))
 
 
 # Figures

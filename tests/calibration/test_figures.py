@@ -276,9 +276,30 @@ def test_models_and_logs_that_do_not_fit_are_refused(arm, given: tuple[Path, Cal
     with pytest.raises(InputError, match="not calibrated"):
         write_figures(arm.model, tmp_path / "a")
     (tmp_path / "campaign.toml").write_text("[[run]]\n", encoding="utf-8")
-    with pytest.raises(InputError, match="a campaign, and the model was calibrated from plain logs"):
+    with pytest.raises(InputError, match="run 1: step: missing"):
         write_figures(given[1].model, tmp_path / "a", tmp_path)
     assert not (tmp_path / "a").exists()
+
+
+def test_the_folder_of_a_campaign_of_one_log_gives_the_figures_of_its_log(
+    given: tuple[Path, Calibration], tmp_path: Path
+):
+    """So do campaigns with other runs, of which the exciting one is taken, and those with a motion for validation."""
+    log, record = given
+    plain = {path.name: path.read_bytes() for path in write_figures(record.model, tmp_path / "plain", log)}
+    run = '[[run]]\nstep = "{0}"\nname = "{0}"\nlog = "{1}"\n'
+    campaigns = {
+        "one_log": run.format("inertial", log.as_posix()),
+        "four_steps": run.format("inertial", log.as_posix()) + run.format("gravity", log.as_posix()),
+        "validation": run.format("inertial", "none.npz") + run.format("validation", log.as_posix()),
+    }
+    for name, text in campaigns.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "campaign.toml").write_text(text, encoding="utf-8")
+
+        found = write_figures(record.model, tmp_path / f"{name}_figures", tmp_path / name)
+
+        assert {path.name: path.read_bytes() for path in found} == plain, name
 
 
 @pytest.mark.slow
@@ -291,8 +312,8 @@ def test_a_campaign_s_model_is_drawn_with_its_campaign(
 
     assert {"torque.pdf", "friction.svg", "joints.tex"} <= {path.name for path in found}
     assert len(viewed(record.model, folder).times) > 100
-    with pytest.raises(InputError, match="plain logs, and the model was calibrated from a campaign"):
-        write_figures(record.model, tmp_path / "b", given[0])
+    exciting = folder / "logs" / "inertial.npz"
+    assert "torque.pdf" in {path.name for path in write_figures(record.model, tmp_path / "b", exciting)}
 
 
 def test_the_view_lays_a_calibration_over_the_file(given: tuple[Path, Calibration]):
