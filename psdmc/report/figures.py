@@ -12,15 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import refuse_foreign_folder, write_together
-from psdmc.calibration.campaign_file import plain_logs
-from psdmc.calibration.sources import LogNaming, campaign_of
+from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.validation import opened_logs
 from psdmc.calibration.verdict.delivered import delivered, delivered_quality
 from psdmc.errors import InputError
 from psdmc.friction.joints import rows_of
 from psdmc.friction.law import Array, At, Row, total
 from psdmc.friction.terms import OPTIONAL
-from psdmc.model.calibrated import WHOLE, Calibrated, NumberRow, ParameterRow, StepQuality
+from psdmc.model.calibrated import Calibrated, NumberRow, ParameterRow, StepQuality
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.latex import terms_latex
 from psdmc.progress import Progress, silent
@@ -95,13 +94,8 @@ def require_own_folder(folder: str | Path) -> None:
 
 
 def _torque(model: DynamicsModel, log: str | Path, progress: Progress) -> StepQuality:
-    """Measured and predicted torque of the logs that `psdmc validate` would read; of a model from a campaign of four steps
-    and such a campaign, those of its exciting motion."""
-    found, path = delivered(model), Path(log)
-    is_runs = not found.prediction.is_linear and campaign_of([path]) is not None
-    if is_runs and plain_logs(path, found.model.v_names) is None:
-        return next(step for step in delivered_quality(model, path) if step.step == WHOLE)
-    logs, _ = opened_logs(found, path, LogNaming(), progress)
+    """Measured and predicted torque of the logs that `psdmc validate` would read."""
+    logs, _ = opened_logs(delivered(model), log, LogNaming(), progress)
     return next(iter(delivered_quality(model, logs)))
 
 
