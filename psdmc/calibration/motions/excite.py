@@ -81,8 +81,8 @@ class Excitation:
         if not np.isfinite(self.times):
             return f"none of {count} random motions is allowed, at any size"
         return (
-            f"{MEASURES[self.objective]} {self.times:.2f} times smaller than with the best of {count} random motions that"
-            f" pass the same checks, whose condition number is {self.random_condition:.3g}"
+            f"the {MEASURES[self.objective]} is {self.times:.2f} times smaller than that of the best of {count} random"
+            f" motions that pass the same checks; the condition number of that random motion is {self.random_condition:.3g}"
         )
 
 

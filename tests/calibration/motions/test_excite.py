@@ -58,7 +58,7 @@ def test_the_comparison_is_by_what_is_minimised(arm, objective: str):
         assert each.condition == pytest.approx(condition, rel=1e-9)
         assert each.random_condition == pytest.approx(conditions[best], rel=1e-6)
         np.testing.assert_allclose(each.random_times, np.sort(measures) / own, rtol=1e-6)
-        assert f"{MEASURES[objective]} {each.times:.2f} times smaller" in each.comparison
+        assert f"the {MEASURES[objective]} is {each.times:.2f} times smaller" in each.comparison
     assert found.times >= 1.0
     assert searched.times > 1.05
 
