@@ -22,6 +22,7 @@ from psdmc.calibration.motions.limited_sines import LimitedSines
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.compiler import derive
 from psdmc.errors import InputError
+from psdmc.robot.pinocchio_text import JOINT_PREFIX
 
 OPTIONS = CampaignOptions(
     sweep=SweepOptions(seconds=20.0, period=4e-3),
@@ -119,6 +120,44 @@ def test_a_floor_needs_no_shapes(tmp_path: Path):
         assert (touched is not None) == (height < 0.3 + APART)
     touched = floor.first_touch(np.array([[0.3, 2.5, 0.0]]))
     assert str(touched).startswith("the origin of joint 'bend' and the floor come within 10 mm")
+
+
+def stl(triangles: np.ndarray) -> str:
+    """Triangles (N, 3, 3) as a text file."""
+    facets = [
+        f"facet normal 0 0 0\nouter loop\n{''.join('vertex {} {} {} '.format(*x) for x in own)}\nendloop\nendfacet\n"
+        for own in triangles
+    ]
+    return f"solid bent\n{''.join(facets)}endsolid bent\n"
+
+
+@pytest.mark.parametrize(("is_flat", "floor"), [(False, -0.1), (True, 0.25)])
+def test_a_mesh_is_above_the_floor_where_its_lowest_vertex_is(tmp_path: Path, is_flat: bool, floor: float):
+    """A bent mesh, and a flat one, which has no hull: by the vertices' heights, from Pinocchio's frames."""
+    places = np.random.default_rng(5).uniform(-0.3, 0.3, (8, 3, 3)) * [1.0, 1.0, 0.0 if is_flat else 1.0]
+    (tmp_path / "crane").mkdir()
+    (tmp_path / "crane" / "upper.stl").write_text(stl(places), encoding="utf-8")
+    mesh = '<collision><geometry><mesh filename="package://crane/upper.stl" scale="1 1 2"/></geometry></collision>'
+    model = model_of(
+        tmp_path, urdf(shapes=False).replace('<link name="upper">', f'<link name="upper">{mesh}')
+    )
+    clearance = clearance_of(model, (tmp_path,), floor)
+    data, heights = clearance.model.createData(), []
+    poses = np.random.default_rng(2).uniform(-2.6, 2.6, (300, 3))
+    for pose in poses:
+        pin.forwardKinematics(clearance.model, data, pose)
+        place = data.oMi[clearance.model.getJointId(JOINT_PREFIX + "lift")]
+        heights.append(min(place.act(x * [1.0, 1.0, 2.0])[2] for x in places.reshape(-1, 3)))
+
+    found = [clearance.first_touch(pose[None]) for pose in poses]
+
+    assert [text is not None for text in found] == [height < floor + APART for height in heights]
+    assert 20 < sum(text is not None for text in found) < 280
+    assert {text.split(" come")[0] for text in found if text} == {"link 'upper' and the floor"}
+    pairs = [
+        clearance.shapes.geometryObjects[pair.first].geometry for pair in clearance.shapes.collisionPairs
+    ]
+    assert [hasattr(shape, "buildConvexHull") for shape in pairs] == [is_flat], "meshes themselves take long"
 
 
 def test_meshes_are_read_below_the_given_folders_alone(tmp_path: Path):
