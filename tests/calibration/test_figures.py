@@ -350,6 +350,22 @@ def test_the_command_writes_a_folder_of_its_own(given: tuple[Path, Calibration],
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
+def test_the_next_command_after_a_calibration_does_not_meet_its_report(
+    arm, given: tuple[Path, Calibration], tmp_path: Path
+):
+    """`psdmc view OUT.npz` would write OUT.html, which often is the report."""
+    arm.model.save(tmp_path / "arm.npz")
+    shutil.copy(given[0], tmp_path / "log.npz")
+
+    done = typed("calibrate", "arm.npz", "log.npz", "-o", "out.npz", "--report", "out.html", cwd=tmp_path)
+    words = next(line for line in done.stderr.splitlines() if line.startswith("next: psdmc view")).split()[2:]
+    shown = typed(*words, cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert shown.returncode == 0, shown.stderr
+    assert (tmp_path / "out_view.html").exists()
+
+
 def test_models_and_logs_that_do_not_fit_are_refused(arm, given: tuple[Path, Calibration], tmp_path: Path):
     with pytest.raises(InputError, match="not calibrated"):
         write_figures(arm.model, tmp_path / "a")

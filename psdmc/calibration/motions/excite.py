@@ -57,6 +57,7 @@ class Excitation:
     ended_by_clock    True: the time limit ended the search, so another run may find another motion
     random_condition  condition number of the best random motion; the best is that with the smallest measure
     objective         which measure the search minimises (MEASURES)
+    deviation         upper bound of the parameters' standard deviations (criterion.Scaled.deviation)
     """
 
     motion: SineSum
@@ -68,6 +69,7 @@ class Excitation:
     ended_by_clock: bool = False
     random_condition: float = np.inf
     objective: Objective = "deviation"
+    deviation: float = np.nan
 
     @property
     def times(self) -> float:
@@ -145,6 +147,7 @@ def excite(
         found.ended_by_clock,
         np.inf if best_random is None else best_random[1].condition,
         options.objective,
+        reached_columns.deviation,
     )
 
 

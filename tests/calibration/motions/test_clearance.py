@@ -18,7 +18,7 @@ from psdmc.calibration.motions.clearance import APART, clearance_of, floor_point
 from psdmc.calibration.motions.criterion import all_columns, scaled
 from psdmc.calibration.motions.excite import excite
 from psdmc.calibration.motions.excite_options import ExciteOptions
-from psdmc.calibration.motions.limited_sines import LimitedSines
+from psdmc.calibration.motions.limited_sines import LimitedSines, SineSum
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.compiler import derive
 from psdmc.errors import InputError
@@ -206,15 +206,20 @@ def test_a_motion_is_never_worse_than_the_best_random_one_that_hits_nothing(tmp_
     found = excite(chain, columns, options, allowed=allowed)
 
     space, scores = LimitedSines(chain, options), []
+
+    def deviation(motion: SineSum) -> float:
+        return scaled(columns.at(*motion.at(np.arange(space.samples) * 5.0 / space.samples))).deviation
+
     stricter = replace(allowed, torque_margin=0.99 * 0.8)
     for point in space.drawn(random, np.random.default_rng(options.seed)):
         motion = space.motion(point)
         for share in 0.97 ** np.arange(60):
             small = motion.shrunk(share)
             if not stricter.faults(small.sampled(chain.joint_names, 5.0 / 200)):
-                states = small.at(np.arange(space.samples) * 5.0 / space.samples)
-                scores.append(scaled(columns.at(*states)).deviation)
+                scores.append(deviation(small))
                 break
     assert len(scores) > 0.5 * random
-    assert found.deviation <= 1.001 * min(scores)
+    assert deviation(found.motion) <= 1.001 * min(scores)
+    assert found.times == pytest.approx(min(scores) / deviation(found.motion), rel=0.03)
+    assert found.times >= 1.0
     assert allowed.faults(found.motion.sampled(chain.joint_names, 5.0 / 1000)) == []
