@@ -121,7 +121,8 @@ def draw_parameters(figure: Figure, known: Calibrated) -> None:
         axis.set_yticks(range(len(rows)), [row.name for row in rows], parse_math=False)
         axis.invert_yaxis()
         axis.tick_params(axis="x", labelsize=8)
-        axis.set_xticks(_powers(*axis.get_xlim(), first))
+        low, high = axis.get_xlim()
+        axis.set_xticks(_powers(low, high, first))
         axis.set_xlabel(
             f"{unit}; bars: ± {DEVIATIONS:g} standard deviations, circles: robot file, grey: not identified",
             parse_math=False,
