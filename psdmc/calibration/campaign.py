@@ -5,7 +5,6 @@ for its user: runs, duration, size, loads to mount, and what was checked."""
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +20,7 @@ from psdmc.calibration.campaign_plan import PlannedRun as PlannedRun
 from psdmc.calibration.campaign_plan import plan_campaign as plan_campaign
 from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.foreign_bytes import is_folder
-from psdmc.calibration.motions.excite import Excitation
+from psdmc.calibration.motions.excite import MEASURES, Excitation
 from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
 from psdmc.errors import InputError
@@ -159,10 +158,11 @@ def excitation_json(found: Excitation) -> dict[str, Any]:
         "amplitude": motion.amplitude.tolist(),
         "phase_rad": motion.phase.tolist(),
         "condition": found.condition,
-        "best_random_condition": _finite(found.random_conditions[0]),
-        "median_random_condition": _finite(np.median(found.random_conditions)),
-        "deviation_times_below_random": _finite(found.deviation_gain),
-        "random_trajectories": len(found.random_conditions),
+        "minimised": MEASURES[found.objective],
+        "times_below_best_random": _finite(found.times),
+        "times_below_median_random": _finite(np.median(found.random_times)),
+        "condition_of_best_random": _finite(found.random_condition),
+        "random_trajectories": len(found.random_times),
         "evaluations": found.evaluations,
         "ended_by_clock": found.ended_by_clock,
         "seconds": round(found.seconds, 2),
@@ -194,6 +194,7 @@ def summary(plan: Plan, folder: str | Path) -> tuple[str, ...]:
         *_steps(plan),
         *(f"mount: {_load(load, plan)} for the runs {_which(plan, load)}" for load in _loads(plan)),
         _found(plan),
+        f"compared: {plan.found.comparison}",
         *plan.looked,
         "not planned: the paths from the end of a run to the start of the next; your controller drives them",
     )
@@ -222,17 +223,10 @@ def _which(plan: Plan, load: Load) -> str:
 
 
 def _found(plan: Plan) -> str:
-    found = plan.found
     is_whole = all(run.step in ("inertial", "validation") for run in plan.runs)
     what = (
-        "all columns of the fit, friction and offsets included" if is_whole else "what gravity does not show"
+        "all fitted values: base parameters, friction and offsets"
+        if is_whole
+        else "the base parameters that torques at rest do not determine"
     )
-    start = f"exciting motion: condition number {found.condition:.3g} of {what}"
-    if not math.isfinite(found.gain):
-        return f"{start}; none of {len(found.random_conditions)} random motions keeps the torque limits"
-    best, count = found.random_conditions[0], len(found.random_conditions)
-    of_random = "" if not plan.is_cleared else ", which were not asked to hit nothing"
-    return (
-        f"{start}, {best:.3g} for the best of {count} random motions{of_random}; the bound on the parameters' standard"
-        f" deviations is {found.deviation_gain:.2f} times lower than for that random motion"
-    )
+    return f"exciting motion: condition number {plan.found.condition:.3g}, of {what}"

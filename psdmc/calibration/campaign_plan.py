@@ -110,11 +110,11 @@ class CampaignOptions:
         )
         rate, needed = 1.0 / max(self.sweep.period, self.sines.period), ROWS_PER_CUTOFF * fastest
         if not rate >= needed * (1.0 - 1e-9):
+            kind = "of one log (--one-log)" if self.one_log else "of four kinds of runs (without --one-log)"
             raise InputError(
-                f"{rate:g} rows a second, the filter of {fastest:g} Hz needs {needed:g}",
-                "give a higher --rate"
-                if self.one_log
-                else "give a higher --rate, or plan one log: --one-log",
+                f"--rate is {rate:g} rows a second, expected at least {needed:g} for a plan {kind}: the fit filters logs at"
+                f" {fastest:g} Hz",
+                "give a higher --rate" if self.one_log else f"--rate {needed:g}, or plan one log: --one-log",
             )
 
 
@@ -136,7 +136,6 @@ class Plan:
     runs        motions for the robot, in their order
     found       the exciting motion
     chain       the robot with the limits that the motions keep
-    is_cleared  whether collisions of shapes or with a floor were checked
     looked      sentences on the collisions that were checked, and on those that were not
     remarks     differences from what the user asked for, and values that the campaign cannot determine
     """
@@ -144,7 +143,6 @@ class Plan:
     runs: tuple[PlannedRun, ...]
     found: Excitation
     chain: Mechanism
-    is_cleared: bool = False
     looked: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
@@ -208,7 +206,6 @@ def plan_campaign(
         tuple(planner.runs),
         found,
         chain,
-        allowed.clearance is not None,
         looked_at(allowed, model, options.shapes, options.floor),
         (*planner.remarks, *said),
     )
@@ -329,7 +326,7 @@ def _spoken(progress: Progress) -> Callable[[float, float, float], None]:
         nonlocal said
         if seconds - said >= SPOKEN_EVERY:
             said = seconds
-            progress(Share(f"exciting motion: {score:.4g} after {seconds:.0f} s of CPU", share))
+            progress(Share(f"exciting motion: criterion {score:.4g} after {seconds:.0f} s of CPU", share))
 
     return say
 

@@ -215,7 +215,8 @@ def calibrate(
             print(f"{written}: {what}")
     if not verdict.usable:
         raise typer.Exit(verdict.exit_status)
-    say_next("view", output, *logs[:1])
+    is_report = report is not None and report.resolve() == Path(f"{output.stem}.html").resolve()
+    say_next("view", output, *logs[:1], *(["-o", f"{output.stem}_view.html"] if is_report else []))
     say_next("emit-c", output, "-o", output.stem)
 
 

@@ -43,7 +43,12 @@ def excite(
         ),
     ] = None,
     rate: Annotated[
-        float, typer.Option(min=1.0, max=20_000.0, help="rows per second of the trajectories")
+        float,
+        typer.Option(
+            min=1.0,
+            max=20_000.0,
+            help="rows per second of the trajectories; at least 160, or 32 with --one-log",
+        ),
     ] = 1000.0,
     duration: Annotated[
         float, typer.Option(min=0.1, max=LONGEST_DURATION, help="period of the exciting motion, s")

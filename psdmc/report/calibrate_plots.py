@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.excite import Excitation
+from psdmc.calibration.motions.excite import MEASURES, Excitation
 from psdmc.model.calibrated import Sample, StepQuality
-from psdmc.report.drawing import Axes, Figure, legend_below, svg
+from psdmc.report.drawing import Axes, Figure, document, legend_below, svg
 from psdmc.robot.mechanism import Limits
 
 POINTS = 600
@@ -25,6 +25,9 @@ PANEL = (5.2, 2.6)
 """inches: narrow, so that labels stay readable on a phone."""
 
 WHAT = "observed and predicted torque of joint"
+
+MOST_TIMES = 50.0
+"""Where the comparison with random motions ends; worse ones count there."""
 
 LIMIT_LINE = "limit"
 """Name of the lines of joints' limits in a picture."""
@@ -83,23 +86,23 @@ def _shade(axis: Axes, x: Array, held_out: Array) -> None:
 def excitation_panels(
     found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()
 ) -> tuple[str, ...]:
-    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Draw the
-    condition number of the motion, too, next to those of random motions."""
+    """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Compare the
+    motion with random motions, too."""
     return tuple(
         svg(partial(alone, draw), PANEL, f"exciting motion: {says}")
         for says, draw in _excitation(found, joint_names, limits)
     )
 
 
-def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()) -> str:
-    """The same four in one picture."""
+def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()) -> bytes:
+    """The same four in one SVG file."""
 
     def draw(figure: Figure) -> None:
         panels = _excitation(found, joint_names, limits)
         for axis, (_, panel) in zip(figure.subplots(2, 2).flat, panels, strict=True):
             panel(axis)
 
-    return svg(draw, FILE, "exciting motion")
+    return document("excitation", draw, FILE, ["svg"])["excitation.svg"]
 
 
 def limit_lines(limits: Sequence[Limits]) -> tuple[list[tuple[float, float]], ...]:
@@ -133,16 +136,16 @@ def _excitation(
 
         return draw
 
-    def conditions(axis: Axes) -> None:
-        random = found.random_conditions[np.isfinite(found.random_conditions)]
-        axis.hist(np.minimum(random, 50 * found.condition), bins=40, color=RESIDUAL)
-        axis.axvline(found.condition, color=PREDICTED, linewidth=1.5)
-        axis.set_xlabel("condition number: random motions (grey), the one found (line)")
+    def compared(axis: Axes) -> None:
+        random = found.random_times[np.isfinite(found.random_times)]
+        axis.hist(np.minimum(random, MOST_TIMES), bins=40, color=RESIDUAL)
+        axis.axvline(1.0, color=PREDICTED, linewidth=1.5)
+        axis.set_xlabel(f"{MEASURES[found.objective]},\ndivided by that of the planned motion (line)")
         axis.set_ylabel("random motions")
 
     return [
         ("positions", curves("position [rad]", motion.q, positions)),
         ("speeds", curves("speed [rad/s]", motion.qd, speeds)),
         ("accelerations", curves("acceleration [rad/s²]", motion.qdd, accelerations)),
-        ("condition", conditions),
+        ("comparison with random motions", compared),
     ]

@@ -138,10 +138,7 @@ def _figures(record: Calibrated, found: Excitation | None) -> tuple[FigureView, 
         if step.samples
     ]
     if found is not None:
-        caption = (
-            f"Condition number {found.condition:.2f}; the best of {len(found.random_conditions)} random motions "
-            f"scaled to the limits has {found.random_conditions[0]:.2f}."
-        )
+        caption = f"Condition number {found.condition:.2f}. Compared: {found.comparison}."
         figures.append(FigureView("Exciting motion", excitation_panels(found, record.joint_names), caption))
     return tuple(figures)
 

@@ -9,7 +9,7 @@ import html
 import io
 import logging
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -57,22 +57,27 @@ def svg(draw: Callable[[Figure], None], size: tuple[float, float], says: str) ->
 
 
 PRINTED = STYLE | dict.fromkeys((key for key, value in STYLE.items() if value == INK), "black")
-PRINTED |= {"svg.fonttype": "path", "pdf.fonttype": 42}
-"""Pictures that are files: they look the same in each program, and their text can be searched in a PDF."""
+PRINTED |= {"svg.fonttype": "path", "pdf.fonttype": 42, "figure.facecolor": "white"}
+"""Pictures that are files: they look the same in each program, dark or not, and a PDF keeps their text searchable."""
+LEFT_OUT = {"pdf": ("Creator", "Producer", "CreationDate"), "svg": ("Creator", "Date")}
+"""What files do not say, by kind: it would differ from run to run."""
 
 
-def document(name: str, draw: Callable[[Figure], None], size: tuple[float, float]) -> dict[str, bytes]:
-    """Write a picture, which a function draws, as NAME.pdf and NAME.svg. Equal numbers give equal bytes."""
+def document(
+    name: str,
+    draw: Callable[[Figure], None],
+    size: tuple[float, float],
+    kinds: Sequence[str] = ("pdf", "svg"),
+) -> dict[str, bytes]:
+    """Return a picture, which a function draws, as files NAME.pdf and NAME.svg on white ground. Equal numbers give equal
+    bytes."""
     found = {}
     with _style(PRINTED):
         figure = _new_figure(figsize=size)
         draw(figure)
-        for kind, left_out in (
-            ("pdf", ("Creator", "Producer", "CreationDate")),
-            ("svg", ("Creator", "Date")),
-        ):
+        for kind in kinds:
             content = io.BytesIO()
-            figure.savefig(content, format=kind, metadata=dict.fromkeys(left_out))
+            figure.savefig(content, format=kind, metadata=dict.fromkeys(LEFT_OUT[kind]))
             found[f"{name}.{kind}"] = content.getvalue()
     return found
 

@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import refuse_foreign_folder, write_together
-from psdmc.calibration.campaign_file import is_campaign
-from psdmc.calibration.description.description import is_description
-from psdmc.calibration.verdict.delivered import delivered_quality
+from psdmc.calibration.sources import LogNaming
+from psdmc.calibration.validation import opened_logs
+from psdmc.calibration.verdict.delivered import delivered, delivered_quality
 from psdmc.errors import InputError
 from psdmc.friction.joints import rows_of
 from psdmc.friction.law import Array, At, Row, total
-from psdmc.model.calibrated import SHOWN, WHOLE, Calibrated, NumberRow, StepQuality, code_of
+from psdmc.friction.terms import OPTIONAL
+from psdmc.model.calibrated import Calibrated, NumberRow, ParameterRow, StepQuality
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.latex import terms_latex
 from psdmc.progress import Progress, silent
@@ -36,6 +37,8 @@ DIGITS = 2
 """Of a standard deviation in tables."""
 TIMES_SPEED = 3.0
 """Largest speed of friction curves, in RMS speeds of the joint's logs."""
+TICKS = 4
+"""To each side of zero."""
 CURVE = 201
 """Points of each half of a friction curve."""
 LINE, HALF, FULL = 0.22, 2.4, 7.0
@@ -51,7 +54,7 @@ def write_figures(
 
     log   a log, log description or campaign, from which measured and predicted torque are drawn too
 
-    Raise InputError if the model is not calibrated, the log does not suit it, or the folder has files that are not
+    Raise InputError if the model is not calibrated, the log cannot be used, or the folder has files that are not
     psdmc's.
     """
     known = model.calibrated
@@ -59,7 +62,7 @@ def write_figures(
         raise InputError(f"{shown(model.mechanism.name)}: not calibrated", "run `psdmc calibrate` first")
     require_own_folder(folder)
     progress("reading the log")
-    torque = None if log is None else _torque(model, known, log)
+    torque = None if log is None else _torque(model, log, progress)
     progress("drawing")
     files: dict[str, str | bytes] = dict(tables(model, known))
     high = 1.2 * len({row.unit for row in known.parameters}) + LINE * len(known.parameters)
@@ -90,18 +93,10 @@ def require_own_folder(folder: str | Path) -> None:
         refuse_foreign_folder(folder, "choose a new or empty folder with -o DIR")
 
 
-def _torque(model: DynamicsModel, known: Calibrated, log: str | Path) -> StepQuality:
-    """Measured and predicted torque of a log, or of a campaign's fast motion."""
-    path = Path(log)
-    has_runs = is_campaign(path) and not is_description(path)
-    by_runs = known.prediction is not None and not known.prediction.is_linear
-    if has_runs is not by_runs:
-        kinds = ("a campaign", "plain logs")
-        raise InputError(
-            f"{path}: {kinds[not has_runs]}, and the model was calibrated from {kinds[not by_runs]}",
-            "give the folder of a campaign" if by_runs else "give a log or a log description",
-        )
-    return next(step for step in delivered_quality(model, path) if step.step == WHOLE)
+def _torque(model: DynamicsModel, log: str | Path, progress: Progress) -> StepQuality:
+    """Measured and predicted torque of the logs that `psdmc validate` would read."""
+    logs, _ = opened_logs(delivered(model), log, LogNaming(), progress)
+    return next(iter(delivered_quality(model, logs)))
 
 
 # Figures
@@ -114,10 +109,11 @@ def draw_parameters(figure: Figure, known: Calibrated) -> None:
     axes = figure.subplots(len(units), 1, squeeze=False, height_ratios=[len(rows) + 2 for rows in groups])
     for axis, unit, rows in zip(axes[:, 0], units, groups, strict=True):
         spread = [row.std for row in rows if 0.0 < row.std < math.inf]
-        axis.set_xscale("symlog", linthresh=float(np.median(spread)) if spread else 1.0)
+        sizes = spread or [abs(row.value) for row in rows if row.value] or [1.0]
+        first = math.floor(math.log10(np.median(sizes)))
+        axis.set_xscale("symlog", linthresh=10.0**first)
         for k, row in enumerate(rows):
-            is_shown = code_of(row.visibility) in SHOWN and math.isfinite(row.std)
-            colour = MEASURED if is_shown else RESIDUAL
+            colour = MEASURED if row.identifiable else RESIDUAL
             reach = DEVIATIONS * row.std if math.isfinite(row.std) else None
             axis.errorbar(row.value, k, xerr=reach, fmt="o", color=colour, markersize=3.5, capsize=2)
             if row.file is not None:
@@ -125,14 +121,26 @@ def draw_parameters(figure: Figure, known: Calibrated) -> None:
         axis.set_yticks(range(len(rows)), [row.name for row in rows], parse_math=False)
         axis.invert_yaxis()
         axis.tick_params(axis="x", labelsize=8)
+        low, high = axis.get_xlim()
+        axis.set_xticks(_powers(low, high, first))
         axis.set_xlabel(
-            f"{unit}; bars: ± {DEVIATIONS:g} standard deviations, circles: robot file", parse_math=False
+            f"{unit}; bars: ± {DEVIATIONS:g} standard deviations, circles: robot file, grey: not identified",
+            parse_math=False,
         )
 
 
+def _powers(low: float, high: float, first: int) -> list[float]:
+    """Zero and powers of ten of both signs in a range, as ticks. They are few enough to leave their labels apart on an
+    axis that is linear below 10^first."""
+    last = max(first, math.floor(math.log10(max(abs(low), abs(high)))))
+    step = math.ceil((last - first + 1) / TICKS)
+    each = [10.0**power for power in range(last, first - 1, -step) if power - first + 1 >= step]
+    return sorted(value for value in (*(-x for x in each), 0.0, *each) if low <= value <= high)
+
+
 def friction_curves(known: Calibrated) -> dict[str, tuple[Array, Array]]:
-    """Return for each joint an array of speeds and the friction torques at these constant speeds. Friction that depends
-    on position or load is left out."""
+    """Return for each joint an array of speeds and the friction torques at these constant speeds. The offset is left
+    out, and friction that depends on position or load."""
     law = known.prediction
     if law is None:
         return {}
@@ -141,7 +149,9 @@ def friction_curves(known: Calibrated) -> dict[str, tuple[Array, Array]]:
     for joint in known.joint_names:
         values = {row.name: row.value for row in known.friction if row.joint == joint}
         rows = [
-            row for row in rows_of(values, law.law, law.laws) if not {"q", "load"} & _reads(row) and row[1]
+            row
+            for row in rows_of(values, law.law, law.laws)
+            if row[0].law is not OPTIONAL and row[1] and not {"q", "load"} & _reads(row)
         ]
         rms = speeds.get(joint, math.nan)
         top = TIMES_SPEED * rms if math.isfinite(rms) and rms > 0.0 else 1.0
@@ -181,7 +191,7 @@ def draw_friction(
         axis.axhline(0.0, color=RESIDUAL, linewidth=0.5)
         axis.set_title(joint, fontsize=9, loc="left", parse_math=False)
         axis.set_xlabel("speed [m/s]" if efforts[joint] == "N" else "speed [rad/s]", fontsize=8)
-        axis.set_ylabel(f"friction [{efforts[joint]}]", fontsize=8)
+        axis.set_ylabel(f"friction without offset [{efforts[joint]}]", fontsize=8)
         axis.tick_params(labelsize=8)
 
 
@@ -217,13 +227,13 @@ def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
             f"${{\\theta_{{{k}}}}}$",
             f"${terms_latex(terms)}$",
             "--" if row.file is None else number(row.file),
-            number(row.value, row.std),
+            _seen(row, row.identifiable),
             unit(row.unit),
         ]
         for k, (row, terms) in enumerate(zip(known.parameters, equations, strict=True))
     ]
     joints = [
-        [escaped(row.joint), escaped(row.name.replace("_", " ")), _seen(row), unit(row.unit)]
+        [escaped(row.joint), escaped(row.name.replace("_", " ")), _seen(row, row.seen), unit(row.unit)]
         for row in (*known.motors, *known.friction, *known.elasticity, *known.springs)
     ]
     accuracy = [
@@ -247,10 +257,10 @@ def tables(model: DynamicsModel, known: Calibrated) -> dict[str, str]:
     return found
 
 
-def _seen(row: NumberRow) -> str:
-    """A joint's number; in brackets what the data do not show."""
+def _seen(row: NumberRow | ParameterRow, is_identified: bool) -> str:
+    """A calibrated number; in brackets what the data do not identify, which is grey in the pictures."""
     text = number(row.value, row.std)
-    return text if row.seen else f"({text})"
+    return text if is_identified else f"({text})"
 
 
 def tabular(columns: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "tabular") -> str:

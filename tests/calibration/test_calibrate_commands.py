@@ -38,10 +38,10 @@ def test_from_a_model_without_parameters_to_one_with_them(arm, tmp_path: Path):
         actuators=tmp_path / "c",
     )
 
-    assert found.deviation < found.random_deviation
+    assert found.times > 1.0
     assert count == 2 + 2 + 1 + 2 + 1
     assert (folder / "excitation.csv").exists()
-    assert (folder / "excitation.svg").read_text(encoding="utf-8").startswith("<svg")
+    assert "<svg" in (folder / "excitation.svg").read_text(encoding="utf-8")
     calibrated = load(tmp_path / "calibrated.npz")
     assert calibrated.theta_b is not None
     assert np.abs(calibrated.theta_b - arm.model.theta_b).max() < 0.05

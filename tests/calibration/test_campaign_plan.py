@@ -111,7 +111,9 @@ def test_rows_have_the_rate_and_runs_the_length_that_was_asked_for(arm, tmp_path
 
 @pytest.mark.parametrize(("one_log", "rate", "message"), [(False, 100.0, "160"), (True, 20.0, "32")])
 def test_too_few_rows_for_the_filters_are_refused(one_log: bool, rate: float, message: str):
-    with pytest.raises(InputError, match=f"{rate:g} rows a second, the filter of .* needs {message}"):
+    with pytest.raises(
+        InputError, match=f"--rate is {rate:g} rows a second, expected at least {message} for"
+    ):
         CampaignOptions(
             sweep=SweepOptions(period=1 / rate), sines=SineOptions(period=1 / rate), one_log=one_log
         )

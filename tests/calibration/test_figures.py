@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,14 +14,18 @@ import numpy as np
 import pytest
 from calibration.conftest import smooth_log
 from command_line import typed
+from matplotlib.figure import Figure
 
 from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.logs.log_files import write_log
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 from psdmc.friction.law import Term
 from psdmc.friction.laws import LAWS
-from psdmc.model.calibrated import NumberRow, by_joint
+from psdmc.model.calibrated import NumberRow, Remark, by_joint
+from psdmc.report.calibrate_plots import RESIDUAL, excitation_figure
 from psdmc.report.drawing import document
 from psdmc.report.figures import (
     MARK,
@@ -199,8 +204,10 @@ def test_latex_typesets_the_tables_and_figures(
 
 
 def test_friction_curves_by_closed_form(given: tuple[Path, Calibration]):
-    """Of a linear law: (F_c + F_v |v|) tanh(v / v_s), and the constant."""
+    """Of a linear law: (F_c + F_v |v|) tanh(v / v_s); the offset, which is large here, is left out."""
     record = given[1]
+    friction = [replace(row, value=7.0) if row.name == "offset" else row for row in record.friction]
+    record = replace(record, friction=tuple(friction))
     values = by_joint(record.friction)
 
     found = friction_curves(record)
@@ -208,9 +215,9 @@ def test_friction_curves_by_closed_form(given: tuple[Path, Calibration]):
     assert list(found) == ["shoulder", "elbow"]
     for joint, (v, torque) in found.items():
         names = {name: value for (own, name), value in values.items() if own == joint}
-        assert set(names) <= {"coulomb", "viscous", "offset"}
+        assert set(names) == {"coulomb", "viscous", "offset"}
         sign = np.tanh(v / record.prediction.sign_speed)
-        expected = (names["coulomb"] + names["viscous"] * np.abs(v)) * sign + names.get("offset", 0.0)
+        expected = (names["coulomb"] + names["viscous"] * np.abs(v)) * sign
         np.testing.assert_allclose(torque, expected, rtol=1e-12)
         np.testing.assert_allclose(v, -v[::-1])
 
@@ -226,6 +233,70 @@ def test_lugre_friction_in_steady_motion_by_closed_form():
     np.testing.assert_allclose(found, size * np.sign(v), rtol=1e-9)
 
 
+def test_what_is_not_identified_is_grey_in_pictures_and_in_brackets_in_tables(
+    given: tuple[Path, Calibration],
+):
+    record = given[1]
+    weak = Remark("weakly visible", "weak")
+    rows = tuple(
+        replace(row, identifiable=k % 2 == 0, visibility="identified" if k % 2 == 0 else weak)
+        for k, row in enumerate(record.parameters)
+    )
+    record = replace(record, parameters=rows)
+    figure = Figure()
+
+    draw_parameters(figure, record)
+    table = tables(record.model, record)["parameters.tex"]
+
+    grey = set()
+    for axis in figure.axes:
+        names = [label.get_text() for label in axis.get_yticklabels()]
+        points = [
+            line for line in axis.lines if line.get_marker() == "o" and line.get_markerfacecolor() != "none"
+        ]
+        grey |= {names[int(line.get_ydata()[0])] for line in points if line.get_color() == RESIDUAL}
+    cells = [line.split(" & ")[3] for line in table.splitlines() if line.startswith("${\\theta")]
+    assert [cell.startswith("(") for cell in cells] == [row.name in grey for row in rows]
+    assert len(grey) == len(rows) // 2
+
+
+@pytest.mark.parametrize("spread", [1e-9, 3e-5, 0.02, 0.9, 8.0, 40.0, np.inf])
+@pytest.mark.parametrize("largest", [0.5, 10.0, 3e4])
+def test_labels_of_parameters_do_not_overlap(given: tuple[Path, Calibration], spread: float, largest: float):
+    """On an axis that is linear about zero and logarithmic beyond."""
+    record = given[1]
+    ends = (-largest, 0.0, 0.3 * min(spread, 1.0), largest)
+    rows = tuple(
+        replace(row, value=ends[k % 4], std=spread, file=None, unit="kg m")
+        for k, row in enumerate(record.parameters)
+    )
+    figure = Figure(figsize=(7.0, 3.0), layout="constrained")
+
+    draw_parameters(figure, replace(record, parameters=rows))
+    figure.canvas.draw()
+
+    axis = figure.axes[0]
+    low, high = axis.get_xlim()
+    boxes = [label.get_window_extent() for label in axis.get_xticklabels() if label.get_text()]
+    assert len(boxes) >= 3
+    assert low < -largest
+    assert high > largest
+    for left, right in pairwise(boxes):
+        assert left.x1 + 4.0 < right.x0, "4 of 100 pixels per inch"
+
+
+def require_white(picture: bytes) -> None:
+    """The first thing that an SVG draws is a white rectangle over the whole of it."""
+    root = ElementTree.fromstring(picture)
+    _, _, wide, high = map(float, root.attrib["viewBox"].split())
+    first = next(root.iter("{http://www.w3.org/2000/svg}path"))
+    assert "fill: #ffffff" in first.attrib["style"]
+    assert "opacity: 0" not in first.attrib["style"]
+    corners = [float(word) for word in re.findall(r"[-0-9.]+", first.attrib["d"])]
+    assert (max(corners[::2]), max(corners[1::2])) == pytest.approx((wide, high))
+    assert min(corners) == pytest.approx(0.0)
+
+
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_pictures_are_the_same_bytes_sound_and_without_dates(
     given: tuple[Path, Calibration], nasty: Calibration
@@ -239,12 +310,19 @@ def test_pictures_are_the_same_bytes_sound_and_without_dates(
     assert document("x", drawers[1], (7.0, 4.0)) == document("x", drawers[1], (7.0, 4.0))
     for draw in drawers:
         once = document("x", draw, (7.0, 4.0))
+        require_white(once["x.svg"])
         root = ElementTree.fromstring(once["x.svg"])
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
         assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 10
         assert once["x.pdf"].startswith(b"%PDF-")
         for word in (b"CreationDate", b"<dc:date>", b"ModDate"):
             assert word not in once["x.pdf"] + once["x.svg"]
+
+
+def test_the_picture_of_an_exciting_motion_is_a_file_on_white_ground(arm):
+    found = excite(arm.model.chain, arm.regressor, ExciteOptions(evaluations=1, seconds=0.0, random=20))
+
+    require_white(excitation_figure(found, arm.model.joint_names))
 
 
 def test_the_command_writes_a_folder_of_its_own(given: tuple[Path, Calibration], tmp_path: Path):
@@ -272,13 +350,50 @@ def test_the_command_writes_a_folder_of_its_own(given: tuple[Path, Calibration],
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
+def test_the_next_command_after_a_calibration_does_not_meet_its_report(
+    arm, given: tuple[Path, Calibration], tmp_path: Path
+):
+    """`psdmc view OUT.npz` would write OUT.html, which often is the report."""
+    arm.model.save(tmp_path / "arm.npz")
+    shutil.copy(given[0], tmp_path / "log.npz")
+
+    done = typed("calibrate", "arm.npz", "log.npz", "-o", "out.npz", "--report", "out.html", cwd=tmp_path)
+    words = next(line for line in done.stderr.splitlines() if line.startswith("next: psdmc view")).split()[2:]
+    shown = typed(*words, cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert shown.returncode == 0, shown.stderr
+    assert (tmp_path / "out_view.html").exists()
+
+
 def test_models_and_logs_that_do_not_fit_are_refused(arm, given: tuple[Path, Calibration], tmp_path: Path):
     with pytest.raises(InputError, match="not calibrated"):
         write_figures(arm.model, tmp_path / "a")
     (tmp_path / "campaign.toml").write_text("[[run]]\n", encoding="utf-8")
-    with pytest.raises(InputError, match="a campaign, and the model was calibrated from plain logs"):
+    with pytest.raises(InputError, match="run 1: step: missing"):
         write_figures(given[1].model, tmp_path / "a", tmp_path)
     assert not (tmp_path / "a").exists()
+
+
+def test_the_folder_of_a_campaign_of_one_log_gives_the_figures_of_its_log(
+    given: tuple[Path, Calibration], tmp_path: Path
+):
+    """So do campaigns with other runs, of which the exciting one is taken, and those with a motion for validation."""
+    log, record = given
+    plain = {path.name: path.read_bytes() for path in write_figures(record.model, tmp_path / "plain", log)}
+    run = '[[run]]\nstep = "{0}"\nname = "{0}"\nlog = "{1}"\n'
+    campaigns = {
+        "one_log": run.format("inertial", log.as_posix()),
+        "four_steps": run.format("inertial", log.as_posix()) + run.format("gravity", log.as_posix()),
+        "validation": run.format("inertial", "none.npz") + run.format("validation", log.as_posix()),
+    }
+    for name, text in campaigns.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "campaign.toml").write_text(text, encoding="utf-8")
+
+        found = write_figures(record.model, tmp_path / f"{name}_figures", tmp_path / name)
+
+        assert {path.name: path.read_bytes() for path in found} == plain, name
 
 
 @pytest.mark.slow
@@ -291,8 +406,8 @@ def test_a_campaign_s_model_is_drawn_with_its_campaign(
 
     assert {"torque.pdf", "friction.svg", "joints.tex"} <= {path.name for path in found}
     assert len(viewed(record.model, folder).times) > 100
-    with pytest.raises(InputError, match="plain logs, and the model was calibrated from a campaign"):
-        write_figures(record.model, tmp_path / "b", given[0])
+    exciting = folder / "logs" / "inertial.npz"
+    assert "torque.pdf" in {path.name for path in write_figures(record.model, tmp_path / "b", exciting)}
 
 
 def test_the_view_lays_a_calibration_over_the_file(given: tuple[Path, Calibration]):

@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from psdmc.calibration.campaign_plan import ROWS_PER_CUTOFF
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.motions.trajectory import read_trajectory
@@ -57,7 +60,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
         (("--torque-margin", "0"), "--torque-margin"),
         (("--rate", "0"), "--rate"),
         (("--rate", "nan"), "--rate"),
-        (("--rate", "50"), "50 rows a second, the filter of 40 Hz needs 160"),
+        (("--rate", "50"), "--rate is 50 rows a second, expected at least 160"),
         (("--load", "3.5"), "--load is '3.5'"),
         (("--load", "0,0,0,0"), "--load: 0 kg, expected 0.001 to 10000"),
         (("--load", "1,0,nan,0"), "--load: its centre of mass"),
@@ -148,7 +151,9 @@ def test_the_plan_is_printed(capsys: pytest.CaptureFixture[str], model: Path, tm
     said = capsys.readouterr()
     assert said.out.startswith("1 run, 0.1 min of motion; trajectories 0.")
     assert "exciting motion: condition number" in said.out
-    assert "the best of 1000 random motions, which were not asked to hit nothing" in said.out
+    compared = next(line for line in said.out.splitlines() if line.startswith("compared: "))
+    assert "standard deviations" in compared
+    assert "the best of 1000 random motions that pass the same checks" in compared
     assert "torques: by theta_b without friction, at most 80% of the limits" in said.out
     assert "not checked: self-collision" in said.out
     assert "floor at -2 m: origins of joints and the tip, not their bodies, stay 10 mm above" in said.out
@@ -158,6 +163,18 @@ def test_the_plan_is_printed(capsys: pytest.CaptureFixture[str], model: Path, tm
     assert -0.99 < motion.q[:, 1].min() < motion.q[:, 1].max() < 1.19
     picture = (tmp_path / "plan" / "excitation.svg").read_text(encoding="utf-8")
     assert picture.count('<g id="limit">') == 2 * 2 * 3
+
+
+def test_help_says_the_rates_that_plans_need(capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit):
+        main(["excite", "--help"])
+
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    four, one = (
+        ROWS_PER_CUTOFF * options.filter.cutoff
+        for options in (CalibrationOptions().friction, LinearOptions())
+    )
+    assert f"at least {four:g}, or {one:g} with --one-log" in said
 
 
 def test_simulate_of_a_model_says_what_a_plant_is(

@@ -5,6 +5,7 @@ psdmc's commands write, at the narrowest width."""
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import sys
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 from made_up_bench import made_up_result
 from made_up_denso import denso, made_up_record, plant
+from matplotlib.image import imread
 
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
@@ -289,3 +291,29 @@ def test_legend_and_texts_of_a_view_have_the_plot_s_size(page: Any):
     expected = page.evaluate("document.getElementById('plot').clientWidth")
 
     assert found == pytest.approx(expected, abs=1.0)
+
+
+@pytest.mark.skipif("view" not in OWN, reason="plotly is not installed")
+@of("view", widths=(400, 800), schemes=("light", "dark"))
+def test_the_axes_of_a_view_lie_within_the_plot(page: Any):
+    """Lines and labels keep away from its left and right edge, also after the window was wider."""
+    wide, high = page.viewport_size["width"], page.viewport_size["height"]
+    for width in (wide, 1000, wide):
+        page.set_viewport_size({"width": width, "height": high})
+        page.wait_for_function(DRAWN, arg=width)
+        page.wait_for_timeout(DRAWN_AFTER)
+    plot = imread(io.BytesIO(page.locator("#plot").screenshot()))[:-LEGEND, :, :3]
+    is_ink = (np.abs(plot - plot[0, 0]) > 0.05).any(axis=(0, 2))
+
+    assert is_ink.sum() > 0.4 * len(is_ink), "the plot is drawn"
+    assert not is_ink[:EDGE].any()
+    assert not is_ink[-EDGE:].any()
+
+
+DRAWN = (
+    "width => plot.clientWidth < width && plot.clientWidth === plot.querySelector('.main-svg').clientWidth"
+)
+DRAWN_AFTER = 500
+"""ms, in which WebGL draws."""
+LEGEND, EDGE = 150, 8
+"""px, of the legend's height and of the edges."""

@@ -18,7 +18,7 @@ from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.allowed import Allowed, require_limits
 from psdmc.calibration.motions.criterion import FitColumns, Scaled, scaled
-from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.excite_options import ExciteOptions, Objective
 from psdmc.calibration.motions.limited_sines import LimitedSines
 from psdmc.calibration.motions.limited_sines import SineSum as SineSum
 from psdmc.calibration.motions.search import Criterion, SearchProgress, cpu_seconds, search
@@ -34,45 +34,58 @@ COARSE_STEP = 0.1
 """rad (m) between the poses that the search looks at; what it finds is looked at more finely."""
 FINER = 4
 """Rows at which a motion's limits are looked at, per sample of the search."""
+MEASURES: dict[Objective, str] = {
+    "deviation": "bound on the parameters' standard deviations",
+    "condition": "condition number",
+    "log_det": "mean semi-axis of the parameters' confidence ellipsoid",
+}
+"""What the search minimises, by objective. The mean is the geometric one."""
 SPARE = 0.99
 """Share of the torque margin that the search may use; the rest is for its slow beginning and end, and between rows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Excitation:
-    """The exciting motion that a search found, compared with random motions. Smaller condition numbers are better.
+    """The exciting motion that a search found, compared with random motions by what the search minimises.
 
-    condition          condition number of the scaled columns of the fit along the motion
-    random_conditions  (random,) condition numbers of random motions within the same limits, ascending; infinite if a
-                       motion needs too much torque at any amplitude. Motions that collide do not count if they are
-                       better than the best allowed one
-    history            (k, 2) for k times during the search: number of evaluations, and best value of the objective so
-                       far
-    seconds            CPU time since the time limit of the options began to count
-    ended_by_clock     True: the time limit ended the search, so another run may find another motion
-    deviation          upper bound of the parameters' standard deviations (criterion.Scaled.deviation)
-    random_deviation   the bound for the best random motion
+    condition         condition number of the scaled columns of the fit along the motion; smaller is better
+    random_times      (random,) how many times the measure of each random motion is that of the motion found, ascending;
+                      infinite if a motion needs too much torque at any amplitude. Motions that collide do not count if
+                      they are better than the best allowed one
+    history           (k, 2) for k times during the search: number of evaluations, and best value of the objective so far
+    seconds           CPU time since the time limit of the options began to count
+    ended_by_clock    True: the time limit ended the search, so another run may find another motion
+    random_condition  condition number of the best random motion; the best is that with the smallest measure
+    objective         which measure the search minimises (MEASURES)
+    deviation         upper bound of the parameters' standard deviations (criterion.Scaled.deviation)
     """
 
     motion: SineSum
     condition: float
-    random_conditions: Array
+    random_times: Array
     history: Array
     evaluations: int
     seconds: float
     ended_by_clock: bool = False
+    random_condition: float = np.inf
+    objective: Objective = "deviation"
     deviation: float = np.nan
-    random_deviation: float = np.inf
 
     @property
-    def gain(self) -> float:
-        """Best condition number of the random motions divided by that of the motion found."""
-        return float(self.random_conditions[0] / self.condition)
+    def times(self) -> float:
+        """The measure of the best random motion divided by that of the motion found: at least one."""
+        return float(self.random_times[0])
 
     @property
-    def deviation_gain(self) -> float:
-        """Best bound on standard deviations of the random motions divided by that of the motion found."""
-        return self.random_deviation / self.deviation
+    def comparison(self) -> str:
+        """Return a sentence that compares the motion with the best random motion."""
+        count = len(self.random_times)
+        if not np.isfinite(self.times):
+            return f"none of {count} random motions is allowed, at any size"
+        return (
+            f"the {MEASURES[self.objective]} is {self.times:.2f} times smaller than that of the best of {count} random"
+            f" motions that pass the same checks; the condition number of that random motion is {self.random_condition:.3g}"
+        )
 
 
 def excite(
@@ -107,8 +120,6 @@ def excite(
     scores = [np.inf if seen is None else seen[1].score(options.objective) for seen in random]
     starts = drawn[np.argsort(scores, kind="stable")]
     best_random = _best_allowed(random, space, columns, allowed)
-    seen = [np.inf if each is None else each[1].condition for each in random]
-    deviations = [np.inf if each is None else each[1].deviation for each in random]
     criterion = Criterion(space, columns, options, allowed.torques)
     is_free = None if allowed.clearance is None else _free(space, allowed)
     if is_free is not None:
@@ -127,13 +138,16 @@ def excite(
     return Excitation(
         motion,
         reached_columns.condition,
-        np.sort(seen),
+        np.sort(
+            [np.inf if each is None else each[1].times(reached_columns, options.objective) for each in random]
+        ),
         found.history,
         found.evaluations,
         cpu_seconds() - begin,
         found.ended_by_clock,
+        np.inf if best_random is None else best_random[1].condition,
+        options.objective,
         reached_columns.deviation,
-        min(deviations),
     )
 
 

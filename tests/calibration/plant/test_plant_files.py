@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,9 @@ from psdmc.calibration.motions.sweeps import SweepOptions, gravity_sweep
 from psdmc.calibration.plant.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.errors import InputError
 from psdmc.export.export_urdf import export_urdf
+from psdmc.friction.law import Term
+from psdmc.friction.laws import LAWS
+from psdmc.friction.terms import named
 from psdmc.model.store import save
 
 
@@ -166,3 +170,35 @@ def test_a_tables_plant_states_no_drive_inertia_and_no_tip(arm, tmp_path: Path):
     assert "tip: found with a DH table" in refused(
         arm, tmp_path, plant.replace("[sensors]", 'tip = "x"\n[sensors]')
     )
+
+
+PAGE = Path(__file__).parents[3] / "docs" / "calibration.md"
+NUMBERED = {"viscous": "viscous^2", "stribeck": "stribeck_0.15"}
+"""How a plant names laws with a number, for example."""
+
+
+def named_or_plain(word: str) -> list[Term]:
+    found = named(word, LAWS)
+    return [Term(LAWS[word])] if found is None else [found[0]]
+
+
+def test_the_page_lists_the_keys_that_the_reader_knows(arm, tmp_path: Path):
+    """The reader itself says them, where it finds another key. The page also names no key that the reader refuses."""
+    words = [word for word in LAWS if word != "stribeck"] + list(NUMBERED.values())
+    text = f"friction = {words}\n" + arm.plant.read_text(encoding="utf-8")
+    names = {name for word in words for term in named_or_plain(word) for name in term.names}
+    more = [f'"{name}" = 1.0' for name in sorted(names) if f"\n{name} = " not in text]
+    text = text.replace("[[joint]]", "\n".join(["[[joint]]", *more]))
+    wanted: set[str] = set()
+    for head in ("friction", "[sensors]", "[harness]", "[[joint]]"):
+        odd = f"odd = 1\n{head}" if head == "friction" else f"{head}\nodd = 1"
+        said = refused(arm, tmp_path, text.replace(head, odd, 1))
+        wanted |= set(re.search(r"unknown key\(s\) 'odd', known are ([^;]+)", said)[1].split(", "))
+    section = PAGE.read_text(encoding="utf-8").split("## Virtual robots")[1].split("\n## ")[0]
+    rows = [line.split(" | ") for line in section.splitlines() if line.startswith("| ")]
+    laws = [row for row in rows if len(row) == 2]
+    cells = [cell for row in rows for cell in ([row[1]] if row in laws else [row[0]])]
+    documented = {re.sub(r'[]["]', "", name) for cell in cells for name in re.findall(r"`([^`]+)`", cell)}
+    assert wanted - documented == set()
+    assert documented - wanted == set()
+    assert {row[0].strip("`| ") for row in laws} >= set(words)
