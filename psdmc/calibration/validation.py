@@ -280,7 +280,7 @@ def _validated(
         ),
     )
     has_changed = test.chance < CHANCE and test.noticed
-    why = test.explanation() if has_changed else Explanation(np.zeros(test.size), left=test.chi2)
+    why = test.explanation() if has_changed else Explanation(np.zeros(test.size), np.zeros(test.size), left=test.chi2)
     explained = qualities(rows.measured, rows.predicted + test.torque(why.values))
     r2 = dict(zip(chain.v_names, (q.r2 for q in explained), strict=True))
     against = [ground for ground in own.against if not _is_harmless(ground, own, r2, why)]
@@ -326,7 +326,7 @@ def _doubts(
     kept = found.model.calibrated
     assert kept is not None
     doubts = []
-    used = {(log.log, log.rows, log.seconds) for log in kept.logs}
+    used = {(log.log, log.rows, log.seconds) for log in kept.logs if log.use != "validate"}
     again = [log.log for log in result.logs if (log.log, log.rows, log.seconds) in used]
     if again:
         text = (
@@ -344,11 +344,12 @@ def _doubts(
         text = f"the changes named leave a chi-square of {result.left:.4g}: they do not explain all that is different"
         doubts.append(Remark(text, "unexplained"))
     if result.chance < CHANCE and not test.noticed:
-        text = (
-            f"values differ significantly (chi-square {result.chi2:.4g} of {result.freedom} degrees of freedom), but the "
-            "torque of these differences is small compared with the error that a new calibration would leave"
+        why = (
+            "the model predicts the torques as well as in the test of its calibration"
+            if test.as_calibrated
+            else "the torque of these differences is too small to matter"
         )
-        doubts.append(Remark(text, "small_change"))
+        doubts.append(Remark(f"values differ by more than noise, but {why}", "small_change"))
     return (*doubts, *(Remark(g.words, g.code) for g in grounds if g.code in SAID))
 
 

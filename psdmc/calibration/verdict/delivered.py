@@ -39,7 +39,7 @@ from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
 from psdmc.model import recursive
-from psdmc.model.calibrated import Prediction, StepQuality, by_joint
+from psdmc.model.calibrated import WHOLE, Prediction, StepQuality, by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
 from psdmc.model.store import save
@@ -92,6 +92,14 @@ class Delivered:
             coupling=law.coupling,
             columns=self.columns,
         )
+
+    @property
+    def own_error(self) -> Array:
+        """Return each joint's RMSE (n,) on the samples that tested the calibration itself, N m (N); 0 without such samples."""
+        kept, names = self.model.calibrated, self.model.v_names
+        joints = {} if kept is None else {step.step: step.joints for step in kept.steps}.get(WHOLE, {})
+        errors = [joints[name].held_out.rmse if name in joints else 0.0 for name in names]
+        return np.nan_to_num(np.array(errors, dtype=np.float64))
 
     @property
     def motors(self) -> Motors:
