@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,59 @@ def test_an_unchanged_arm_is_still_valid_and_figures_are_the_log_s(file: Path, f
         assert joint.rms < joint.largest < 5.0 * joint.rms
         assert joint.r2 > 0.999
         assert len(joint.by_speed) == len(joint.by_time) == 10
+
+
+@pytest.fixture(scope="module")
+def ideal(arm, table: Path, folder: Path) -> DynamicsModel:
+    """A model that a log without noise calibrated, so that its standard deviations are tiny."""
+    return psdmc.calibrate(arm.model, recorded(folder, "ideal", Worn(seed=100, noise=0.0), table)).model
+
+
+WORN = (VISCOUS[0], 1.1 * VISCOUS[1])
+
+
+@pytest.mark.parametrize(
+    ("how", "word", "named"),
+    [
+        pytest.param(Worn(seed=5), "still valid", [], id="same"),
+        pytest.param(Worn(seed=10), "still valid", [], id="other motion"),
+        pytest.param(Worn(seed=11), "still valid", [], id="third motion"),
+        pytest.param(Worn(seed=1, load=Payload(0.0003, LOAD.com)), "still valid", [], id="0.3 g"),
+        pytest.param(Worn(seed=1, load=Payload(0.1, LOAD.com)), "changed load", [], id="100 g"),
+        pytest.param(Worn(seed=2, viscous=WORN), "drifted", ["viscous of elbow"], id="friction"),
+        pytest.param(
+            Worn(seed=3, viscous=WORN, load=Payload(0.0003, LOAD.com)),
+            "drifted",
+            ["viscous of elbow"],
+            id="friction and 0.3 g",
+        ),
+    ],
+)
+def test_without_noise_only_what_changes_a_torque_counts(ideal, folder: Path, table: Path, how, word, named):
+    found = validate(ideal, recorded(folder, "of_ideal", replace(how, noise=0.0), table))
+
+    assert found.word == word
+    assert [change.name for change in found.named] == named
+    if how.load is not None and word == "changed load":
+        assert found.load is not None
+        assert found.load.mass == pytest.approx(how.load.mass, rel=0.02)
+    if named:
+        assert found.named[0].change == pytest.approx(0.1 * VISCOUS[1], rel=0.02)
+
+
+def test_a_motion_that_the_calibration_predicted_as_badly_shows_no_change(arm, folder: Path, table: Path):
+    """Friction that grows with the square of speed, of which a fast motion needs other values than a slow one."""
+    slow, fast = (Worn(seed=s, viscosity="viscous^2", pace=pace) for s, pace in ((31, 0.5), (32, 1.0)))
+    logs = [recorded(folder, name, how, table) for name, how in (("slow", slow), ("fast", fast))]
+    model = psdmc.calibrate(arm.model, logs[0], validation=logs[1]).model
+
+    found = validate(model, logs[1])
+    worn = validate(model, recorded(folder, "fast_worn", replace(fast, viscous=(4.0, 4.5)), table))
+
+    assert (found.word, found.as_json()["codes"]["doubts"]) == ("still valid", ["small_change"])
+    assert found.chance < 1e-6
+    assert "as well as in the test of its calibration" in found.doubts[0]
+    assert worn.word == "drifted"
 
 
 def test_viscous_friction_that_grew_by_half_is_named_with_its_change(file: Path, folder: Path, table: Path):
