@@ -76,6 +76,7 @@ WORN = (VISCOUS[0], 1.1 * VISCOUS[1])
         pytest.param(Worn(seed=10), "still valid", [], id="other motion"),
         pytest.param(Worn(seed=11), "still valid", [], id="third motion"),
         pytest.param(Worn(seed=1, load=Payload(0.0003, LOAD.com)), "still valid", [], id="0.3 g"),
+        pytest.param(Worn(seed=1, load=Payload(0.002, LOAD.com)), "still valid", [], id="2 g"),
         pytest.param(Worn(seed=1, load=Payload(0.1, LOAD.com)), "changed load", [], id="100 g"),
         pytest.param(Worn(seed=2, viscous=WORN), "drifted", ["viscous of elbow"], id="friction"),
         pytest.param(
@@ -83,6 +84,12 @@ WORN = (VISCOUS[0], 1.1 * VISCOUS[1])
             "drifted",
             ["viscous of elbow"],
             id="friction and 0.3 g",
+        ),
+        pytest.param(
+            Worn(seed=2, viscous=(1.003 * VISCOUS[0], WORN[1])),
+            "drifted",
+            ["viscous of elbow"],
+            id="friction, and 0.3 % of another",
         ),
     ],
 )
