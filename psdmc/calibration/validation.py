@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import stats
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
+from psdmc.calibration.campaign_file import tested_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_quantity
@@ -226,15 +226,7 @@ def opened_logs(
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]
     campaign = campaign_of(paths)
     if campaign is not None:
-        plain_ones = validation_logs(campaign) or plain_logs(campaign, names)
-        if plain_ones is None:
-            own = [run.log for run in read_campaign(campaign, names).inertial if run.tool is None]
-            if not own:
-                raise InputError(
-                    f"{campaign}: no exciting motion without a load", "give logs, not the campaign"
-                )
-            return list(own), {}
-        paths = list(plain_ones)
+        paths = list(tested_logs(campaign, names))
     naming.require_bag(paths)
     read = log_sources(paths, (), names, found.linear, FitChoice(), naming, progress)
     return [replace(log, use="fit") for log in read.logs], read.constants
@@ -280,7 +272,11 @@ def _validated(
         ),
     )
     has_changed = test.chance < CHANCE and test.noticed
-    why = test.explanation() if has_changed else Explanation(np.zeros(test.size), np.zeros(test.size), left=test.chi2)
+    why = (
+        test.explanation()
+        if has_changed
+        else Explanation(np.zeros(test.size), np.zeros(test.size), left=test.chi2)
+    )
     explained = qualities(rows.measured, rows.predicted + test.torque(why.values))
     r2 = dict(zip(chain.v_names, (q.r2 for q in explained), strict=True))
     against = [ground for ground in own.against if not _is_harmless(ground, own, r2, why)]
@@ -300,10 +296,11 @@ def _validated(
     doubts = _doubts(found, result, [*harmless, *own.doubted], test)
     if reasons:
         return replace(result, word="log not usable", reasons=tuple(reasons), doubts=doubts)
-    if has_changed:
-        word: Word = "drifted" if why.load is None else "changed load"
-        result = replace(result, word=word, load=why.load, named=why.named)
-    return replace(result, doubts=doubts)
+    if not has_changed:
+        return replace(result, doubts=doubts)
+    word: Word = "drifted" if why.load is None else "changed load"
+    doubts = (*doubts, *_doubts_of_names(why, test))
+    return replace(result, word=word, load=why.load, named=why.named, doubts=doubts)
 
 
 def _is_harmless(ground: Ground, own: Verdict, r2: Mapping[str, float], why: Explanation) -> bool:
@@ -351,6 +348,18 @@ def _doubts(
         )
         doubts.append(Remark(f"values differ by more than noise, but {why}", "small_change"))
     return (*doubts, *(Remark(g.words, g.code) for g in grounds if g.code in SAID))
+
+
+def _doubts_of_names(why: Explanation, test: Changes) -> list[Remark]:
+    """What may be wrong with the names of what has changed."""
+    links = [change.name for change in why.named if change.equation]
+    if links and test.refuses_load:
+        text = f"a load would show as a change of {listed(links)}, because {test.refuses_load}"
+        return [Remark(text, "refuses_load")]
+    if not why.named and why.load is None:
+        text = "many values have changed a little, none by enough to be named: --report lists all of them"
+        return [Remark(text, "many_small")]
+    return []
 
 
 def _joint_errors(

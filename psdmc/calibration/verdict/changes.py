@@ -238,13 +238,22 @@ class Changes:
         """Whether the load alone changes some joint's torque by what counts."""
         return bool(np.any(np.sqrt(np.mean(self.torque(found.of_load) ** 2, axis=0)) > self.felt))
 
-    def _load_onto_values(self) -> Array | None:
-        """(u, 10) change of all values per load parameter; None if the model admits no load at its tip."""
+    @property
+    def refuses_load(self) -> str:
+        """Why no load at the tip can explain anything, as a sentence; empty if one can."""
         model = self.found.model
         try:
-            onto = load_map(model.mechanism, model.B, model.mechanism.tip_frame)
-        except InputError:
+            load_map(model.mechanism, model.B, model.mechanism.tip_frame)
+        except InputError as error:
+            return f"{error.message}: {error.hint}"
+        return ""
+
+    def _load_onto_values(self) -> Array | None:
+        """(u, 10) change of all values per load parameter; None if the model admits no load at its tip."""
+        if self.refuses_load:
             return None
+        model = self.found.model
+        onto = load_map(model.mechanism, model.B, model.mechanism.tip_frame)
         return np.concatenate([onto, np.zeros((self.by_value.shape[1] - model.l, onto.shape[1]))])
 
     def _delivered(

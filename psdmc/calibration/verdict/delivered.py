@@ -95,7 +95,7 @@ class Delivered:
 
     @property
     def own_error(self) -> Array:
-        """Return each joint's RMSE (n,) on the samples that tested the calibration itself, N m (N); 0 without such samples."""
+        """Return each joint's RMSE (n,) on the samples that tested the calibration itself, N m (N). Without them: 0."""
         kept, names = self.model.calibrated, self.model.v_names
         joints = {} if kept is None else {step.step: step.joints for step in kept.steps}.get(WHOLE, {})
         errors = [joints[name].held_out.rmse if name in joints else 0.0 for name in names]

@@ -50,7 +50,13 @@ def recorded(folder: Path, name: str, how: Worn, table: Path) -> Path:
     plant.write_text("\n".join(lines), encoding="utf-8")
     rng = np.random.default_rng(how.seed)
     time = np.arange(0.0, how.seconds, 0.01)
-    w = how.pace * 2.0 * np.pi * np.array([[0.31, 0.47], [0.83, 0.71], [1.13, 1.37]]) * rng.uniform(0.8, 1.2, (3, 2))
+    w = (
+        how.pace
+        * 2.0
+        * np.pi
+        * np.array([[0.31, 0.47], [0.83, 0.71], [1.13, 1.37]])
+        * rng.uniform(0.8, 1.2, (3, 2))
+    )
     turning = time[:, None, None] * w + rng.uniform(0.0, 6.0, (3, 2))
     q, qd = 0.2 * np.sin(turning).sum(axis=1), 0.2 * (w * np.cos(turning)).sum(axis=1)
     qdd = -0.2 * (w**2 * np.sin(turning)).sum(axis=1)
