@@ -294,12 +294,13 @@ def _validated(
         reasons = [Remark(text, "another_robot")]
     result = replace(result, left=why.left)
     doubts = _doubts(found, result, [*harmless, *own.doubted], test)
+    if has_changed:
+        doubts = (*doubts, *_doubts_of_names(why, test, bool(reasons)))
     if reasons:
         return replace(result, word="log not usable", reasons=tuple(reasons), doubts=doubts)
     if not has_changed:
         return replace(result, doubts=doubts)
     word: Word = "drifted" if why.load is None else "changed load"
-    doubts = (*doubts, *_doubts_of_names(why, test))
     return replace(result, word=word, load=why.load, named=why.named, doubts=doubts)
 
 
@@ -350,13 +351,13 @@ def _doubts(
     return (*doubts, *(Remark(g.words, g.code) for g in grounds if g.code in SAID))
 
 
-def _doubts_of_names(why: Explanation, test: Changes) -> list[Remark]:
+def _doubts_of_names(why: Explanation, test: Changes, unusable: bool) -> list[Remark]:
     """What may be wrong with the names of what has changed."""
-    links = [change.name for change in why.named if change.equation]
-    if links and test.refuses_load:
-        text = f"a load would show as a change of {listed(links)}, because {test.refuses_load}"
+    links = any(change.equation for change in why.named)
+    if test.refuses_load and (links or unusable):
+        text = f"if the robot carries a load, this model cannot show it: {test.refuses_load}"
         return [Remark(text, "refuses_load")]
-    if not why.named and why.load is None:
+    if not why.named and why.load is None and not unusable:
         text = "many values have changed a little, none by enough to be named: --report lists all of them"
         return [Remark(text, "many_small")]
     return []

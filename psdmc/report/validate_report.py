@@ -161,7 +161,7 @@ ERRORS = (
     "direction. Refitted: the R² that a new fit of these logs reaches on their last 30 %."
 )
 CHANGE_HEAD = ["Value", "In the file", "Change", "±", "In ±", "Unit", "Torque", "Equation"]
-NAMED = "The verdict's numbers: only these values and a load are fitted to the logs, all other values stay those of the file."
+NAMED = "The verdict's numbers: only these values and a load are fitted to the logs, all others stay those of the file."
 CHANGES = (
     "All values are fitted to the logs together, for the chi-square test. So a named value has another change and a larger "
     "± here than in the verdict. ± is one standard deviation of file and logs together. Torque: the largest RMS over the "
