@@ -57,6 +57,8 @@ CHANGED_STATUS = 5
 """Exit status of `psdmc validate` if the robot has changed."""
 MOST_WITH_LOAD = 2
 """Further changes beside a load whose torques look like another unit's."""
+MOST_LINKS = 2
+"""Base parameters among the named changes of a robot whose links are the same, with a cable or a part added."""
 BINS = 10
 """Of speed and time, in which errors are averaged."""
 SAID = (
@@ -353,7 +355,10 @@ def _doubts(
 
 def _doubts_of_names(why: Explanation, test: Changes, unusable: bool) -> list[Remark]:
     """What may be wrong with the names of what has changed."""
-    links = any(change.equation for change in why.named)
+    links = [change.name for change in why.named if change.equation]
+    if len(links) > MOST_LINKS and not unusable:
+        text = f"{listed(links)} are of links, which do not wear: is the log another robot's, or has the robot been rebuilt?"
+        return [Remark(text, "other_links")]
     if test.refuses_load and (links or unusable):
         text = f"if the robot carries a load, this model cannot show it: {test.refuses_load}"
         return [Remark(text, "refuses_load")]

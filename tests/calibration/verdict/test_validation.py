@@ -316,6 +316,20 @@ def test_a_log_of_an_arm_of_another_length_is_not_usable(file: Path, folder: Pat
     assert "wrong_gains" in found.as_json()["codes"]["reasons"]
 
 
+def test_links_that_seem_to_wear_are_doubted(file: Path, folder: Path, table: Path):
+    text = table.read_text(encoding="utf-8").replace("com = [-0.15, 0.02,", "com = [-0.2, 0.1,")
+    text = text.replace("drive_inertia = 0.3", "drive_inertia = 0.6").replace(
+        "drive_inertia = 0.1", "drive_inertia = 0.3"
+    )
+    (folder / "rebuilt.toml").write_text(text, encoding="utf-8")
+
+    found = validate(file, recorded(folder, "of_rebuilt", Worn(seed=17), folder / "rebuilt.toml"))
+
+    assert found.exit_status == 5
+    assert found.as_json()["codes"]["doubts"] == ["other_links"]
+    assert "is the log another robot's, or has the robot been rebuilt?" in found.doubts[0]
+
+
 def test_more_changes_than_a_worn_robot_has_are_another_robot_s(
     file: Path, folder: Path, table: Path, monkeypatch: pytest.MonkeyPatch
 ):
