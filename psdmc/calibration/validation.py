@@ -273,10 +273,9 @@ def _validated(
             "All", chain.v_names, rows.time, rows.measured, rows.predicted, np.zeros(len(rows.time), bool)
         ),
     )
-    has_changed = test.chance < CHANCE and test.noticed
     why = (
         test.explanation()
-        if has_changed
+        if test.chance < CHANCE and test.noticed
         else Explanation(np.zeros(test.size), np.zeros(test.size), left=test.chi2)
     )
     explained = qualities(rows.measured, rows.predicted + test.torque(why.values))
@@ -295,12 +294,13 @@ def _validated(
         )
         reasons = [Remark(text, "another_robot")]
     result = replace(result, left=why.left)
-    doubts = _doubts(found, result, [*harmless, *own.doubted], test)
-    if has_changed:
-        doubts = (*doubts, *_doubts_of_names(why, test, bool(reasons)))
+    doubts = (
+        *_doubts(found, result, [*harmless, *own.doubted]),
+        *(_doubts_of_changes(result, why, test, bool(reasons)) if test.chance < CHANCE else ()),
+    )
     if reasons:
         return replace(result, word="log not usable", reasons=tuple(reasons), doubts=doubts)
-    if not has_changed:
+    if why.load is None and not why.named:
         return replace(result, doubts=doubts)
     word: Word = "drifted" if why.load is None else "changed load"
     return replace(result, word=word, load=why.load, named=why.named, doubts=doubts)
@@ -320,9 +320,7 @@ def _is_harmless(ground: Ground, own: Verdict, r2: Mapping[str, float], why: Exp
     )
 
 
-def _doubts(
-    found: Delivered, result: Validation, grounds: Sequence[Ground], test: Changes
-) -> tuple[str, ...]:
+def _doubts(found: Delivered, result: Validation, grounds: Sequence[Ground]) -> tuple[str, ...]:
     kept = found.model.calibrated
     assert kept is not None
     doubts = []
@@ -340,32 +338,32 @@ def _doubts(
         doubts.append(Remark(text, "no_covariance"))
     if kept.verdict is not None and not kept.verdict.usable:
         doubts.append(Remark("the verdict on the calibration itself is: not usable", "not_usable"))
-    if test.noticed and result.chance < CHANCE and stats.chi2.sf(result.left, result.freedom) < CHANCE:
-        text = f"the changes named leave a chi-square of {result.left:.4g}: they do not explain all that is different"
-        doubts.append(Remark(text, "unexplained"))
-    if result.chance < CHANCE and not test.noticed:
-        why = (
-            "the model predicts the torques as well as in the test of its calibration"
-            if test.as_calibrated
-            else "the torque of these differences is too small to matter"
-        )
-        doubts.append(Remark(f"values differ by more than noise, but {why}", "small_change"))
     return (*doubts, *(Remark(g.words, g.code) for g in grounds if g.code in SAID))
 
 
-def _doubts_of_names(why: Explanation, test: Changes, unusable: bool) -> list[Remark]:
-    """What may be wrong with the names of what has changed."""
+def _doubts_of_changes(result: Validation, why: Explanation, test: Changes, unusable: bool) -> list[Remark]:
+    """What may be wrong with the explanation of a significant difference."""
+    if not test.noticed:
+        text = "values differ by more than noise, but the torque of these differences is too small to matter"
+        return [Remark(text, "small_change")]
     links = [change.name for change in why.named if change.equation]
+    found = []
+    if why.load is None and not why.named and not unusable:
+        text = (
+            "values differ by more than noise, but none of them surely: the model may lack an effect that this motion "
+            "shows; the report draws the errors against speed and time"
+        )
+        found.append(Remark(text, "none_sure"))
+    elif stats.chi2.sf(result.left, result.freedom) < CHANCE:
+        text = f"the changes named leave a chi-square of {result.left:.4g}: they do not explain all that is different"
+        found.append(Remark(text, "unexplained"))
     if len(links) > MOST_LINKS and not unusable:
         text = f"{listed(links)} are of links, which do not wear: is the log another robot's, or has the robot been rebuilt?"
-        return [Remark(text, "other_links")]
-    if test.refuses_load and (links or unusable):
+        found.append(Remark(text, "other_links"))
+    elif test.refuses_load and (links or unusable):
         text = f"if the robot carries a load, this model cannot show it: {test.refuses_load}"
-        return [Remark(text, "refuses_load")]
-    if not why.named and why.load is None and not unusable:
-        text = "many values have changed a little, none by enough to be named: --report lists all of them"
-        return [Remark(text, "many_small")]
-    return []
+        found.append(Remark(text, "refuses_load"))
+    return found
 
 
 def _joint_errors(

@@ -115,8 +115,7 @@ class Changes:
     white     (r,) the differences in r independent directions that the logs determine, in standard deviations. The
               standard deviations are those of file and logs together
     by_value  (r, u) the entries of `white` for a difference of one in each value
-    noticed   whether some joint's torque differs by enough to matter, and by more than in the calibration's own test
-    as_calibrated  whether a joint's torque differs by enough to matter, but by no more than in the calibration's own test
+    noticed   whether some joint's torque differs by enough to matter
     """
 
     def __init__(self, found: Delivered, fit: LinearResult, rows: PredictedRows) -> None:
@@ -140,8 +139,7 @@ class Changes:
         before, after = (np.mean(part[problem.held_out] ** 2, axis=0) for part in (residual, left))
         self.felt: Array = FELT * np.sqrt(np.mean(rows.measured**2, axis=0))
         matters = (before > (1.0 + NOTICED**2) * after) & (before - after > self.felt**2)
-        worse = before > (1.0 + NOTICED**2) * found.own_error**2
-        self.noticed, self.as_calibrated = bool(np.any(matters & worse)), bool(np.any(matters & ~worse))
+        self.noticed = bool(np.any(matters))
         squares = sum(np.sum(block.columns**2, axis=0) for block in problem.rows)
         self.effect: Array = np.asarray(np.sqrt(squares / len(residual)))
         seen = np.sum(solved.unseen**2, axis=1) < options.unseen_share
@@ -312,14 +310,20 @@ def _resolved(columns: Array, k: int) -> bool:
 
 def _file_covariance(found: Delivered, fit: LinearResult, solved: Estimate) -> Array:
     """(u, u) of the file's values. Friction, of which files keep standard deviations only, is taken as correlated like the
-    new logs' friction is, and as independent of theta_b; what the file does not know as far off as is believable."""
+    new logs' friction is, and as independent of theta_b; what the file does not know as far off as is believable.
+
+    Standard deviations of the file are those of noise in the fitted motion. They are widened by how much larger the errors
+    of the calibration's test are: friction's by those of its joint, theta_b's by the worst of all joints.
+    """
     kept, l = found.model.calibrated, found.model.l
     assert kept is not None
     problem = fit.problem
     believable = found.linear.fit.seen * solved.scale
     stds = by_joint(replace(row, value=row.std) for row in (*kept.friction, *kept.springs))
     owners = [*problem.plain, *((unknown.owner, unknown.name) for unknown in problem.columns.unknowns)]
-    std = np.array([*kept.std, *(stds.get(owner, np.inf) for owner in owners)])
+    worst = max(found.misfit.values(), default=1.0)
+    wider = [found.misfit.get(owner, worst) for owner, _ in owners]
+    std = np.array([*kept.std, *(stds.get(owner, np.inf) for owner in owners)]) * [*[worst] * l, *wider]
     std = np.where(np.isfinite(std) & (std > 0.0), std, believable)
     sizes = np.sqrt(np.diag(solved.total_covariance))
     sizes[sizes == 0.0] = np.inf
@@ -331,5 +335,5 @@ def _file_covariance(found: Delivered, fit: LinearResult, solved: Estimate) -> A
     if kept.covariance is not None:
         own = np.sqrt(np.diag(kept.covariance))
         missing = np.where(own > 0.0, 0.0, believable[:l])
-        covariance[:l, :l] = kept.covariance + np.diag(missing**2)
+        covariance[:l, :l] = worst**2 * kept.covariance + np.diag(missing**2)
     return np.asarray(covariance)

@@ -94,12 +94,18 @@ class Delivered:
         )
 
     @property
-    def own_error(self) -> Array:
-        """Return each joint's RMSE (n,) on the samples that tested the calibration itself, N m (N). Without them: 0."""
-        kept, names = self.model.calibrated, self.model.v_names
+    def misfit(self) -> Mapping[str, float]:
+        """Return by joint name how many times larger the calibration's RMSE is in its test than in its fit, at least 1.
+
+        More than 1 shows that the model lacks an effect, so that another motion would give other values.
+        """
+        kept = self.model.calibrated
         joints = {} if kept is None else {step.step: step.joints for step in kept.steps}.get(WHOLE, {})
-        errors = [joints[name].held_out.rmse if name in joints else 0.0 for name in names]
-        return np.nan_to_num(np.array(errors, dtype=np.float64))
+        ratios = {
+            name: own.held_out.rmse / own.fit.rmse if own.fit.rmse > 0.0 else 1.0
+            for name, own in joints.items()
+        }
+        return {name: max(1.0, ratio) if np.isfinite(ratio) else 1.0 for name, ratio in ratios.items()}
 
     @property
     def motors(self) -> Motors:

@@ -108,19 +108,23 @@ def test_without_noise_only_what_changes_a_torque_counts(ideal, folder: Path, ta
         assert found.named[0].change == pytest.approx(0.1 * found.named[0].value, rel=0.02)
 
 
-def test_a_motion_that_the_calibration_predicted_as_badly_shows_no_change(arm, folder: Path, table: Path):
-    """Friction that grows with the square of speed, of which a fast motion needs other values than a slow one."""
-    slow, fast = (Worn(seed=s, viscosity="viscous^2", pace=pace) for s, pace in ((31, 0.5), (32, 1.0)))
-    logs = [recorded(folder, name, how, table) for name, how in (("slow", slow), ("fast", fast))]
-    model = psdmc.calibrate(arm.model, logs[0], validation=logs[1]).model
+@pytest.mark.parametrize(("seed", "pace", "doubts"), [(31, 0.5, []), (41, 0.7, ["none_sure"])])
+def test_a_motion_that_the_model_predicts_badly_shows_no_change(
+    arm, folder: Path, table: Path, seed: int, pace: float, doubts: list[str]
+):
+    """Friction that grows with speed^0.6, of which a fast motion needs other values than a slow one. The test of the
+    calibration shows this."""
+    fast = Worn(seed=seed + 1, viscosity="viscous^0.6")
+    slow = recorded(folder, "slow", replace(fast, seed=seed, pace=pace), table)
+    log = recorded(folder, "fast", fast, table)
+    model = psdmc.calibrate(arm.model, slow, validation=log).model
 
-    found = validate(model, logs[1])
-    worn = validate(model, recorded(folder, "fast_worn", replace(fast, viscous=(4.0, 4.5)), table))
+    found = validate(model, log)
+    worn = validate(model, recorded(folder, "fast_worn", replace(fast, viscous=(4.0, 2.4)), table))
 
-    assert (found.word, found.as_json()["codes"]["doubts"]) == ("still valid", ["small_change"])
-    assert found.chance < 1e-6
-    assert "as well as in the test of its calibration" in found.doubts[0]
+    assert (found.word, found.as_json()["codes"]["doubts"]) == ("still valid", doubts)
     assert worn.word == "drifted"
+    assert all(change.name.endswith("of elbow") for change in worn.named)
 
 
 def test_viscous_friction_that_grew_by_half_is_named_with_its_change(file: Path, folder: Path, table: Path):
