@@ -35,7 +35,8 @@ def calibrate(
     options            filter and friction law of the fit; None: those of the log description, or the defaults
     torque_constants   torque per current of each joint, for logs of motor currents: a dictionary from joint names to
                        N m/A at the joint (after the gear). With `loaded`, psdmc finds the constants of all joints on which
-                       the load exerts a torque. In that case, give only the constants of the other joints
+                       the load exerts a torque. In that case, give only the constants of the other joints. None: those of
+                       the log description, or of `model` if it was calibrated before
     validation         logs that psdmc uses only to test the fitted model. Without validation logs, psdmc tests the model
                        with the last part of each log, and does not use this part for the fit
     loaded             logs of motor currents that were recorded with a known load at the tip. From `logs`, recorded without

@@ -23,7 +23,7 @@ from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.log_information import ALONE, MAIN_SHARE, LogInformation, log_information
-from psdmc.calibration.identify.motor_model import motors_of_logs
+from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
@@ -102,7 +102,8 @@ def calibrate(
     campaign (its folder or campaign.toml), a log description (log.toml) or plain log files.
 
     regressor         compiled regressor of the model, which is fast; None: psdmc computes the regressor in NumPy
-    torque_constants  N m/A by joint name, for plain logs of currents, and for joints that no load affects
+    torque_constants  N m/A by joint name, for plain logs of currents, and for joints that no load affects; None: those
+                      of the log description, or of a model that was calibrated before
     validation        plain logs that psdmc uses only to test the fit
     naming            topic, and joint names in plain logs
     loaded, load      further logs of currents with a known load on the robot, and this load; they determine torque
@@ -139,8 +140,23 @@ def calibrate(
         own = log_sources(with_load, [], model.v_names, options.linear, options.choice, naming, progress)
         full = LoadedLogs(own.logs, load)
     options = replace(options, linear=found.linear)
-    constants = {**found.constants, **(torque_constants or {})}
-    return calibrate_logs(model, found.logs, options, regressor, constants or None, progress, full)
+    given = {**found.constants, **(torque_constants or {})}
+    constants = given if full is not None else {**_constants_of(model, found.logs), **given}
+    result = calibrate_logs(model, found.logs, options, regressor, constants or None, progress, full)
+    kept = [
+        f"{name}={constants[name]:.6g}" for name in model.v_names if name in constants and name not in given
+    ]
+    if not kept:
+        return result
+    note = f"torque constants are those of the calibrated input model: {', '.join(kept)} N m/A"
+    return with_model(replace(result, notes=(note, *result.notes)))
+
+
+def _constants_of(model: DynamicsModel, logs: Sequence[AnyLog]) -> dict[str, float]:
+    """Torque constants of a model that was calibrated before, by joint, for logs of currents; none for other logs."""
+    if model.calibrated is None or one_quantity(logs) != "current":
+        return {}
+    return {row.joint: row.value for row in model.calibrated.motors}
 
 
 def _exciting_logs(campaign: Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:

@@ -112,6 +112,21 @@ def validation_logs(path: str | Path) -> tuple[Path, ...]:
     return tuple(run.log for run in listed_runs(path) if run.step == "validation")
 
 
+def tested_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...]:
+    """Return the logs of a campaign that test a calibrated model: those of its validation runs, or if it has none, those
+    of its exciting motions without a load. Raises InputError if the campaign has neither, or moves an unknown joint."""
+    runs = listed_runs(path)
+    _require_joints(runs, joint_names, path)
+    found = validation_logs(path) or tuple(
+        run.log for run in runs if run.step == "inertial" and run.load is None
+    )
+    if not found:
+        raise InputError(
+            f"{path}: no exciting motion without a load", "give logs of the robot without a load"
+        )
+    return found
+
+
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
     """Return all logs of a campaign except those of validation runs, by the step of the calibration that uses them:
     motor, gravity, friction, inertial.

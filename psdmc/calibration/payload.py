@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.columns.columns import Columns
+from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import names_of
@@ -31,7 +32,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.payload_found import PayloadFound, load_numbers
-from psdmc.calibration.sources import plain_sources
+from psdmc.calibration.sources import LogNaming, log_sources
 from psdmc.calibration.verdict.delivered import beside, delivered
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError
@@ -56,6 +57,7 @@ def identify_payload(
     torque_constants: Mapping[str, float] | None = None,
     regressor: Regressor | None = None,
     progress: Progress = silent,
+    naming: LogNaming | None = None,
 ) -> PayloadFound:
     """Find the mass, centre of mass and inertia of a rigid load from logs.
 
@@ -70,6 +72,7 @@ def identify_payload(
                       at the joint (after the gear); None: those of the model
     regressor         result of psdmc.compile(model), which makes the fit faster; None: psdmc computes with NumPy
     progress          function, such as print, that psdmc calls with the name of each stage
+    naming            topic, and joint names in the logs that differ from those of the model; None: no name differs
 
     Raises InputError if psdmc cannot use a log, if no joint moves in the logs, or if the model's theta_b is unknown.
     """
@@ -86,7 +89,9 @@ def identify_payload(
     if not paths:
         raise InputError("no log to identify a load from", "give a log that was recorded with it")
     progress("reading logs")
-    read = plain_sources([Path(path) for path in paths], model.joint_names, settings, progress)
+    opened, naming = [Path(path) for path in paths], naming or LogNaming()
+    naming.require_bag(opened)
+    read = log_sources(opened, (), model.joint_names, settings, FitChoice(), naming, progress)
     settings = read.linear
     checked_logs = [
         checked(log, model.mechanism, settings.filter.cutoff, settings.check) for log in read.logs

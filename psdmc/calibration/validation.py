@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import stats
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
+from psdmc.calibration.campaign_file import tested_logs
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_quantity
@@ -57,6 +57,8 @@ CHANGED_STATUS = 5
 """Exit status of `psdmc validate` if the robot has changed."""
 MOST_WITH_LOAD = 2
 """Further changes beside a load whose torques look like another unit's."""
+MOST_LINKS = 2
+"""Base parameters among the named changes of a robot whose links are the same, with a cable or a part added."""
 BINS = 10
 """Of speed and time, in which errors are averaged."""
 SAID = (
@@ -226,15 +228,7 @@ def opened_logs(
     paths = [Path(given)] if isinstance(given, str | Path) else [Path(path) for path in given]
     campaign = campaign_of(paths)
     if campaign is not None:
-        plain_ones = validation_logs(campaign) or plain_logs(campaign, names)
-        if plain_ones is None:
-            own = [run.log for run in read_campaign(campaign, names).inertial if run.tool is None]
-            if not own:
-                raise InputError(
-                    f"{campaign}: no exciting motion without a load", "give logs, not the campaign"
-                )
-            return list(own), {}
-        paths = list(plain_ones)
+        paths = list(tested_logs(campaign, names))
     naming.require_bag(paths)
     read = log_sources(paths, (), names, found.linear, FitChoice(), naming, progress)
     return [replace(log, use="fit") for log in read.logs], read.constants
@@ -279,8 +273,11 @@ def _validated(
             "All", chain.v_names, rows.time, rows.measured, rows.predicted, np.zeros(len(rows.time), bool)
         ),
     )
-    has_changed = test.chance < CHANCE and test.noticed
-    why = test.explanation() if has_changed else Explanation(np.zeros(test.size), left=test.chi2)
+    why = (
+        test.explanation()
+        if test.chance < CHANCE and test.noticed
+        else Explanation(np.zeros(test.size), np.zeros(test.size), left=test.chi2)
+    )
     explained = qualities(rows.measured, rows.predicted + test.torque(why.values))
     r2 = dict(zip(chain.v_names, (q.r2 for q in explained), strict=True))
     against = [ground for ground in own.against if not _is_harmless(ground, own, r2, why)]
@@ -297,13 +294,16 @@ def _validated(
         )
         reasons = [Remark(text, "another_robot")]
     result = replace(result, left=why.left)
-    doubts = _doubts(found, result, [*harmless, *own.doubted], test)
+    doubts = (
+        *_doubts(found, result, [*harmless, *own.doubted]),
+        *(_doubts_of_changes(result, why, test, bool(reasons)) if test.chance < CHANCE else ()),
+    )
     if reasons:
         return replace(result, word="log not usable", reasons=tuple(reasons), doubts=doubts)
-    if has_changed:
-        word: Word = "drifted" if why.load is None else "changed load"
-        result = replace(result, word=word, load=why.load, named=why.named)
-    return replace(result, doubts=doubts)
+    if why.load is None and not why.named:
+        return replace(result, doubts=doubts)
+    word: Word = "drifted" if why.load is None else "changed load"
+    return replace(result, word=word, load=why.load, named=why.named, doubts=doubts)
 
 
 def _is_harmless(ground: Ground, own: Verdict, r2: Mapping[str, float], why: Explanation) -> bool:
@@ -320,13 +320,11 @@ def _is_harmless(ground: Ground, own: Verdict, r2: Mapping[str, float], why: Exp
     )
 
 
-def _doubts(
-    found: Delivered, result: Validation, grounds: Sequence[Ground], test: Changes
-) -> tuple[str, ...]:
+def _doubts(found: Delivered, result: Validation, grounds: Sequence[Ground]) -> tuple[str, ...]:
     kept = found.model.calibrated
     assert kept is not None
     doubts = []
-    used = {(log.log, log.rows, log.seconds) for log in kept.logs}
+    used = {(log.log, log.rows, log.seconds) for log in kept.logs if log.use != "validate"}
     again = [log.log for log in result.logs if (log.log, log.rows, log.seconds) in used]
     if again:
         text = (
@@ -340,16 +338,32 @@ def _doubts(
         doubts.append(Remark(text, "no_covariance"))
     if kept.verdict is not None and not kept.verdict.usable:
         doubts.append(Remark("the verdict on the calibration itself is: not usable", "not_usable"))
-    if test.noticed and result.chance < CHANCE and stats.chi2.sf(result.left, result.freedom) < CHANCE:
-        text = f"the changes named leave a chi-square of {result.left:.4g}: they do not explain all that is different"
-        doubts.append(Remark(text, "unexplained"))
-    if result.chance < CHANCE and not test.noticed:
-        text = (
-            f"values differ significantly (chi-square {result.chi2:.4g} of {result.freedom} degrees of freedom), but the "
-            "torque of these differences is small compared with the error that a new calibration would leave"
-        )
-        doubts.append(Remark(text, "small_change"))
     return (*doubts, *(Remark(g.words, g.code) for g in grounds if g.code in SAID))
+
+
+def _doubts_of_changes(result: Validation, why: Explanation, test: Changes, unusable: bool) -> list[Remark]:
+    """What may be wrong with the explanation of a significant difference."""
+    if not test.noticed:
+        text = "values differ by more than noise, but the torque of these differences is too small to matter"
+        return [Remark(text, "small_change")]
+    links = [change.name for change in why.named if change.equation]
+    found = []
+    if why.load is None and not why.named and not unusable:
+        text = (
+            "values differ by more than noise, but none of them surely: the model may lack an effect that this motion "
+            "shows; the report draws the errors against speed and time"
+        )
+        found.append(Remark(text, "none_sure"))
+    elif stats.chi2.sf(result.left, result.freedom) < CHANCE:
+        text = f"the changes named leave a chi-square of {result.left:.4g}: they do not explain all that is different"
+        found.append(Remark(text, "unexplained"))
+    if len(links) > MOST_LINKS and not unusable:
+        text = f"{listed(links)} are of links, which do not wear: is the log another robot's, or has the robot been rebuilt?"
+        found.append(Remark(text, "other_links"))
+    elif test.refuses_load and (links or unusable):
+        text = f"if the robot carries a load, this model cannot show it: {test.refuses_load}"
+        found.append(Remark(text, "refuses_load"))
+    return found
 
 
 def _joint_errors(

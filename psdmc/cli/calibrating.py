@@ -15,6 +15,15 @@ from psdmc.errors import InputError
 
 if TYPE_CHECKING:
     from psdmc.calibration.description.table_fit import FitChoice
+    from psdmc.calibration.sources import LogNaming
+
+Topic = Annotated[
+    str | None, typer.Option(metavar="TOPIC", help="topic of joint states, if a bag has several")
+]
+JointMap = Annotated[
+    list[str] | None,
+    typer.Option(metavar="LOGGED=JOINT,...", help="joint names of the log and of the model"),
+]
 
 
 def calibrate(
@@ -50,7 +59,7 @@ def calibrate(
         list[str] | None,
         typer.Option(
             metavar="JOINT=KT,...",
-            help="joint torque per ampere in N m/A, gear included, for logs of currents",
+            help="joint torque per ampere in N m/A, gear included, for logs of currents; default: the model's",
         ),
     ] = None,
     loaded: Annotated[
@@ -98,13 +107,8 @@ def calibrate(
         list[str] | None,
         typer.Option(metavar="TERM,...", help="friction terms: coulomb,viscous,viscous^2,offset"),
     ] = None,
-    topic: Annotated[
-        str | None, typer.Option(metavar="TOPIC", help="topic of joint states, if a bag has several")
-    ] = None,
-    joint_map: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LOGGED=JOINT,...", help="joint names of the log and of the model"),
-    ] = None,
+    topic: Topic = None,
+    joint_map: JointMap = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -147,7 +151,6 @@ def calibrate(
     choice = fit_choice(cutoff, split, friction, warm)
     from psdmc.calibration.calibrate import CalibrateOptions
     from psdmc.calibration.identify.essential import EssentialOptions
-    from psdmc.calibration.sources import LogNaming
     from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
     from psdmc.cli.show_checks import (
         print_accuracy,
@@ -183,7 +186,7 @@ def calibrate(
             progress,
             keep=keep,
             validation=validate or [],
-            naming=LogNaming(topic or "", parsed_joint_map(joint_map)),
+            naming=naming_of(topic, joint_map),
             loaded=loaded or (),
             load_on=load,
             scheduler=scheduler,
@@ -281,6 +284,13 @@ def parsed_joint_map(given: Sequence[str] | None) -> dict[str, str]:
     return found
 
 
+def naming_of(topic: str | None, joint_map: Sequence[str] | None) -> LogNaming:
+    """Return the names in the logs that the options --topic and --joint-map give."""
+    from psdmc.calibration.sources import LogNaming
+
+    return LogNaming(topic or "", parsed_joint_map(joint_map))
+
+
 def payload(
     model: Annotated[
         Path,
@@ -310,6 +320,8 @@ def payload(
     keep: Annotated[
         bool, typer.Option("--keep", help="write the files even if the verdict is: not usable")
     ] = False,
+    topic: Topic = None,
+    joint_map: JointMap = None,
 ) -> None:
     """Identify a load's mass, centre of mass and inertia from logs with it; the verdict comes first, exit 6: not usable."""
     from psdmc.calibration.payload import identify_payload
@@ -321,7 +333,14 @@ def payload(
     check_output(loaded, model, *logs, *([output] if output else []))
     known, constants = load(model), parsed_torque_constants(torque_constants)
     with steps() as progress:
-        found = identify_payload(known, logs, frame, torque_constants=constants, progress=progress)
+        found = identify_payload(
+            known,
+            logs,
+            frame,
+            torque_constants=constants,
+            progress=progress,
+            naming=naming_of(topic, joint_map),
+        )
     print_verdict(found.verdict)
     print_line(f"on {found.frame!r} of {found.robot!r}:")
     for line in found.lines():

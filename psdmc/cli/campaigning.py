@@ -191,12 +191,15 @@ def simulate(
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
+    from psdmc.calibration.campaign_file import listed_runs
     from psdmc.calibration.simulate_campaign import SimulateOptions, torque_constants_for
     from psdmc.report.calibrate_commands import simulate_command
 
     with steps() as progress:
         count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
-    print(f"{campaign}: {count} runs simulated, the others were up to date")
+    total = len(listed_runs(campaign))
+    rest = f", {total - count} up to date" if count < total else ""
+    print(f"{campaign}: {count} run{'' if count == 1 else 's'} simulated{rest}")
     words = torque_constants_for(plant, campaign)
     given = f" --torque-constants {quoted(','.join(words))}" if words else ""
     say_next_line(

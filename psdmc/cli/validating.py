@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.calibrating import parsed_joint_map
+from psdmc.cli.calibrating import JointMap, Topic, naming_of
 from psdmc.cli.lists import parsed_torque_constants
 from psdmc.cli.output import check_report, say_next
 from psdmc.cli.progress import steps
@@ -17,6 +17,7 @@ from psdmc.cli.progress import steps
 if TYPE_CHECKING:
     from psdmc.calibration.compared import Comparison
     from psdmc.calibration.validation import Validation
+    from psdmc.model.dynamics_model import DynamicsModel
 
 Report = Annotated[
     Path | None, typer.Option(metavar="FILE.html", help="write a report, and FILE.json with the same numbers")
@@ -25,13 +26,6 @@ AsJson = Annotated[bool, typer.Option("--json", help="print one JSON document in
 Constants = Annotated[
     list[str] | None,
     typer.Option(metavar="JOINT=KT,...", help="joint torque per ampere, gear included; default: the model's"),
-]
-Topic = Annotated[
-    str | None, typer.Option(metavar="TOPIC", help="topic of joint states, if a bag has several")
-]
-JointMap = Annotated[
-    list[str] | None,
-    typer.Option(metavar="LOGGED=JOINT,...", help="joint names of the log and of the model"),
 ]
 
 
@@ -63,14 +57,18 @@ def validate(
             logs,
             parsed_torque_constants(torque_constants),
             regressor=CompiledWhenAsked(known, progress),
-            **_naming(topic, joint_map),
+            naming=naming_of(topic, joint_map),
             progress=progress,
         )
     _deliver(found, report, as_json)
+    own = {"--torque-constants": torque_constants, "--topic": [topic or ""], "--joint-map": joint_map}
+    options = [
+        word for flag, values in own.items() for value in values or () if value for word in (flag, value)
+    ]
     if found.load is not None:
-        say_next("payload", calibrated, *logs, "-o", "load.toml")
+        say_next("payload", calibrated, *logs_of(known, logs), *options, "-o", "load.toml")
     elif found.exit_status == CHANGED_STATUS:
-        say_next("calibrate", calibrated, *logs, "-o", f"{calibrated.stem}_new.npz")
+        say_next("calibrate", calibrated, *logs, *options, "-o", f"{calibrated.stem}_new.npz")
     if found.exit_status:
         raise typer.Exit(found.exit_status)
 
@@ -93,14 +91,17 @@ def compare(
     _check(report, a, b, *(logs or []))
     constants = parsed_torque_constants(torque_constants)
     with steps() as progress:
-        found = run(a, b, logs or [], constants, **_naming(topic, joint_map), progress=progress)
+        found = run(a, b, logs or [], constants, naming=naming_of(topic, joint_map), progress=progress)
     _deliver(found, report, as_json)
 
 
-def _naming(topic: str | None, joint_map: Sequence[str] | None) -> dict[str, Any]:
-    from psdmc.calibration.sources import LogNaming
+def logs_of(model: DynamicsModel, given: Sequence[Path]) -> Sequence[Path]:
+    """The logs that test a model, without their campaign."""
+    from psdmc.calibration.campaign_file import tested_logs
+    from psdmc.calibration.sources import campaign_of
 
-    return {"naming": LogNaming(topic or "", parsed_joint_map(joint_map))}
+    campaign = campaign_of(given)
+    return given if campaign is None else tested_logs(campaign, model.v_names)
 
 
 def _check(report: Path | None, *inputs: Path) -> None:

@@ -15,6 +15,7 @@ from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
 from psdmc.calibration.compared import Comparison, Curve
 from psdmc.calibration.validation import JointError, Validation
+from psdmc.calibration.verdict.changes import Change
 from psdmc.report.calibrate_plots import MEASURED, PANEL, PREDICTED, RESIDUAL, alone, step_panels
 from psdmc.report.calibrate_report import FigureView
 from psdmc.report.calibrate_tables import number, r_squared, table
@@ -46,7 +47,7 @@ class PageView:
     """The data of the page's template. Tables and figures are HTML text; the template escapes all other text.
 
     kind    style of the verdict's box: "", "doubted" or "refused";  document: kind of the JSON file
-    lines   (kind, sentence) for the first part of the page;  more: further lines that the terminal prints
+    lines   (kind, sentence) for the first part of the page;  more: further lines below it
     """
 
     document: str
@@ -101,13 +102,6 @@ def validation_page(found: Validation) -> PageView:
         for j in found.joints
     ]
     by_log = [[log, *map(r_squared, values)] for log, values in found.r2_by_log.items()]
-    changes = [
-        [
-            *(c.name, number(c.value), number(c.change), number(c.std), number(c.sigmas), c.unit),
-            *(number(c.torque), c.equation),
-        ]
-        for c in found.changes
-    ]
     tables = [
         TableView("Error of the prediction", head, errors, ERRORS, errors),
         TableView(
@@ -117,7 +111,8 @@ def validation_page(found: Validation) -> PageView:
             "",
             by_log[1:] and by_log,
         ),
-        TableView("Changes of single values", CHANGE_HEAD, changes, CHANGES, prose=True),
+        TableView("Named changes", CHANGE_HEAD, _changes(found.named), NAMED, prose=True),
+        TableView("Changes of all values", CHANGE_HEAD, _changes(found.changes), CHANGES, prose=True),
     ]
     figures = [] if found.quality is None else [FigureView("Torque", step_panels(found.quality), TORQUE)]
     for which, label in (("by_speed", "speed"), ("by_time", "time")):
@@ -136,15 +131,29 @@ def validation_page(found: Validation) -> PageView:
         head=f"verdict: {found.word}",
         kind="refused" if found.exit_status else "doubted" if found.grounds else "",
         lines=found.grounds,
-        more=[
-            f"changes of all values: chi-square {found.chi2:.4g}, {found.freedom} degrees of freedom; such changes have "
-            f"probability {found.chance:.2g} if the robot is unchanged"
-        ]
-        if found.joints
-        else [],
+        more=_test("all changes", found, "if the robot is unchanged"),
         tables=[each for each in tables if each.rows],
         figures=figures if found.joints else [],
     )
+
+
+def _changes(changes: Sequence[Change]) -> Rows:
+    return [
+        [
+            *(c.name, number(c.value), number(c.change), number(c.std), number(c.sigmas), c.unit),
+            *(number(c.torque), c.equation),
+        ]
+        for c in changes
+    ]
+
+
+def _test(what: str, found: Validation | Comparison, unless: str) -> list[str]:
+    """The line that says the chi-square test's result; none without a test."""
+    if not found.freedom:
+        return []
+    chance = f"{found.chance:.2g}" if found.chance else "below 1e-300"
+    degrees = "1 degree" if found.freedom == 1 else f"{found.freedom} degrees"
+    return [f"{what}: chi-square {found.chi2:.4g}, {degrees} of freedom, probability {chance} {unless}"]
 
 
 ERRORS = (
@@ -152,9 +161,11 @@ ERRORS = (
     "direction. Refitted: the R² that a new fit of these logs reaches on their last 30 %."
 )
 CHANGE_HEAD = ["Value", "In the file", "Change", "±", "In ±", "Unit", "Torque", "Equation"]
+NAMED = "The verdict's numbers: only these values and a load are fitted to the logs, all others stay those of the file."
 CHANGES = (
-    "What the logs say of each value by itself, minus the file's value. ± is one standard deviation of file and logs "
-    "together. Torque: the largest RMS over the joints that the change makes."
+    "All values are fitted to the logs together, for the chi-square test. So a named value has another change and a larger "
+    "± here than in the verdict. ± is one standard deviation of file and logs together. Torque: the largest RMS over the "
+    "joints that the change makes."
 )
 TORQUE = "Blue: observed; orange, dashed: predicted by the file; grey: the difference."
 BINNED = "Points: mean of measured minus predicted torque, each of a tenth of the samples. Band: plus and minus the RMS."
@@ -206,16 +217,13 @@ def comparison_page(found: Comparison) -> PageView:
         svg(partial(alone, partial(_curve, curve=curve)), PANEL, f"friction of joint {curve.joint}")
         for curve in found.curves
     )
-    chance = f"such differences have probability {found.chance:.2g} if the models are equal"
     return PageView(
         document="comparison",
         title=f"{found.robot}: A is {found.a}, B is {found.b}",
         head=f"a controller notices the difference at {len(found.noticed)} of {len(found.joints)} joints",
         kind="doubted" if lines else "",
         lines=lines,
-        more=[f"base parameters: chi-square {found.chi2:.4g}, {found.freedom} degrees of freedom; {chance}"]
-        if found.freedom
-        else [],
+        more=_test("base parameters", found, "if the models are equal"),
         tables=[each for each in tables if each.rows],
         figures=[FigureView("Friction", panels, "Each joint moves alone. Blue: A; orange, dashed: B.")]
         if panels

@@ -194,3 +194,20 @@ def test_a_hostile_name_stays_a_name(kr6: DynamicsModel, with_load: Path, tmp_pa
     found = replace(psdmc.identify_payload(kr6, with_load), frame=name)
     found.save(tmp_path / "load.toml")
     assert read_load(tmp_path / "load.toml").frame == name
+
+
+@pytest.mark.slow
+def test_half_a_kilogram_on_an_industrial_arm_is_a_changed_load(
+    calibrated: DynamicsModel, kr6: DynamicsModel, tmp_path: Path
+) -> None:
+    motion = sines(np.random.default_rng(4), 20.0, 0.2, Run().joints)
+    torque = motor_torques(motion, pin.Inertia(0.5, COM, INERTIA / 5.0))
+    torque += np.random.default_rng(5).normal(size=torque.shape) * np.array([0.3, 0.3, 0.3, 0.03, 0.03, 0.03])
+    log = Log("half", kr6.joint_names, motion.time, motion.q, None, torque, "motor_torque")
+    write_log(log, tmp_path / "half.csv")
+
+    found = psdmc.validate(calibrated, tmp_path / "half.csv")
+
+    assert found.word == "changed load"
+    assert found.load is not None
+    assert found.load.mass == pytest.approx(0.5, abs=3.0 * found.load.mass_std)

@@ -28,6 +28,12 @@ NOTICED = 0.5
 by an eighth than that of a new fit, on samples that this fit did not use. A smaller change does not matter."""
 MINOR = 0.1
 """The same share for one of several changes to be named."""
+FELT = 0.005
+"""RMS torque of all changes of a joint, as a share of the joint's RMS torque, from which they count: torque sensors and
+torque constants are hardly better. A controller notices ten times as much (compared.NOTICEABLE). Without noise, filters and
+differences of samples alone cause up to a tenth of it."""
+SMALLEST = 0.005
+"""Share of its value in the file by which a named value has changed at least: less would be printed as 0 %."""
 SURE = 3.0
 """Standard deviations that a named change has at least."""
 MOST_NAMED = 8
@@ -88,6 +94,7 @@ class Explanation:
     """A load at the tip and changed values of the calibrated file that together explain new logs.
 
     values  (u,) differences of all u values of the file, theta_b first
+    of_load (u,) those of them that the load makes
     load    the load; None: no load is needed
     named   the changed values
     left    chi-square of the differences that remain unexplained
@@ -95,6 +102,7 @@ class Explanation:
     """
 
     values: Array
+    of_load: Array
     load: LoadChange | None = None
     named: tuple[Change, ...] = ()
     left: OrNaN = float("nan")
@@ -107,6 +115,7 @@ class Changes:
     white     (r,) the differences in r independent directions that the logs determine, in standard deviations. The
               standard deviations are those of file and logs together
     by_value  (r, u) the entries of `white` for a difference of one in each value
+    noticed   whether some joint's torque differs by enough to matter
     """
 
     def __init__(self, found: Delivered, fit: LinearResult, rows: PredictedRows) -> None:
@@ -128,7 +137,9 @@ class Changes:
         left = residual - self.torque(solved.values)
         self.noise: Array = np.maximum(np.sqrt(np.mean(left**2, axis=0)), np.finfo(float).tiny)
         before, after = (np.mean(part[problem.held_out] ** 2, axis=0) for part in (residual, left))
-        self.noticed = bool(np.any(before > (1.0 + NOTICED**2) * after))
+        self.felt: Array = FELT * np.sqrt(np.mean(rows.measured**2, axis=0))
+        matters = (before > (1.0 + NOTICED**2) * after) & (before - after > self.felt**2)
+        self.noticed = bool(np.any(matters))
         squares = sum(np.sum(block.columns**2, axis=0) for block in problem.rows)
         self.effect: Array = np.asarray(np.sqrt(squares / len(residual)))
         seen = np.sum(solved.unseen**2, axis=1) < options.unseen_share
@@ -176,11 +187,15 @@ class Changes:
         In each step, the item that explains most of chi-square is added. The search ends if the remaining differences
         are no more than chance. A load has more parameters than a single value, so it explains more by chance.
         Therefore each parameter has a cost. But a load changes more often than a link, so a base parameter costs as
-        much as a load if a load is possible.
+        much as a load if a load is possible. A load that nobody would feel is no explanation.
         """
+        found = self._search(with_load=True)
+        return found if found.load is None or self._is_felt(found) else self._search(with_load=False)
+
+    def _search(self, with_load: bool) -> Explanation:
         price = float(stats.chi2.isf(CHANCE / self.size, 1))
         blocks = {k: self.by_value[:, [k]] for k in range(self.size) if self.by_value[:, k].any()}
-        onto = self._load_onto_values()
+        onto = self._load_onto_values() if with_load else None
         cost = price
         if onto is not None and self._mass_is_sure(load := self.by_value @ onto):
             blocks[LOAD] = load
@@ -217,13 +232,26 @@ class Changes:
         values, covariance = _solved(block, self.white)
         return bool(_resolved(block, 0) and abs(values[0]) > SURE * np.sqrt(covariance[0, 0]) > 0.0)
 
-    def _load_onto_values(self) -> Array | None:
-        """(u, 10) change of all values per load parameter; None if the model admits no load at its tip."""
+    def _is_felt(self, found: Explanation) -> bool:
+        """Whether the load alone changes some joint's torque by what counts."""
+        return bool(np.any(np.sqrt(np.mean(self.torque(found.of_load) ** 2, axis=0)) > self.felt))
+
+    @property
+    def refuses_load(self) -> str:
+        """Why no load at the tip can explain anything, as a sentence; empty if one can."""
         model = self.found.model
         try:
-            onto = load_map(model.mechanism, model.B, model.mechanism.tip_frame)
-        except InputError:
+            load_map(model.mechanism, model.B, model.mechanism.tip_frame)
+        except InputError as error:
+            return f"{error.message}: {error.hint}"
+        return ""
+
+    def _load_onto_values(self) -> Array | None:
+        """(u, 10) change of all values per load parameter; None if the model admits no load at its tip."""
+        if self.refuses_load:
             return None
+        model = self.found.model
+        onto = load_map(model.mechanism, model.B, model.mechanism.tip_frame)
         return np.concatenate([onto, np.zeros((self.by_value.shape[1] - model.l, onto.shape[1]))])
 
     def _delivered(
@@ -231,15 +259,15 @@ class Changes:
     ) -> Explanation:
         whole = np.zeros(self.by_value.shape[1])
         if not chosen:
-            return Explanation(whole, left=self.chi2)
+            return Explanation(whole, whole, left=self.chi2)
         values, covariance = _solved(_joined(blocks, chosen), self.white)
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        load, named, first = None, [], 0
+        load, of_load, named, first = None, np.zeros_like(whole), [], 0
         for k in chosen:
             own = slice(first, first + blocks[k].shape[1])
             first = own.stop
             if k == LOAD and onto is not None:
-                whole += onto @ values[own]
+                of_load = onto @ values[own]
                 mass = float(values[own][0])
                 shown = [_resolved(blocks[k], axis) for axis in (1, 2, 3)]
                 com = tuple(np.where(shown, values[own][1:4] / mass, np.nan).tolist())
@@ -247,13 +275,16 @@ class Changes:
                 continue
             whole[k] += values[own][0]
             change = self._change(k, float(values[own][0]), float(std[own][0]))
-            if (
-                np.any(self.effect[:, k] * abs(change.change) > MINOR * self.noise)
-                and abs(change.sigmas) > SURE
-            ):
+            if self._is_named(k, change):
                 named.append(change)
         left = self._left(blocks, chosen)
-        return Explanation(whole, load, tuple(named), float(left @ left), len(chosen))
+        return Explanation(whole + of_load, of_load, load, tuple(named), float(left @ left), len(chosen))
+
+    def _is_named(self, k: int, change: Change) -> bool:
+        """Whether a change of value k is certain, changes some joint's torque by a share of what counts, and is not 0 %."""
+        least = MINOR * np.maximum(self.noise, self.felt / NOTICED)
+        felt = bool(np.any(self.effect[:, k] * abs(change.change) > least))
+        return felt and abs(change.sigmas) > SURE and abs(change.change) > SMALLEST * abs(change.value)
 
 
 LOAD = -2
@@ -279,14 +310,20 @@ def _resolved(columns: Array, k: int) -> bool:
 
 def _file_covariance(found: Delivered, fit: LinearResult, solved: Estimate) -> Array:
     """(u, u) of the file's values. Friction, of which files keep standard deviations only, is taken as correlated like the
-    new logs' friction is, and as independent of theta_b; what the file does not know as far off as is believable."""
+    new logs' friction is, and as independent of theta_b; what the file does not know as far off as is believable.
+
+    Standard deviations of the file are those of noise in the fitted motion. They are widened by how much larger the errors
+    of the calibration's test are: friction's by those of its joint, theta_b's by the worst of all joints.
+    """
     kept, l = found.model.calibrated, found.model.l
     assert kept is not None
     problem = fit.problem
     believable = found.linear.fit.seen * solved.scale
     stds = by_joint(replace(row, value=row.std) for row in (*kept.friction, *kept.springs))
     owners = [*problem.plain, *((unknown.owner, unknown.name) for unknown in problem.columns.unknowns)]
-    std = np.array([*kept.std, *(stds.get(owner, np.inf) for owner in owners)])
+    worst = max(found.misfit.values(), default=1.0)
+    wider = [found.misfit.get(owner, worst) for owner, _ in owners]
+    std = np.array([*kept.std, *(stds.get(owner, np.inf) for owner in owners)]) * [*[worst] * l, *wider]
     std = np.where(np.isfinite(std) & (std > 0.0), std, believable)
     sizes = np.sqrt(np.diag(solved.total_covariance))
     sizes[sizes == 0.0] = np.inf
@@ -298,5 +335,5 @@ def _file_covariance(found: Delivered, fit: LinearResult, solved: Estimate) -> A
     if kept.covariance is not None:
         own = np.sqrt(np.diag(kept.covariance))
         missing = np.where(own > 0.0, 0.0, believable[:l])
-        covariance[:l, :l] = kept.covariance + np.diag(missing**2)
+        covariance[:l, :l] = worst**2 * kept.covariance + np.diag(missing**2)
     return np.asarray(covariance)

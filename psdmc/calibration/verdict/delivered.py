@@ -39,7 +39,7 @@ from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
 from psdmc.model import recursive
-from psdmc.model.calibrated import Prediction, StepQuality, by_joint
+from psdmc.model.calibrated import WHOLE, Prediction, StepQuality, by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
 from psdmc.model.store import save
@@ -92,6 +92,20 @@ class Delivered:
             coupling=law.coupling,
             columns=self.columns,
         )
+
+    @property
+    def misfit(self) -> Mapping[str, float]:
+        """Return by joint name how many times larger the calibration's RMSE is in its test than in its fit, at least 1.
+
+        More than 1 shows that the model lacks an effect, so that another motion would give other values.
+        """
+        kept = self.model.calibrated
+        joints = {} if kept is None else {step.step: step.joints for step in kept.steps}.get(WHOLE, {})
+        ratios = {
+            name: own.held_out.rmse / own.fit.rmse if own.fit.rmse > 0.0 else 1.0
+            for name, own in joints.items()
+        }
+        return {name: max(1.0, ratio) if np.isfinite(ratio) else 1.0 for name, ratio in ratios.items()}
 
     @property
     def motors(self) -> Motors:

@@ -113,6 +113,16 @@ def test_what_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path, data:
     assert len(raised.value.message) < 400
 
 
+@pytest.mark.parametrize(
+    ("rows", "remedy"), [(b"0,1,2\n1,2", "delete this line"), (b"0,1\n1,2,3", "one cell per")]
+)
+def test_a_file_that_ends_within_a_line_gets_its_remedy(rows: bytes, remedy: str):
+    with pytest.raises(InputError) as raised:
+        list(FORMAT.pieces(io.BytesIO(HEADER.encode() + b"\n" + rows), "run.csv")[1])
+
+    assert remedy in (raised.value.hint or "")
+
+
 def test_decimal_commas_under_commas_get_their_remedy():
     with pytest.raises(InputError) as raised:
         list(FORMAT.pieces(io.BytesIO(HEADER.encode() + b'\n0,"1,5",2\n'), "run.csv")[1])

@@ -206,6 +206,11 @@ def test_the_page_and_its_numbers_are_the_result_s(files, folder: Path):
     assert "noticed: elbow: feed-forward torque differs by" in done.stdout
     assert said == {"schema": 1, "kind": "comparison", **found.as_json()}
     assert page.count("<svg") == 2
+    line = (
+        f"base parameters: chi-square {found.chi2:.4g}, 7 degrees of freedom, probability {found.chance:.2g}"
+    )
+    assert f"\n{line} if the models are equal\n" in done.stdout
+    assert f"<p>{line} if the models are equal</p>" in page
     (folder / "taken.json").write_text("{}", encoding="utf-8")
     taken = typed("compare", files[0], files[2], "--report", folder / "taken.html")
     assert taken.returncode == 2

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
+from dataclasses import replace
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -20,6 +23,7 @@ from psdmc.calibration.validation import Validation, validate
 from psdmc.calibration.verdict import changes
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.report.validate_report import validation_page
 
 LOAD = Payload(0.5, (0.05, -0.02, 0.0))
 
@@ -57,6 +61,70 @@ def test_an_unchanged_arm_is_still_valid_and_figures_are_the_log_s(file: Path, f
         assert joint.rms < joint.largest < 5.0 * joint.rms
         assert joint.r2 > 0.999
         assert len(joint.by_speed) == len(joint.by_time) == 10
+
+
+@pytest.fixture(scope="module")
+def ideal(arm, table: Path, folder: Path) -> DynamicsModel:
+    """A model that a log without noise calibrated, so that its standard deviations are tiny."""
+    return psdmc.calibrate(arm.model, recorded(folder, "ideal", Worn(seed=100, noise=0.0), table)).model
+
+
+WORN = (VISCOUS[0], 1.1 * VISCOUS[1])
+
+
+@pytest.mark.parametrize(
+    ("how", "word", "named"),
+    [
+        pytest.param(Worn(seed=5), "still valid", [], id="same"),
+        pytest.param(Worn(seed=10), "still valid", [], id="other motion"),
+        pytest.param(Worn(seed=11), "still valid", [], id="third motion"),
+        pytest.param(Worn(seed=1, load=Payload(0.0003, LOAD.com)), "still valid", [], id="0.3 g"),
+        pytest.param(Worn(seed=1, load=Payload(0.002, LOAD.com)), "still valid", [], id="2 g"),
+        pytest.param(Worn(seed=1, load=Payload(0.1, LOAD.com)), "changed load", [], id="100 g"),
+        pytest.param(Worn(seed=2, viscous=WORN), "drifted", ["viscous of elbow"], id="friction"),
+        pytest.param(
+            Worn(seed=3, viscous=WORN, load=Payload(0.0003, LOAD.com)),
+            "drifted",
+            ["viscous of elbow"],
+            id="friction and 0.3 g",
+        ),
+        pytest.param(
+            Worn(seed=2, viscous=(1.1 * VISCOUS[0], 1.004 * VISCOUS[1])),
+            "drifted",
+            ["viscous of shoulder"],
+            id="friction, and 0.4 % of another",
+        ),
+    ],
+)
+def test_without_noise_only_what_changes_a_torque_counts(ideal, folder: Path, table: Path, how, word, named):
+    found = validate(ideal, recorded(folder, "of_ideal", replace(how, noise=0.0), table))
+
+    assert found.word == word
+    assert [change.name for change in found.named] == named
+    if how.load is not None and word == "changed load":
+        assert found.load is not None
+        assert found.load.mass == pytest.approx(how.load.mass, rel=0.02)
+    if named:
+        assert found.named[0].change == pytest.approx(0.1 * found.named[0].value, rel=0.02)
+
+
+@pytest.mark.parametrize(("seed", "pace", "doubts"), [(31, 0.5, []), (41, 0.7, ["none_sure"])])
+def test_a_motion_that_the_model_predicts_badly_shows_no_change(
+    arm, folder: Path, table: Path, seed: int, pace: float, doubts: list[str]
+):
+    """Friction that grows with speed^0.6, of which a fast motion needs other values than a slow one. The test of the
+    calibration shows this."""
+    fast = Worn(seed=seed + 1, viscosity="viscous^0.6")
+    slow = recorded(folder, "slow", replace(fast, seed=seed, pace=pace), table)
+    log = recorded(folder, "fast", fast, table)
+    model = psdmc.calibrate(arm.model, slow, validation=log).model
+
+    found = validate(model, log)
+    worn = validate(model, recorded(folder, "fast_worn", replace(fast, viscous=(4.0, 2.4)), table))
+
+    assert (found.word, found.as_json()["codes"]["doubts"]) == ("still valid", doubts)
+    assert worn.word == "drifted"
+    assert all(change.name.endswith("of elbow") for change in worn.named)
 
 
 def test_viscous_friction_that_grew_by_half_is_named_with_its_change(file: Path, folder: Path, table: Path):
@@ -123,6 +191,98 @@ def test_errors_are_also_said_in_amperes_where_the_constants_are_known(arm, fold
         assert joint.largest_current == pytest.approx(joint.largest / constant)
 
 
+def printed_next(done: CompletedProcess[str]) -> list[str]:
+    """The words of the command that the last line suggests, without `psdmc`."""
+    said, program, *words = shlex.split(done.stderr.splitlines()[-1])
+    assert (said, program) == ("next:", "psdmc")
+    return words
+
+
+RENAMED = ("--joint-map", "m1=shoulder,m2=elbow")
+
+
+@pytest.fixture(scope="module")
+def electric(arm, folder: Path, table: Path) -> Path:
+    """A model that a campaign of one motion and one for the test calibrated, from logs of currents; their folder."""
+    campaign, run = folder / "campaign", '[[run]]\nstep = "{}"\nlog = "{}.csv"\n'
+    campaign.mkdir()
+    for seed, step in ((11, "inertial"), (12, "validation")):
+        recorded(campaign, step, Worn(seed=seed, quantity="current"), table)
+    text = "".join(run.format(step, step) for step in ("inertial", "validation"))
+    (campaign / "campaign.toml").write_text(text, encoding="utf-8")
+    constants = dict(zip(arm.model.joint_names, CONSTANTS.tolist(), strict=True))
+    psdmc.save(psdmc.calibrate(arm.model, campaign, torque_constants=constants).model, campaign / "model.npz")
+    return campaign
+
+
+def test_the_motion_that_tested_a_campaign_was_not_fitted(electric: Path):
+    found, again = (
+        validate(electric / "model.npz", electric),
+        validate(electric / "model.npz", electric / "inertial.csv"),
+    )
+
+    assert (found.word, found.doubts) == ("still valid", ())
+    assert set(found.r2_by_log) == {"validation.csv"}
+    assert again.as_json()["codes"]["doubts"] == ["used_before"]
+
+
+def test_the_next_line_calibrates_from_currents_again(electric: Path, folder: Path, table: Path):
+    how = Worn(seed=13, quantity="current", viscous=WORN)
+    text = recorded(folder, "worn_amperes", how, table).read_text(encoding="utf-8")
+    (folder / "other names.csv").write_text(
+        text.replace(".shoulder", ".m1").replace(".elbow", ".m2"), encoding="utf-8"
+    )
+
+    done = typed("validate", electric / "model.npz", folder / "other names.csv", *RENAMED)
+    again = typed(*printed_next(done), cwd=folder)
+
+    assert done.returncode == 5
+    assert again.returncode == 0, again.stderr
+    assert (
+        "note: torque constants are those of the calibrated input model: shoulder=12, elbow=5 N m/A"
+        in again.stdout
+    )
+    now = psdmc.load(folder / "model_new.npz").calibrated
+    assert now is not None
+    assert [row.value for row in now.motors] == pytest.approx(CONSTANTS)
+    (viscous,) = [row for row in now.friction if (row.joint, row.name) == ("elbow", "viscous")]
+    assert viscous.value == pytest.approx(WORN[1], abs=4.0 * viscous.std)
+
+
+def test_the_next_line_finds_the_load_of_a_campaign_s_log(
+    electric: Path, folder: Path, table: Path, tmp_path: Path
+):
+    for name in ("campaign.toml", "inertial.csv"):
+        (tmp_path / name).write_bytes((electric / name).read_bytes())
+    log = recorded(tmp_path, "validation", Worn(seed=14, quantity="current", load=LOAD), table)
+    given = ",".join(f"{name}={value}" for name, value in zip(("shoulder", "elbow"), CONSTANTS, strict=True))
+
+    done = typed("validate", electric / "model.npz", tmp_path, "--torque-constants", given)
+    again = typed(*printed_next(done), cwd=tmp_path)
+
+    assert done.returncode == 5
+    assert printed_next(done)[:3] == ["payload", str(electric / "model.npz"), str(log)]
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "load.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("load", "word"), [(Payload(0.5, (0.05, 0, 0)), "drifted"), (LOAD, "log not usable")]
+)
+def test_a_load_on_a_link_that_admits_none_is_said(arm, folder: Path, table: Path, load: Payload, word: str):
+    model = psdmc.derive(table, assume_zero=["link2:my"])
+    model = psdmc.calibrate(model, recorded(folder, "zeros", Worn(seed=41), table)).model
+
+    found = validate(model, recorded(folder, "zeros_loaded", Worn(seed=42, load=load), table))
+
+    assert found.word == word
+    assert found.as_json()["codes"]["doubts"][-1] == "refuses_load"
+    assert (
+        "if the robot carries a load, this model cannot show it: link 'link2' cannot carry"
+        in found.doubts[-1]
+    )
+
+
 def spoiled(path: Path, how: str) -> Path:
     effort = read_log(path).effort
     if how == "clipped":
@@ -160,6 +320,20 @@ def test_a_log_of_an_arm_of_another_length_is_not_usable(file: Path, folder: Pat
     assert "wrong_gains" in found.as_json()["codes"]["reasons"]
 
 
+def test_links_that_seem_to_wear_are_doubted(file: Path, folder: Path, table: Path):
+    text = table.read_text(encoding="utf-8").replace("com = [-0.15, 0.02,", "com = [-0.2, 0.1,")
+    text = text.replace("drive_inertia = 0.3", "drive_inertia = 0.6").replace(
+        "drive_inertia = 0.1", "drive_inertia = 0.3"
+    )
+    (folder / "rebuilt.toml").write_text(text, encoding="utf-8")
+
+    found = validate(file, recorded(folder, "of_rebuilt", Worn(seed=17), folder / "rebuilt.toml"))
+
+    assert found.exit_status == 5
+    assert found.as_json()["codes"]["doubts"] == ["other_links"]
+    assert "is the log another robot's, or has the robot been rebuilt?" in found.doubts[0]
+
+
 def test_more_changes_than_a_worn_robot_has_are_another_robot_s(
     file: Path, folder: Path, table: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -185,6 +359,10 @@ def test_the_log_of_the_calibration_itself_is_doubted_first(file: Path, folder: 
     assert (said["kind"], said["word"], said["exit_status"]) == ("validation", "still valid", 0)
     assert "used_before" in said["codes"]["doubts"]
     assert page.count("<svg") == 6
+    test = f"chi-square {said['chi2']:.4g}, {said['freedom']} degrees of freedom, probability {said['chance']:.2g}"
+    line = f"all changes: {test}"
+    assert f"{line} if the robot is unchanged" in done.stdout
+    assert f"<p>{line} if the robot is unchanged</p>" in page
     assert f"{said['joints'][0]['r2']:.4f}" in page
 
 
@@ -201,6 +379,22 @@ def test_the_command_ends_with_the_verdict_s_status_and_the_next_step(file: Path
     assert done.stderr.splitlines()[-1] == f"next: psdmc payload {file} {log} -o load.toml"
     assert clipped.returncode == 6
     assert json.loads(clipped.stdout)["word"] == "log not usable"
+
+
+def test_the_page_has_the_verdict_s_change_and_says_why_the_other_table_differs(
+    file: Path, folder: Path, table: Path
+):
+    found = validate(
+        file, recorded(folder, "viscous", Worn(seed=5, viscous=(VISCOUS[0], 1.5 * VISCOUS[1])), table)
+    )
+
+    tables = {each.title: each for each in validation_page(found).tables}
+    (named,) = tables["Named changes"].rows
+    (alike,) = [row for row in tables["Changes of all values"].rows if row[0] == named[0]]
+    assert named[0] == "viscous of elbow"
+    assert float(named[2]) == pytest.approx(found.named[0].change, rel=0.01)
+    assert float(alike[3]) > float(named[3])
+    assert "a named value has another change" in tables["Changes of all values"].caption
 
 
 def test_a_model_that_was_not_calibrated_and_a_missing_log_are_refused(arm, file: Path, folder: Path):

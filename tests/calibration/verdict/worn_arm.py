@@ -19,13 +19,19 @@ COULOMB, VISCOUS = (3.0, 1.2), (4.0, 1.5)
 
 @dataclass(frozen=True)
 class Worn:
-    """What is changed of the arm, and how its log is recorded."""
+    """What is changed of the arm, and how its log is recorded; without noise, sensors are ideal.
+
+    viscosity  its friction law, such as "viscous^2"
+    pace       speed of the motion
+    """
 
     seed: int = 1
     viscous: tuple[float, float] = VISCOUS
     load: Payload | None = None
     quantity: str = "motor_torque"
     noise: float = 0.01
+    viscosity: str = "viscous"
+    pace: float = 1.0
     seconds: float = 20.0
 
 
@@ -33,17 +39,24 @@ def recorded(folder: Path, name: str, how: Worn, table: Path) -> Path:
     """A log `name`.csv in a folder; table: the arm's DH table."""
     lines = [
         f'robot = "{table}"',
-        'friction = ["coulomb", "viscous"]',
-        f"[sensors]\nposition_step = 5e-7\ncurrent_noise = {how.noise}\ncurrent_step = 1e-3",
+        f'friction = ["coulomb", "{how.viscosity}"]',
     ]
+    if how.noise:
+        lines.append(f"[sensors]\nposition_step = 5e-7\ncurrent_noise = {how.noise}\ncurrent_step = 1e-3")
     for k, joint in enumerate(("shoulder", "elbow")):
         lines += [f'[[joint]]\nname = "{joint}"\ntorque_constant = {CONSTANTS[k]}']
-        lines += [f"coulomb = {COULOMB[k]}\nviscous = {how.viscous[k]}"]
+        lines += [f"coulomb = {COULOMB[k]}", f'"{how.viscosity}" = {how.viscous[k]}']
     plant = folder / f"{name}.toml"
     plant.write_text("\n".join(lines), encoding="utf-8")
     rng = np.random.default_rng(how.seed)
     time = np.arange(0.0, how.seconds, 0.01)
-    w = 2.0 * np.pi * np.array([[0.31, 0.47], [0.83, 0.71], [1.13, 1.37]]) * rng.uniform(0.8, 1.2, (3, 2))
+    w = (
+        how.pace
+        * 2.0
+        * np.pi
+        * np.array([[0.31, 0.47], [0.83, 0.71], [1.13, 1.37]])
+        * rng.uniform(0.8, 1.2, (3, 2))
+    )
     turning = time[:, None, None] * w + rng.uniform(0.0, 6.0, (3, 2))
     q, qd = 0.2 * np.sin(turning).sum(axis=1), 0.2 * (w * np.cos(turning)).sum(axis=1)
     qdd = -0.2 * (w**2 * np.sin(turning)).sum(axis=1)

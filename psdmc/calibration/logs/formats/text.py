@@ -210,7 +210,8 @@ def _numbers(body: str, separator: str) -> Array | None:
 
 def _first_fault(body: str, names: Sequence[str], separator: str, first: int, name: str) -> InputError:
     """The fault of the first wrong line; `first` is the number of the body's first line."""
-    for number, line in enumerate(body.split("\n"), start=first):
+    lines = body.split("\n")
+    for number, line in enumerate(lines, start=first):
         if not line:
             continue
         try:
@@ -220,9 +221,12 @@ def _first_fault(body: str, names: Sequence[str], separator: str, first: int, na
                 f"{name}: line {number}: {error}", "export it as plain numbers separated by commas"
             )
         if len(cells) != len(names):
+            is_cut = line is lines[-1] and len(cells) < len(names)  # no line end follows
             return InputError(
                 f"{name}: line {number} has {len(cells)} cells under {len(names)} names",
-                "each line has one cell per column",
+                "the file ends within its last line: delete this line, or copy the log again"
+                if is_cut
+                else "each line has one cell per column",
             )
         for column, cell in zip(names, cells, strict=True):
             if not is_number(cell):
