@@ -67,11 +67,16 @@ def test_check_passes_pinocchios_free_flyer(work: Path) -> None:
     assert "the mass matrix is positive definite" in done.stdout
 
 
-def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
+@pytest.fixture(scope="module")
+def package(work: Path) -> Path:
     functions = "inverse_dynamics,neutral,integrate,difference"
     done = typed("emit-c", "solo12.npz", "-o", "solo", "--functions", functions, cwd=work)
     assert done.returncode == 0, done.stderr
-    header = (work / "solo/include/solo/solo.h").read_text(encoding="utf-8")
+    return work / "solo"
+
+
+def test_its_package_is_built_and_passes_its_own_test(work: Path, package: Path) -> None:
+    header = (package / "include/solo/solo.h").read_text(encoding="utf-8")
     assert "solo_NQ 19" in header
     assert "solo_NV 18" in header
     assert "Robot: solo, a floating base in the world (universe)" in header
@@ -82,10 +87,10 @@ def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
     assert "on link FL_SHOULDER" in header
     assert "on link universe; q[0..6], rates[0..5]" in header
     assert "on link FL_SHOULDER; q[8], rates[7]" in header
-    readme = (work / "solo/README.md").read_text(encoding="utf-8")
+    readme = (package / "README.md").read_text(encoding="utf-8")
     assert "q[solo_NQ], ...;" in readme
     assert "`solo_integrate(q, v, q)` moves q by v, rates times seconds" in readme
-    root, hip = json.loads((work / "solo/manifest.json").read_text(encoding="utf-8"))["joints"][:2]
+    root, hip = json.loads((package / "manifest.json").read_text(encoding="utf-8"))["joints"][:2]
     assert (root["nq"], root["nv"], root["parent"]) == (7, 6, "universe")
     assert (hip["parent"], "nq" in hip) == ("base_link", False)
     built = typed("build", "solo", cwd=work, CC=str(wrapper(work)))
@@ -123,10 +128,10 @@ int main(void)
 """What README tells: begin at the neutral position, move, and ask for torques there."""
 
 
-def test_a_c_program_moves_it_as_readme_says(work: Path, oracle: pin.Model) -> None:
+def test_a_c_program_moves_it_as_readme_says(work: Path, package: Path, oracle: pin.Model) -> None:
     (work / "main.c").write_text(PROGRAM, encoding="utf-8")
-    sources = [str(path) for path in sorted((work / "solo/src").glob("*.c"))]
-    command = [*find_compiler().command, "-std=c99", f"-I{work}/solo/include", str(work / "main.c"), *sources]
+    sources = [str(path) for path in sorted((package / "src").glob("*.c"))]
+    command = [*find_compiler().command, "-std=c99", f"-I{package}/include", str(work / "main.c"), *sources]
     subprocess.run([*command, "-lm", "-o", str(work / "main")], check=True)
     printed = subprocess.run([str(work / "main")], check=True, capture_output=True, text=True).stdout.split()
     q, way, tau = np.split(np.array(printed, dtype=float), [oracle.nq, oracle.nq + oracle.nv])
