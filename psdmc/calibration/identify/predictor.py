@@ -27,6 +27,10 @@ class Regressor(Protocol):
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array: ...
 
 
+IN_CACHE = 1024
+"""States whose regressors are filled at once."""
+
+
 class ChainRegressor:
     """The regressor of a model, computed in NumPy by the Newton-Euler recursion. It needs no compiler."""
 
@@ -36,20 +40,29 @@ class ChainRegressor:
         self._link_frames = [joint.link_frame for joint in chain.joints]
         self._base = base_acceleration(chain)
         self._shape = (chain.nv, model.l)
-        self._expand = expansion(model)
-        self._wanted = [int(k) for k in np.flatnonzero(np.abs(self._expand).any(axis=1))]
+        expand = expansion(model)
+        self._wanted = [int(k) for k in np.flatnonzero(np.abs(expand).any(axis=1))]
+        self._factors = {
+            j: [(int(k), float(expand[j, k])) for k in np.flatnonzero(expand[j])] for j in self._wanted
+        }
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         q, qd, qdd = (np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0) for a in (q, qd, qdd))
         rows = regressor(
             self._frames, self._link_frames, self._wanted, list(q), list(qd), list(qdd), self._base
         )
-        out = np.zeros((*q.shape[1:], *self._shape))
-        for i, row in enumerate(rows):
-            if row:
-                stacked = np.stack([np.broadcast_to(value, q.shape[1:]) for value in row.values()], axis=-1)
-                out[..., i, :] = stacked @ self._expand[list(row)]
-        return out
+        out = np.zeros((q[0].size, *self._shape))
+        terms = [
+            (i, k, factor, np.broadcast_to(value, q.shape[1:]).reshape(-1))
+            for i, row in enumerate(rows)
+            for j, value in row.items()
+            for k, factor in self._factors[j]
+        ]
+        for first in range(0, len(out), IN_CACHE):  # each state's matrix stays in the cache while it is filled
+            part = slice(first, first + IN_CACHE)
+            for i, k, factor, values in terms:
+                out[part, i, k] += values[part] if factor == 1.0 else factor * values[part]
+        return out.reshape(*q.shape[1:], *self._shape)
 
 
 def expansion(model: DynamicsModel) -> Array:
