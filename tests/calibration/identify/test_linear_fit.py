@@ -6,14 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bundled import bundled_model, bundled_robot
+from random_chains import Oracle
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
+from psdmc.calibration.identify import predictor
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.physical import nearest_physical
+from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.errors import InputError
+from psdmc.robot.reference import Reference
 
 HELD = LinearOptions(split=SplitOptions(held_out=0.3, blocks=0))
 
@@ -122,3 +127,24 @@ def smallest_inertia(arm, theta_b: np.ndarray) -> float:
     gravity = arm.regressor.regressor(q, zero, zero) @ theta_b
     columns = [arm.regressor.regressor(q, zero, zero + unit) @ theta_b - gravity for unit in np.eye(2)]
     return float(np.linalg.eigvalsh(np.stack(columns, axis=-1)).min())
+
+
+def test_the_regressor_in_numpy_is_pinocchios(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where base parameters make several parameters of bodies, with any factors, and in more states than are filled
+    at once; and of one state."""
+    model, oracle = bundled_model("lbr7"), Oracle(bundled_robot("lbr7").mechanism)
+    rng = np.random.default_rng(5)
+    q, qd, qdd = rng.uniform(-1.0, 1.0, (3, 2500, model.n))
+    theta_b = np.asarray(model.theta_b)
+    mixed = rng.uniform(-1.0, 1.0, (model.l, model.l))
+    whole = predictor.expansion(model) @ mixed
+    expected = Reference(oracle.model, "tip").inverse_dynamics(q, qd, qdd)
+
+    plain = ChainRegressor(model).regressor(q, qd, qdd)
+    monkeypatch.setattr(predictor, "expansion", lambda model: whole)
+    found = ChainRegressor(model).regressor(q, qd, qdd)
+
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(plain @ theta_b, expected, atol=1e-12 * scale)
+    np.testing.assert_allclose(found @ np.linalg.solve(mixed, theta_b), expected, atol=1e-9 * scale)
+    np.testing.assert_allclose(ChainRegressor(model).regressor(q[7], qd[7], qdd[7]), found[7], rtol=1e-13)
