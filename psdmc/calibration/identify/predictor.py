@@ -28,7 +28,7 @@ class Regressor(Protocol):
 
 
 IN_CACHE = 1024
-"""States whose regressors are filled at once."""
+"""States whose regressors are filled at once, so that they stay in the cache."""
 
 
 class ChainRegressor:
@@ -58,7 +58,7 @@ class ChainRegressor:
             for j, value in row.items()
             for k, factor in self._factors[j]
         ]
-        for first in range(0, len(out), IN_CACHE):  # each state's matrix stays in the cache while it is filled
+        for first in range(0, len(out), IN_CACHE):
             part = slice(first, first + IN_CACHE)
             for i, k, factor, values in terms:
                 out[part, i, k] += values[part] if factor == 1.0 else factor * values[part]
