@@ -1,4 +1,4 @@
-"""Time and memory of `psdmc calibrate` on a long log: the figures of docs/calibration.md.
+"""Time and memory of `psdmc calibrate` on a long log: the figures of docs/campaigns.md.
 
 python docs/long_log.py ROWS [csv|parquet|npz] [--rate HZ]
 
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import argparse
 import os
-import resource
 import subprocess
 import sys
 import tempfile
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +51,10 @@ def synthetic_log(model: DynamicsModel, rows: int, rate: float) -> Log:
     return Log("long", model.joint_names, time, np.round(q / 1e-6) * 1e-6, None, tau, "motor_torque")
 
 
+def _written(model: DynamicsModel, rows: int, rate: float, log: Path) -> None:
+    write_log(synthetic_log(model, rows, rate), log)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -63,14 +67,20 @@ def main() -> None:
         model, log = Path(folder) / "m.npz", Path(folder) / f"log.{options.table}"
         known = derive(ROBOT, drive_inertia=True)
         save(known, model)
-        write_log(synthetic_log(known, options.rows, options.rate), log)
+        # In a process of its own: a child's largest memory includes that of the process that starts it.
+        writer = get_context("spawn").Process(target=_written, args=(known, options.rows, options.rate, log))
+        writer.start()
+        writer.join()
         size = log.stat().st_size
         words = ["-m", "psdmc", "calibrate", str(model), str(log), "-o", str(Path(folder) / "out.npz")]
-        done = subprocess.run([sys.executable, *words], env=os.environ, capture_output=True, text=True)
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(done.stdout[:400] or done.stderr)
+        with (Path(folder) / "said").open("w+b") as said:
+            started = subprocess.Popen([sys.executable, *words], stdout=said, stderr=subprocess.STDOUT)
+            _, status, used = os.wait4(started.pid, 0)
+            code = os.waitstatus_to_exitcode(status)
+            said.seek(0)
+            print(said.read().decode()[:400])
     print(
-        f"{options.rows:,} rows, {size / 2**20:.0f} MiB {options.table}: exit {done.returncode}, {used.ru_utime:.1f} s "
+        f"{options.rows:,} rows, {size / 2**20:.0f} MiB {options.table}: exit {code}, {used.ru_utime:.1f} s "
         f"user, {used.ru_stime:.1f} s system, {used.ru_maxrss / 1024:.0f} MiB at most"
     )
 

@@ -113,8 +113,11 @@ def validation_logs(path: str | Path) -> tuple[Path, ...]:
 
 
 def tested_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...]:
-    """Return the logs of a campaign that test a calibrated model: those of its validation runs, or if it has none, those
-    of its exciting motions without a load. Raises InputError if the campaign has neither, or moves an unknown joint."""
+    """Return the logs of a campaign that test a calibrated model.
+
+    They are those of its validation runs, or if it has none, those of its exciting motions without a load. Raises
+    InputError if the campaign has neither, or moves an unknown joint.
+    """
     runs = listed_runs(path)
     _require_joints(runs, joint_names, path)
     found = validation_logs(path) or tuple(

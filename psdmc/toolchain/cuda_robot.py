@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from psdmc.backends.cuda.package import BLOCK
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
 from psdmc.program.signature import Quantity, Signature
@@ -20,9 +21,6 @@ from psdmc.toolchain.device_arrays import DeviceArray, Seen, seen
 from psdmc.toolchain.interface import Interface
 from psdmc.toolchain.nvrtc import machine_code
 from psdmc.toolchain.stubs import documentation
-
-BLOCK = 128
-"""Threads of a block, as templates/cuda/sizes.jinja says."""
 
 
 @dataclass(frozen=True, slots=True)

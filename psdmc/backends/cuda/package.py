@@ -18,6 +18,9 @@ from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Sizes
 from psdmc.target.presets import SCALAR
 
+BLOCK = 128
+"""Most threads of a block."""
+
 TAKEN = frozenset({"state", "states", "status", "stream", "tile", "here", "first"})
 """Names of the CUDA code's own; no input or output may have one."""
 
@@ -134,6 +137,7 @@ class CudaPackage:
 
     package: PackageView
     description: tuple[str, ...]
+    block: int = BLOCK
 
     @property
     def functions(self) -> tuple[tuple[str, tuple[DeviceFunction, ...]], ...]:

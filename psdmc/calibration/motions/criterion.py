@@ -73,8 +73,9 @@ class Scaled:
                 return self.log_det
 
     def times(self, other: Scaled, objective: Objective) -> float:
-        """Return how many times the measure of an objective is that of other columns: of "log_det", the geometric mean of
-        the semi-axes of the parameters' confidence ellipsoid."""
+        """Return how many times the measure of an objective is that of other columns.
+
+        For "log_det", the measure is the geometric mean of the semi-axes of the parameters' confidence ellipsoid."""
         if objective == "log_det":
             return float(np.exp(0.5 * (self.log_det - other.log_det) / len(self.lengths)))
         return self.score(objective) / other.score(objective)
