@@ -12,47 +12,63 @@ import os
 import subprocess
 import sys
 import tempfile
+from contextlib import ExitStack
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+import pyarrow
+from pyarrow import parquet
 
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import write_log
+from psdmc.calibration.logs.log_files import columns_of, write_columns
 from psdmc.compiler import derive
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import save
+from psdmc.reproducible import in_any_order
 
 ROBOT = Path(__file__).resolve().parents[1] / "examples" / "robots" / "lbr7.toml"
-AT_ONCE = 100_000
-"""Rows whose torques are computed at once."""
+AT_ONCE = 500_000
+"""Rows that are computed and written at once."""
 
 
-def synthetic_log(model: DynamicsModel, rows: int, rate: float) -> Log:
+def rows_of_log(model: DynamicsModel, first: int, last: int, rate: float) -> Log:
     """Three sines a joint, torques by Newton-Euler, friction and noise; positions rounded to 1e-6 rad."""
-    time = np.arange(rows) / rate
+    time = np.arange(first, last) / rate
     n = model.n
-    q, qd, qdd = (np.zeros((rows, n)) for _ in range(3))
+    q, qd, qdd = (np.zeros((len(time), n)) for _ in range(3))
     for size, low in ((0.5, 0.11), (0.25, 0.31), (0.1, 0.73)):
         w = 2 * np.pi * low * (1 + 0.13 * np.arange(n))
         angle = w * time[:, None] + np.arange(n)
         q += size * np.sin(angle)
         qd += size * w * np.cos(angle)
         qdd -= size * w**2 * np.sin(angle)
-    parameters = model.equivalent_parameters()
-    tau = np.concatenate(
-        [
-            recursive.torques(model.mechanism, parameters, [part[k : k + AT_ONCE] for part in (q, qd, qdd)])
-            for k in range(0, rows, AT_ONCE)
-        ]
-    )
-    tau += 2.0 * np.tanh(qd / 0.03) + 3.0 * qd + 0.3 * np.random.default_rng(1).standard_normal(tau.shape)
+    with in_any_order():
+        tau = recursive.torques(model.mechanism, model.equivalent_parameters(), [q, qd, qdd])
+    tau += 2.0 * np.tanh(qd / 0.03) + 3.0 * qd
+    tau += 0.3 * np.random.default_rng([1, first]).standard_normal(tau.shape)
     return Log("long", model.joint_names, time, np.round(q / 1e-6) * 1e-6, None, tau, "motor_torque")
 
 
 def _written(model: DynamicsModel, rows: int, rate: float, log: Path) -> None:
-    write_log(synthetic_log(model, rows, rate), log)
+    """Parquet in pieces, as a day of rows is larger than memory; other tables at once."""
+    pieces = (
+        columns_of(rows_of_log(model, first, min(first + AT_ONCE, rows), rate))
+        for first in range(0, rows, AT_ONCE)
+    )
+    if log.suffix != ".parquet":
+        all_pieces = list(pieces)
+        write_columns(
+            {name: np.concatenate([one[name] for one in all_pieces]) for name in all_pieces[0]}, log
+        )
+        return
+    with ExitStack() as stack:
+        writer = None
+        for piece in pieces:
+            table = pyarrow.table(piece)
+            writer = writer or stack.enter_context(parquet.ParquetWriter(log, table.schema))
+            writer.write_table(table)
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -148,18 +149,18 @@ def _read(
         pieces = _pieces(next(iter(tables.values())), columns, clock, time.dates)
     else:
         pieces = _side_by_side(tables, parts, columns, clock, time.dates)
-    store, times = RowStore(len(columns), held), []
+    store, times = RowStore(len(columns), held), array("d")  # it grows in place
     count = 0
     for piece in pieces:
         count += len(piece)
         if count > LARGEST_STORED_ROWS:
             raise InputError(f"{name}: more than {LARGEST_STORED_ROWS:,} rows", "cut it into several")
         if len(piece):
-            times.append(piece[:, 0] * time.unit)
+            times.frombytes((piece[:, 0] * time.unit).tobytes())
             store.append(np.ascontiguousarray(piece[:, 1:]))
     if not times:
         raise InputError(f"{name}: no rows", "record or export it again")
-    whole = np.arange(count) / time.rate if time.rate else np.concatenate(times)
+    whole = np.arange(count) / time.rate if time.rate else np.frombuffer(times)
     return whole, store
 
 

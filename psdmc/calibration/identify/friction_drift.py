@@ -118,8 +118,8 @@ def _changes(
     cross, own, score = np.zeros((l, m)), np.zeros((m, m)), np.zeros(m)
     for block, rows in with_rows(log.rows):
         plain, turned = _weighted(block, log, rows, columns, turn)
-        cross += np.einsum("tnl,tnm->lm", plain, turned)
-        own += np.einsum("tnl,tnm->lm", turned, turned)
+        cross += np.tensordot(plain, turned, axes=((0, 1), (0, 1)))
+        own += np.tensordot(turned, turned, axes=((0, 1), (0, 1)))
         score += np.einsum("tnm,tn->m", turned, log.residual[rows] * log.weights[rows])
         for k in range(n):
             sizes[k] += np.abs(block.columns[:, k, places[k]][used[rows][:, k]]).sum(axis=0)
@@ -136,7 +136,7 @@ def _changes(
         plain, turned = _weighted(block, log, rows, columns, turn)
         moved = turned - plain @ carried
         left[rows] = log.residual[rows] * log.weights[rows] - moved @ values
-        squares += np.einsum("tnl,tnm->nlm", moved, moved)
+        squares += moved.transpose(1, 2, 0) @ moved.transpose(1, 0, 2)
         np.add.at(sums, stretches[rows], np.einsum("tnm,tn->tm", moved, left[rows]))
     level = np.sum(left**2, axis=0) / np.maximum(used.sum(axis=0), 1)
     by_noise = inverse @ np.tensordot(level * widening(left, used) ** 2, squares, axes=1) @ inverse

@@ -31,13 +31,13 @@ from psdmc.calibration.logs.filter import (
     Stretch,
     central_differences,
     held_out_of,
-    smoothed_rows,
     stretches,
 )
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import noise_like
+from psdmc.calibration.logs.smoothed_rows import smoothed_rows
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError

@@ -3,7 +3,7 @@ and the split for validation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,11 @@ from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import (
     FilterOptions,
     LowPass,
-    memory,
     noise_like,
     position_noise,
     resting,
 )
-from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.logs.stored_log import AnyLog, once
 from psdmc.errors import InputError
 
 
@@ -115,7 +114,7 @@ def stretches(
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
     found = noticed(log, grid, low_pass, options, check, rows)
-    reach = 2 * memory(options.cutoff, grid.period)
+    reach = 2 * low_pass.memory
     every = independent_rows(grid, options, log)
     for start in range(0, grid.count, rows):
         wanted = every[(every >= start) & (every < start + rows)]
@@ -140,7 +139,7 @@ def _states(
     usable = _usable(grid, options, log)
     use = np.zeros(last - first, dtype=bool)
     use[max(usable.start - first, 0) : max(usable.stop - first, 0)] = True
-    time = grid.time[first:last]
+    time = grid.time(first, last)
     smooth = low_pass(effort)
     return States(
         time,
@@ -225,70 +224,6 @@ def _independent(options: FilterOptions, period: float) -> int:
     return max(1, int(np.floor(0.5 / (options.cutoff * period))))
 
 
-BLOCK_ROWS = 49152
-"""Rows whose values are computed at once: a part of a long log (parts.py) with the rows around it that the filter sees. For
-each block these are computed anew: 7,500 rows at 1 kHz and 8 Hz."""
-GROUP_ROWS = 32
-"""Wanted rows whose weighted sums are one product of matrices: half of a larger product would be zeros."""
-
-
-def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
-    """Return values at some rows of a log after low-pass filtering over time, for quantities computed from the log's
-    states.
-
-    at      indices of the wanted rows, in order; the result has one row for each
-    values  function from a slice of the log's rows to the quantity (rows, ...) at these rows
-
-    The values are computed block by block, so that a long log need not fit into memory. The result equals that of
-    filtering all rows at once, up to effects of rows more than MEMORY_CYCLES cut-off periods away. Far from the log's
-    ends, only the wanted rows are computed, as weighted sums of the values around them.
-    """
-    count = len(states.time)
-    margin = memory(states.cutoff, states.period)
-    weights = states.low_pass.weights(margin)
-    parts = []
-    for start in range(0, count, BLOCK_ROWS):
-        wanted = at[(at >= start) & (at < start + BLOCK_ROWS)]
-        if not len(wanted):
-            continue
-        first, last = max(start - margin, 0), min(start + BLOCK_ROWS + margin, count)
-        block = values(slice(first, last))
-        early, late = np.searchsorted(wanted, [margin, count - margin])
-        if early >= late:
-            parts.append(_by_column(states.low_pass, block, wanted - first))
-            continue
-        parts.append(_by_column(states.low_pass, block[: 2 * margin], wanted[:early] - first))
-        parts.append(_weighted(weights, block, wanted[early:late] - first))
-        end = max(len(block) - 2 * margin, 0)
-        parts.append(_by_column(states.low_pass, block[end:], wanted[late:] - first - end))
-    return np.concatenate(parts)
-
-
-def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Array:
-    """The filtered values, column by column: the filter's copies of one column are small, those of all columns are not."""
-    if not len(rows):
-        return np.zeros((0, *values.shape[1:]))
-    flat = values.reshape(len(values), -1)
-    columns = np.ascontiguousarray(flat.T)
-    smooth = np.stack(
-        [low_pass(column)[rows] if column.any() else np.zeros(len(rows)) for column in columns], axis=-1
-    )
-    return smooth.reshape(len(rows), *values.shape[1:])
-
-
-def _weighted(weights: Array, values: Array, rows: NDArray[np.intp]) -> Array:
-    """The filtered values at rows whose neighbours, as many as there are weights, are all there."""
-    reach, smooth = len(weights) // 2, np.empty((len(rows), *values.shape[1:]))
-    for k in range(0, len(rows), GROUP_ROWS):
-        group = rows[k : k + GROUP_ROWS]
-        first, last = group[0] - reach, group[-1] + reach + 1
-        matrix = np.zeros((len(group), last - first))
-        for row, own in zip(matrix, group - group[0], strict=True):
-            row[own : own + len(weights)] = weights
-        smooth[k : k + GROUP_ROWS] = np.tensordot(matrix, values[first:last], 1)
-    return smooth
-
-
 def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:
     """Return for each sample whether the sample is at least two periods of the cut-off away from any reversal of
     motion.
@@ -333,7 +268,15 @@ def noticed(
     A joint is at rest if the position changes no more than noise. For long logs, the noise comes from evenly spread
     rows.
     """
-    reach, every = memory(options.cutoff, grid.period), -(-grid.count // NOISE_ROWS)
+    smallest = (check or CheckOptions()).smallest_motion
+    given = ("noticed", options, smallest, rows)
+    return once(log, given, lambda: _noticed(log, grid, low_pass, options, smallest, rows))
+
+
+def _noticed(
+    log: AnyLog, grid: EvenGrid, low_pass: LowPass, options: FilterOptions, smallest: float, rows: int
+) -> Noticed:
+    reach, every = low_pass.memory, -(-grid.count // NOISE_ROWS)
     raw, smooth = [], []
     n = len(log.joint_names)
     total, bounds = np.zeros(n), np.array([[np.inf] * n, [-np.inf] * n, [np.inf] * n, [-np.inf] * n])
@@ -347,12 +290,12 @@ def noticed(
         for k, values in ((0, position), (2, filtered_position)):
             bounds[k] = np.minimum(bounds[k], values.min(axis=0))
             bounds[k + 1] = np.maximum(bounds[k + 1], values.max(axis=0))
-        raw.append(position[-start % every :: every])
-        smooth.append(filtered_position[-start % every :: every])
+        # Copies: a view would keep the whole stretch in memory.
+        raw.append(position[-start % every :: every].copy())
+        smooth.append(filtered_position[-start % every :: every].copy())
     in_band = min(2.0 * options.cutoff * grid.period, 1.0)
     position = np.concatenate(raw)
     noise = position_noise(position, np.concatenate(smooth), in_band)
-    smallest = (check or CheckOptions()).smallest_motion
     motion = bounds[1] - bounds[0]
     still = resting(position, motion, bounds[3] - bounds[2], noise, in_band, smallest)
     return Noticed(np.where(still, 0.0, noise), still, total / grid.count, motion)
@@ -371,28 +314,44 @@ NOISE_ROWS = 200_000
 class EvenGrid:
     """The times of a log after resampling to equal steps, from the first row to the last, beginning at zero.
 
-    time  s; the step is the median period of the log
-    same  True: the rows of the log already have equal steps
+    duration  s, from the first row to the last
+    count     number of rows
+    same      True: the rows of the log already have equal steps
     """
 
-    time: Array
+    duration: float
+    count: int
     same: bool
 
     @property
-    def count(self) -> int:
-        return len(self.time)
-
-    @property
     def period(self) -> float:
-        return float(self.time[1] - self.time[0])
+        return self.duration / (self.count - 1)
+
+    def time(self, first: int, last: int) -> Array:
+        """Return the times of the rows `first` to before `last`, s."""
+        time: Array = self.period * np.arange(first, last, dtype=np.float64)
+        if last == self.count:
+            time[-1] = self.duration
+        return time
 
 
 def even_grid(log: AnyLog) -> EvenGrid:
-    """Return the times with equal steps for a log."""
-    count = round(log.duration / log.period) + 1
-    even = np.linspace(0.0, log.duration, count)
-    same = count == len(log) and bool(np.abs(even - (log.time - log.time[0])).max() < 1e-6 * log.period)
-    return EvenGrid(even, same)
+    """Return the times with equal steps for a log: its own times if they are equal, else steps of its median period."""
+    own = EvenGrid(log.duration, len(log), True)
+    if all(_near(own, log, start) for start in range(0, len(log), TIMES_AT_ONCE)):
+        return own
+    return EvenGrid(log.duration, round(log.duration / log.period) + 1, False)
+
+
+TIMES_AT_ONCE = 1_000_000
+"""Times that are compared at once: a log of a day has 86 million."""
+EVEN = 1e-6
+"""Share of a period by which the times of an even log differ from equal steps."""
+
+
+def _near(grid: EvenGrid, log: AnyLog, start: int) -> bool:
+    time = log.time[start : start + TIMES_AT_ONCE] - log.time[0]
+    return bool(np.abs(grid.time(start, start + len(time)) - time).max() < EVEN * grid.period)
 
 
 NEIGHBOURS = 4
@@ -407,8 +366,8 @@ def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[A
     if grid.same:
         part = log.rows(first, last)
         return part.position, part.effort
-    wanted = grid.time[first:last]
-    begin, end = np.searchsorted(log.time - log.time[0], wanted[[0, -1]])
+    wanted = grid.time(first, last)
+    begin, end = np.searchsorted(log.time, log.time[0] + wanted[[0, -1]])
     part = log.rows(max(int(begin) - NEIGHBOURS, 0), int(end) + NEIGHBOURS)
     time = part.time - log.time[0]
     return (

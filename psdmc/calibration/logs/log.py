@@ -25,6 +25,10 @@ LARGEST_NUMBER = 1e20
 """In any unit: a number beyond it is no time, angle or torque, and its square may overflow."""
 
 
+MOST_STEPS = 1_000_000
+"""Steps of time of which the median is taken."""
+
+
 class Timed:
     """Properties of rows with a time: their number, duration and period."""
 
@@ -41,8 +45,10 @@ class Timed:
 
     @property
     def period(self) -> float:
-        """Median time between rows, s."""
-        return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf
+        """Median time between rows, s; in a long log between evenly spread ones."""
+        every = -(-len(self) // MOST_STEPS) | 1
+        before = self.time[:-1:every]
+        return float(np.median(self.time[1::every] - before)) if len(self) > 1 else np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)

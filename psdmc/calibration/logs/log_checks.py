@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_survey import Survey, surveyed
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.wording import first_faults, listed
@@ -135,10 +135,9 @@ def _no_numbers(of: Looked) -> Iterator[Fault]:
 def _times(of: Looked) -> Iterator[Fault]:
     """Faults of the time of a log whose numbers are finite, at most one of each kind."""
     log, options = of.log, of.options
-    steps = np.diff(log.time)
-    backwards = np.flatnonzero(steps <= 0)
-    shortest = float(steps.min())
-    if len(backwards):
+    shortest = of.survey.steps[0]
+    if shortest <= 0.0:
+        backwards = np.flatnonzero(np.diff(log.time) <= 0)
         row = int(backwards[0]) + 1
         before, after = log.time[row - 1], log.time[row]
         word = "goes backwards" if after < before else "stands still"
@@ -155,7 +154,7 @@ def _times(of: Looked) -> Iterator[Fault]:
     elif unit := suspected_unit(of):
         yield Fault(f"time_s looks like {unit}: {log.period:.4g} from row to row", "write time_s in seconds")
     else:
-        yield from _gaps_and_length(of, steps)
+        yield from _gaps_and_length(of)
 
 
 def suspected_unit(of: Looked) -> str:
@@ -169,10 +168,12 @@ def suspected_unit(of: Looked) -> str:
     return fitting[-1] if fitting else ""
 
 
-def _gaps_and_length(of: Looked, steps: Array) -> Iterator[Fault]:
+def _gaps_and_length(of: Looked) -> Iterator[Fault]:
     log, options = of.log, of.options
-    gaps = np.flatnonzero(steps > options.largest_gap * log.period)
-    if len(gaps):
+    largest = options.largest_gap * log.period
+    if of.survey.steps[1] > largest:
+        steps = np.diff(log.time)
+        gaps = np.flatnonzero(steps > largest)
         row = int(gaps[0])
         yield Fault(
             f"time has {len(gaps)} gap(s): {steps[row]:.3g} s without a row after {log.time[row]:.6g} s",
@@ -284,8 +285,8 @@ def _nothing_there(of: Looked) -> Iterator[Fault]:
 
 
 def _jitter(of: Looked) -> Iterator[str]:
-    steps = np.diff(of.log.time)
-    jitter = float(np.abs(steps - of.log.period).max() / of.log.period)
+    (shortest, longest), period = of.survey.steps, of.log.period
+    jitter = max(longest - period, period - shortest) / period
     if jitter > of.options.largest_jitter:
         yield f"sample times jitter by {jitter:.0%}: resampled"
 

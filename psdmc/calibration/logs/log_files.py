@@ -8,6 +8,7 @@ log's notes say so.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,13 +91,13 @@ def _stored(path: Path, kind: TableFormat, size: int, progress: Progress, held: 
         names, pieces = kind.pieces(file, str(path))
         layout = layout_of(path.name, names)
         places = [names.index(column) for column in layout.columns]
-        store, times = RowStore(len(places), held), []
+        store, times = RowStore(len(places), held), array("d")  # it grows in place
         for piece in _counted(pieces, path, size, progress, file.tell):
-            times.append(np.array(piece[:, names.index("time_s")]))
+            times.frombytes(piece[:, names.index("time_s")].tobytes())
             store.append(np.ascontiguousarray(piece[:, places]))
     if not times:
         raise _no_rows(path)
-    time = np.concatenate(times)
+    time = np.frombuffer(times)
     return log_of_store(layout, time, store, date_of(float(time[0])))
 
 

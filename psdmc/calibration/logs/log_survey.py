@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
-from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.logs.stored_log import AnyLog, once
 from psdmc.model.grounds import at_level
 
-STRETCH_ROWS = 32_768
+STRETCH_ROWS = 65_536
 """Rows that are surveyed, filtered and fitted at once."""
 MOST_SLOPES = 200_000
 """Rows whose slopes are ranked; in longer logs evenly spread ones."""
@@ -67,6 +67,7 @@ class Survey:
     jumps           the largest jump of each joint's position; None if there is none
     motor_jumps     the same of the motors' positions; empty if the log has none
     straight        share of rows in which all positions and efforts lie on straight lines, as interpolated values do
+    steps           s, the shortest and the longest time between rows
     """
 
     no_numbers: tuple[NoNumber, ...]
@@ -80,6 +81,7 @@ class Survey:
     jumps: tuple[Jump | None, ...]
     motor_jumps: tuple[Jump | None, ...]
     straight: float
+    steps: tuple[float, float]
 
     @property
     def velocity_ratios(self) -> dict[int, float]:
@@ -103,6 +105,10 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
 
     saturated_share  share of rows at an extreme effort above which the effort counts as saturated
     """
+    return once(log, ("survey", saturated_share), lambda: _surveyed(log, saturated_share))
+
+
+def _surveyed(log: AnyLog, saturated_share: float) -> Survey:
     n = len(log.joint_names)
     bad: dict[str, NoNumber] = {}
     low, high, reach = np.full(n, np.inf), np.full(n, -np.inf), np.zeros(n)
@@ -110,8 +116,8 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
     largest = np.zeros(n)
     jumps: list[Jump | None] = [None] * n
     of_motors: list[Jump | None] = []
-    straight = 0
-    every = -(-len(log) // MOST_SLOPES)
+    straight, shortest, longest = 0, np.inf, -np.inf
+    every, period = -(-len(log) // MOST_SLOPES), log.period
     slopes: list[Array] = []
     efforts: list[Array] = []
     with np.errstate(all="ignore"):
@@ -122,21 +128,22 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
                 np.maximum(high, part.position.max(axis=0)),
             )
             reach = np.maximum(reach, np.abs(part.position).max(axis=0))
+            steps = np.diff(part.time)
+            shortest, longest = min(shortest, float(steps.min())), max(longest, float(steps.max()))
             slope = position_slope(part)
             power += np.sum(slope**2, axis=0)
             if part.velocity is not None:
                 has_velocity = True
                 by_velocity += np.sum(slope * part.velocity[1:-1], axis=0)
             first = max(start, 1)
-            slopes.append(slope[(-first) % every :: every])
-            efforts.append(part.effort[1:-1][(-first) % every :: every])
+            # Copies: a view would keep the whole stretch in memory.
+            slopes.append(slope[(-first) % every :: every].copy())
+            efforts.append(part.effort[1:-1][(-first) % every :: every].copy())
             own = part.rows(start - max(start - 1, 0), start - max(start - 1, 0) + STRETCH_ROWS)
             _note_no_numbers(bad, own, start)
-            jumps = [
-                _larger(*both) for both in zip(jumps, _jumps(part, part.position, log.period), strict=True)
-            ]
+            jumps = [_larger(*both) for both in zip(jumps, _jumps(part, part.position, period), strict=True)]
             if part.motor_position is not None:
-                more = _jumps(part, part.motor_position, log.period)
+                more = _jumps(part, part.motor_position, period)
                 of_motors = [_larger(*both) for both in zip(of_motors or [None] * n, more, strict=True)]
             straight += _straight_rows(own)
             largest = np.maximum(largest, np.abs(own.effort).max(axis=0))
@@ -158,6 +165,7 @@ def surveyed(log: AnyLog, saturated_share: float) -> Survey:
             tuple(jumps),
             tuple(of_motors),
             straight / len(log),
+            (shortest, longest),
         )
 
 

@@ -40,14 +40,20 @@ class FilterOptions:
 class LowPass:
     """A zero-phase Butterworth filter along axis 0 of an array, designed for one sample period.
 
-    sections  second-order sections of the filter
-    settled   internal state of the sections after a long constant input of one; it avoids a transient at the start
+    zeros, poles, gain  of its transfer function for one direction
+    sections            second-order sections of the filter
+    settled             internal state of the sections after a long constant input of one; it avoids a transient at the
+                        start
     """
 
-    sections: Array
+    zeros: Array
+    poles: NDArray[np.complex128]
+    gain: float
+    sections: Array = field(init=False, repr=False)
     settled: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sections", signal.zpk2sos(self.zeros, self.poles, self.gain))
         object.__setattr__(self, "settled", signal.sosfilt_zi(self.sections))
 
     @staticmethod
@@ -58,7 +64,13 @@ class LowPass:
                 f"cut-off {options.cutoff:g} Hz is not below half the sampling rate, {nyquist:g} Hz",
                 "filter lower, or sample faster",
             )
-        return LowPass(signal.butter(options.order, options.cutoff, fs=1.0 / period, output="sos"))
+        return LowPass(*signal.butter(options.order, options.cutoff, fs=1.0 / period, output="zpk"))
+
+    @property
+    def memory(self) -> int:
+        """Return the number of rows after which the effect of a sample is smaller than rounding. At 1 kHz and 8 Hz,
+        these are 3,700 rows."""
+        return int(np.ceil(np.log(FORGOTTEN) / np.log(np.abs(self.poles).max())))
 
     def __call__(self, values: Array) -> Array:
         """What scipy.signal.sosfiltfilt gives, but the start states are found once a filter, not once a call."""
@@ -74,21 +86,9 @@ class LowPass:
         filtered, _ = signal.sosfilt(self.sections, values, axis=0, zi=settled)
         return np.asarray(filtered)
 
-    def weights(self, reach: int) -> Array:
-        """Return the weights (2 reach + 1,) of the values around a row in the filtered value of that row."""
-        impulse = np.zeros(4 * reach + 1)
-        impulse[2 * reach] = 1.0
-        return np.asarray(self(impulse)[reach : 3 * reach + 1])
 
-
-MEMORY_CYCLES = 30.0
-"""Cut-off periods after which a sample's effect on the filter is rounding: its slowest pole decays by exp(-2 pi sin(pi
-/ (2 order))) a period, which is to 0.29 at order 8."""
-
-
-def memory(cutoff: float, period: float) -> int:
-    """Return the number of rows after which the effect of a sample on the filter is smaller than rounding."""
-    return int(np.ceil(MEMORY_CYCLES / cutoff / period))
+FORGOTTEN = 1e-16
+"""Share of a sample's effect that counts as rounding."""
 
 
 CLIPPED = 10.0

@@ -91,9 +91,7 @@ def each_part(parts: Iterable[Part], work: Callable[[Part], Result]) -> Iterator
     """Yield each part with what `work` computes from it, in the order of the parts. Few parts are in memory at once."""
     workers = _workers.get()
     if workers is None or workers.lost:
-        with ThreadPoolExecutor(AT_ONCE) as pool:
-            for part, future in _ahead(parts, lambda part: pool.submit(work, part), AT_ONCE):
-                yield part, future.result()
+        yield from in_threads(parts, work)
         return
     import cloudpickle
 
@@ -102,6 +100,13 @@ def each_part(parts: Iterable[Part], work: Callable[[Part], Result]) -> Iterator
         parts, lambda part: workers.submitted(_applied, function, part), workers.ahead
     ):
         yield part, workers.result(future, partial(work, part))
+
+
+def in_threads(parts: Iterable[Part], work: Callable[[Part], Result]) -> Iterator[tuple[Part, Result]]:
+    """Yield each part with what `work` computes from it in this process, in the order of the parts."""
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for part, future in _ahead(parts, lambda part: pool.submit(work, part), AT_ONCE):
+            yield part, future.result()
 
 
 def _ahead(parts: Iterable[Part], submit: Callable[[Part], Any], ahead: int) -> Iterator[tuple[Part, Any]]:

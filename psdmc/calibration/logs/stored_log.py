@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from typing import IO
+from typing import IO, Any, TypeVar
 
 import numpy as np
 
@@ -20,10 +21,12 @@ class RowStore:
 
     width   numbers per row
     held    most bytes in memory before the file is used
+    kept    results of passes over all rows of logs (`once`)
     """
 
     def __init__(self, width: int, held: int = HELD_BYTES) -> None:
         self.width, self.held = width, held
+        self.kept: dict[Hashable, Any] = {}
         self._pieces: list[Array] = []
         self._file: IO[bytes] | None = None
         self._count = 0
@@ -137,6 +140,20 @@ class StoredLog(Timed):
 
 
 AnyLog = Log | StoredLog
+
+Found = TypeVar("Found")
+
+
+def once(log: AnyLog, given: Hashable, of_all_rows: Callable[[], Found]) -> Found:
+    """Return a result that depends on all rows of a log and on `given`. For a log on disk, whose rows take minutes to
+    read, it is computed once."""
+    if not isinstance(log, StoredLog):
+        return of_all_rows()
+    key = (given, log.first, len(log), log.places, log.position_at, log.motors_at, log.has_velocity)
+    if key not in log.store.kept:
+        log.store.kept[key] = of_all_rows()
+    found: Found = log.store.kept[key]
+    return found
 
 
 def without_start(log: AnyLog, seconds: float) -> AnyLog:

@@ -30,10 +30,11 @@ from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
 from psdmc.calibration.identify.steps import Robot, StepOptions, judged, step_of
-from psdmc.calibration.logs.filter import States, Stretch, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, Stretch, held_out_of, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.parts import each_part
+from psdmc.calibration.logs.smoothed_rows import smoothed_rows
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError

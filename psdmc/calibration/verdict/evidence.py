@@ -12,11 +12,12 @@ from scipy import interpolate
 from psdmc.calibration.identify.motor_model import Coupling, Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.logs.filter import States, stretches
+from psdmc.calibration.logs.filter import States, Stretch, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.log_survey import Saturated, surveyed
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
+from psdmc.calibration.logs.parts import each_part
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -235,11 +236,13 @@ def _samples(
     """For one motion: q, qd, qdd, sign and torque of its samples, the RMS noise that passes the filter if noise has the
     same density below the cut-off as above, and at most about so many samples with torques of other times."""
     log = checked(motion.log, model.mechanism, options.cutoff)
-    parts, above, count = [], np.zeros(model.nv), 0
-    lags, moved = delays_tried(options.cutoff), []
+    lags = delays_tried(options.cutoff)
     window, kernel = kernel_of(options)
     every = max(1, round(2.0 * options.cutoff * log.duration / most))
-    for stretch in stretches(log, options):
+
+    def sampled(stretch: Stretch) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
+        """Return the samples of a part, those with torques of other times, and the squares of what the filter
+        removed."""
         states, at = stretch.states, stretch.at
         speed = states.qd if coupling is None else coupling.to_motors(states.qd)
         sign = states.low_pass(np.tanh(speed / SIGN_SPEED))
@@ -254,15 +257,19 @@ def _samples(
         shifted = (motors.torque(later) - other[some, None]).transpose(0, 2, 1)
         near = np.clip(states.time[rows, None] + window, states.time[0], states.time[-1])
         speeds = interpolate.CubicSpline(states.time, speed)(near)
-        moved.append(
-            (states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted, speeds)
-        )
+        moved = states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted, speeds
         own = slice(at[0], at[-1] + 1)
-        above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
-        count += at[-1] + 1 - at[0]
-        parts.append((states.q[at], states.qd[at], states.qdd[at], sign[at], torque))
+        above = np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
+        return (states.q[at], states.qd[at], states.qdd[at], sign[at], torque), moved, above
+
+    parts, moved, above, count = [], [], np.zeros(model.nv), 0
+    for stretch, (part, others, removed) in each_part(stretches(log, options), sampled):
+        parts.append(part)
+        moved.append(others)
+        above += removed
+        count += int(stretch.at[-1] + 1 - stretch.at[0])
     q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
-    share = options.cutoff / (0.5 / states.period - options.cutoff)
+    share = options.cutoff / (0.5 / stretch.states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
     names = ("q", "qd", "qdd", "speed", "sign", "torque", "speeds")
     whole = {name: np.concatenate(x) for name, x in zip(names, zip(*moved, strict=True), strict=True)}

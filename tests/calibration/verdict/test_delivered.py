@@ -18,10 +18,8 @@ from unoptimised import wrapper
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_campaign, calibrate_logs
 from psdmc.calibration.campaign_file import read_campaign
-from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import InertialRun
-from psdmc.calibration.logs.filter import filtered, smoothed_rows, thinned
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.stored_log import StoredLog
@@ -126,20 +124,6 @@ def test_the_ur10s_package_builds(ur10: tuple[Log, Calibration], tmp_path: Path)
 def test_a_model_that_was_not_calibrated_is_said(arm, log: Log):
     with pytest.raises(InputError, match="holds no calibration"):
         delivered_quality(arm.model, [log])
-
-
-def test_blocks_give_what_the_whole_log_gives(arm, log: Log, monkeypatch: pytest.MonkeyPatch):
-    options = LinearOptions()
-    states = filtered(log, options.filter)
-    at = thinned(states, options.filter)
-    values = arm.regressor.regressor(states.q, states.qd, states.qdd)
-    whole = states.low_pass(values)[at]
-
-    monkeypatch.setattr(sys.modules["psdmc.calibration.logs.filter"], "BLOCK_ROWS", 500)
-    blocks = smoothed_rows(states, at, lambda rows: values[rows])
-
-    assert len(log) > 5 * 500
-    assert np.abs(blocks - whole).max() < 1e-12 * np.abs(whole).max()
 
 
 def test_without_a_solver_the_remedy_is_said(arm, log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
