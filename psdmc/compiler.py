@@ -340,6 +340,7 @@ def compile(  # type: ignore[overload-overlap]
     real: Real | None = ...,
     *,
     progress: Progress = ...,
+    gravity_input: bool = ...,
     target: Literal["cuda", "cuda:0", "cuda:1", "cuda:2", "cuda:3"],
 ) -> CudaRobot: ...
 
@@ -428,8 +429,7 @@ def compile(
     found = model_of(model)
     if isinstance(target, str) and target.partition(":")[0] == "cuda":
         absent = {"trig": trig, "friction": friction, "smoothing_speed": smoothing_speed}
-        absent["gravity_input"] = gravity_input
-        return cuda_robot(found, lowering, functions, real, progress, target, absent)
+        return cuda_robot(found, lowering, functions, real, progress, target, gravity_input, absent)
     names = (functions,) if isinstance(functions, str) else functions
     kept = None if names is None else tuple(names)
     chosen_names = wanted(kept, found.mechanism)

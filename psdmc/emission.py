@@ -44,13 +44,16 @@ def cuda_source(
     functions: Sequence[str] | str | None,
     real: Real | None,
     progress: Progress,
+    gravity_input: bool,
 ) -> CudaSource:
     """Return the CUDA source of a model's functions, for `compile` with the target "cuda"."""
     from psdmc.backends.c.render import render
     from psdmc.backends.cuda.package import cuda_package
     from psdmc.toolchain.cuda_robot import CudaSource  # it makes a method for each function, which takes time
 
-    made = emission(model, lowering, functions, emit_options(lowering, real), None, progress)
+    made = emission(
+        model, lowering, functions, emit_options(lowering, real), None, progress, gravity_input=gravity_input
+    )
     cuda = cuda_package(replace(made, references=None))
     text = render("cuda/robot.cuh.jinja", cuda=cuda, package=cuda.package)
     failing = frozenset(kernel.view.name for kernel in cuda.kernels if kernel.view.positive)
@@ -64,6 +67,7 @@ def cuda_robot(
     real: Real | None,
     progress: Progress,
     target: str,
+    gravity_input: bool,
     absent: Mapping[str, object],
 ) -> CudaRobot:
     """Return the robot of a target "cuda", the first GPU, or "cuda:N". Raises InputError if the caller chose one of the
@@ -81,7 +85,7 @@ def cuda_robot(
     driver = Driver(int(number))
 
     def source(names: Sequence[str] | str | None) -> CudaSource:
-        return cuda_source(model, lowering, names, real, progress)
+        return cuda_source(model, lowering, names, real, progress, gravity_input)
 
     made = source(functions)
     progress("compiling")

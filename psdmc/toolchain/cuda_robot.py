@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from psdmc.backends.cuda.names import symbol_of
 from psdmc.backends.cuda.package import BLOCK
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
+from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import Quantity, Signature
-from psdmc.toolchain.call_arguments import THETA_B, bound_arguments
+from psdmc.program.theta_rows import THETA_ROWS, THETAS
+from psdmc.toolchain.call_arguments import THETA_B, bound_arguments, with_gravity
 from psdmc.toolchain.compiled_functions import RobotFacts, results
 from psdmc.toolchain.cuda_driver import DEFAULT_STREAM, Driver
 from psdmc.toolchain.device_arrays import DeviceArray, Seen, seen
@@ -43,13 +46,16 @@ class CudaRobot(RobotFacts):
 
     Inputs are arrays in the memory of the GPU, of CuPy, PyTorch, JAX or another library with the CUDA array interface or
     DLPack. They are not copied. All inputs have the same axes in front of those of one state, and the robot's dtype. Inputs
-    with one number per state, such as a time step, and theta_b (l,) can also be numbers or NumPy arrays, which are copied.
+    with one number per state, such as a time step, theta_b and gravity can also be numbers or NumPy arrays, which are
+    copied. theta_b has the shape (l,), or (..., l) for one per state.
 
-    All methods have two more arguments:
+    All methods have more arguments:
 
     out     array of the GPU into which psdmc writes the result, or a tuple of arrays, which overlap no input. Without it,
             results are DeviceArrays
     stream  stream on which the function runs, of CuPy or PyTorch, or its handle; None: the default stream
+    gravity acceleration of gravity in m/s^2, (3,) or (..., 3), along the axes of the base frame. Only robots that were
+            compiled with gravity_input=True take it. Without it, gravity is that of the model
 
     The methods return without waiting for the GPU. If a matrix such as the mass matrix is not positive definite, the results
     of this state are NaN. Quaternions in q must have length one: psdmc does not check them.
@@ -65,7 +71,7 @@ class CudaRobot(RobotFacts):
         """Compile further functions. A kernel has a handle, and may have the argument `status`."""
         own = source.interface.kernels
         code = machine_code(source.text, f"{source.robot}_KERNELS", self._driver.arch)
-        handles = self._driver.kernels(code, [f"{source.robot}_{name}_rows" for name in own])
+        handles = self._driver.kernels(code, [f"{symbol_of(source.robot, name)}_rows" for name in own])
         pairs = zip(own, handles, strict=True)
         self._kernels |= {name: (handle, name in source.failing) for name, handle in pairs}
         self._interface = replace(source.interface, kernels={**self._interface.kernels, **own})
@@ -86,15 +92,20 @@ class CudaRobot(RobotFacts):
         theta_b: Any = None,
         out: Any = None,
         stream: Any = None,
+        gravity: Any = None,
     ) -> Any:
         """Call a generated function; `function` is an entry of `psdmc.functions.SIGNATURES`."""
         handle = handle_of(stream)
-        name = function.name + ("" if theta_b is None else "_theta")
+        own = self._interface.gravity if self._interface.gravity_input else None
+        function, inputs = with_gravity(self.name, function, inputs, gravity, own)
+        named = list(zip(function.inputs, inputs, strict=True))
+        variant = ""
+        if theta_b is not None:
+            has_rows = len(_shape(f"{function.name}: theta_b", theta_b, handle)) > 1
+            variant = THETA_ROWS if has_rows else "_theta"
+            named.append((THETAS if has_rows else THETA_B, theta_b))
+        name = function.name + variant
         kernel, has_status = self._kernel(name)
-        named = [
-            *zip(function.inputs, inputs, strict=True),
-            *([] if theta_b is None else [(THETA_B, theta_b)]),
-        ]
         lead, arrays, copies = self._arrays(function, named, handle)
         outs = self._results(function, [lead + tail for tail in self._interface.kernels[name]], out, handle)
         places = [each.place for each in (*arrays, *(seen("", each, handle) for each in outs))]
@@ -111,7 +122,7 @@ class CudaRobot(RobotFacts):
         self, function: Signature, named: Sequence[tuple[Quantity, Any]], stream: int
     ) -> tuple[tuple[int, ...], list[Seen], list[DeviceArray]]:
         """The states' leading axes, the inputs, and those that are copies."""
-        what = [f"{function.name}: {quantity.name}" for quantity, _ in named]
+        what = [f"{function.name}: {(THETA_B if q is THETAS else q).name}" for q, _ in named]
         found = [
             None if _is_of_cpu(quantity, given) else seen(name, given, stream)
             for name, (quantity, given) in zip(what, named, strict=True)
@@ -136,7 +147,9 @@ class CudaRobot(RobotFacts):
     def _copied(self, what: str, quantity: Quantity, given: Any, shape: tuple[int, ...]) -> Any:
         """Numbers of the CPU as an array of this shape, and of the robot's dtype."""
         array = np.asarray(given, self.dtype)
-        if array.shape != shape and (array.shape or (quantity.axes and quantity.default is None)):
+        is_number = not array.shape and (not quantity.axes or quantity.default is not None)
+        is_for_all = is_number or (quantity is GRAVITY and array.shape == shape[-1:])
+        if array.shape != shape and not is_for_all:
             raise InputError(f"{what} has shape {array.shape}, expected {shape}", "give an array")
         return np.full(shape, array)
 
@@ -183,7 +196,7 @@ class CudaRobot(RobotFacts):
         return given
 
     def _kernel(self, name: str) -> tuple[ctypes.c_void_p, bool]:
-        stem = name.removesuffix("_theta")
+        stem = name.removesuffix("_theta")  # a name that ends in _theta_rows is a function of its own
         if stem not in self._kernels and f"{stem}_theta" not in self._kernels and self._more is not None:
             self._add(self._more(stem))
         if name not in self._kernels:
@@ -194,7 +207,14 @@ class CudaRobot(RobotFacts):
 
 def _is_of_cpu(quantity: Quantity, given: Any) -> bool:
     """Whether an input is numbers of the CPU, which a call copies."""
-    return np.isscalar(given) or (quantity is THETA_B and isinstance(given, (np.ndarray, list)))
+    is_copied = quantity in (THETA_B, THETAS, GRAVITY)
+    return np.isscalar(given) or (is_copied and isinstance(given, (np.ndarray, list, tuple)))
+
+
+def _shape(what: str, given: Any, stream: int) -> tuple[int, ...]:
+    return (
+        np.shape(given) if isinstance(given, (list, tuple, np.ndarray)) else seen(what, given, stream).shape
+    )
 
 
 def handle_of(stream: Any) -> int:
@@ -210,9 +230,9 @@ def handle_of(stream: Any) -> int:
 
 
 def _method(function: Signature) -> Callable[..., Any]:
-    def method(self: CudaRobot, *given: Any, stream: Any = None, **named: Any) -> Any:
+    def method(self: CudaRobot, *given: Any, stream: Any = None, gravity: Any = None, **named: Any) -> Any:
         inputs, theta_b, out = bound_arguments(function, given, named)
-        return self.call(function, inputs, theta_b, out, stream)
+        return self.call(function, inputs, theta_b, out, stream, gravity)
 
     method.__name__, method.__doc__ = function.name, documentation(function)
     method.__qualname__ = f"{CudaRobot.__name__}.{function.name}"

@@ -49,5 +49,5 @@ BACK_END = BackEnd(
     identifier,
     lambda robot: (f"include/{robot}/{robot}.cuh", f"the header, #include <{robot}/{robot}.cuh>"),
     lambda folder: f"cmake -S {folder} -B {folder}/build && cmake --build {folder}/build",
-    ("trig", "target", "payload", "friction", "bodies", "estimator", "with", "functions NAME_theta_rows"),
+    ("trig", "target", "payload", "friction", "bodies", "estimator", "with"),
 )

@@ -9,7 +9,7 @@ from psdmc.backends.c.kernel_view import KernelView, VectorView
 from psdmc.backends.c.make_kernel_view import is_long, sizes_of
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.self_test import SelfCheck
-from psdmc.backends.cuda.names import identifier
+from psdmc.backends.cuda.names import identifier, symbol_of
 from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
 from psdmc.backends.protocol import Emission
 from psdmc.backends.self_test import given_name
@@ -30,6 +30,7 @@ ARRAYS = (
     "  _states  entry i of the state s is at [i * states + s]; neighbouring threads read neighbouring numbers",
     "  _rows    one state after the other: entry i of the state s is at [s * size + i]",
     "  _theta   with the base parameters theta_b as an input, one theta_b for all states",
+    "  _thetas  of functions NAME_theta_rows: thetas is an input like q, with one theta_b per state",
     "A function that returns int returns 0, or 1 + the number of the first pivot that is not positive. The outputs of such",
     "a state are NaN. Its kernels write these numbers into status, one per state; status may be null.",
     "Quaternions, and cosine and sine of an angle, are of length one.",
@@ -49,7 +50,7 @@ class DeviceFunction:
     @property
     def symbol(self) -> str:
         """Name of the function; the names of its kernels end in _states and _rows."""
-        return f"{self.robot}_{self.view.name}"
+        return symbol_of(self.robot, self.view.name)
 
     @property
     def inlined(self) -> str:

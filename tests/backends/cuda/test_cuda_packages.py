@@ -57,6 +57,16 @@ def test_every_function_of_a_small_robot(tmp_path: Path) -> None:
     assert passed(self_test(tmp_path)) == forms(OF_TREES)
 
 
+def test_each_state_has_its_own_theta_b(tmp_path: Path) -> None:
+    names = ("inverse_dynamics", "forward_dynamics", "mass_matrix")
+    rows = tuple(f"{name}_theta_rows" for name in names)
+    emit(bundled_model("two_link"), tmp_path, "cuda", functions=(*names, *rows))
+
+    assert passed(self_test(tmp_path)) == forms(names) + len(rows)
+    header = next(tmp_path.glob("include/*/*.cuh")).read_text(encoding="utf-8")
+    assert "_inverse_dynamics_thetas_rows(const real *__restrict__ q" in header
+
+
 def test_loops_calls_and_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Forms that long functions have, of an arm."""
     monkeypatch.setattr(make_kernel_view, "LONG", 300)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from bundled import bundled_model, bundled_robot
 from on_a_cpu import FLAGS, SHIM
@@ -129,6 +130,40 @@ def test_theta_b_and_numbers_are_copied(robot: CudaRobot, motion: Any) -> None:
     assert near(after.q_next.numpy(), motion["q"] + 0.01 * rates, SOLVED)
 
 
+def test_each_state_has_its_own_theta_b_and_gravity(gpus: None) -> None:
+    names = ("inverse_dynamics_theta_rows", "gravity")
+    robot: Any = psdmc.compile(
+        bundled_model("two_link"), functions=names, target="cuda", gravity_input=True, real="float64"
+    )
+    rng = np.random.default_rng(5)
+    q, qd, qdd = rng.uniform(-2.0, 2.0, (3, STATES, 2))
+    gravity, scale = rng.uniform(-9.0, 9.0, (STATES, 3)), rng.uniform(0.5, 2.0, (STATES, 1))
+    other = reference(bundled_robot("two_link")).model.copy()
+    data = other.createData()
+    expected, held = np.empty_like(q), np.empty_like(q)
+    for k in range(STATES):
+        other.gravity.linear = gravity[k]
+        expected[k] = scale[k] * pin.rnea(other, data, q[k], qd[k], qdd[k])
+        held[k] = pin.computeGeneralizedGravity(other, data, q[k])
+    thetas, states = scale * robot.theta_b, [Foreign(each) for each in (q, qd, qdd)]
+
+    for theta in (thetas, Foreign(thetas)):
+        tau = robot.inverse_dynamics(*states, theta_b=theta, gravity=Foreign(gravity))
+        assert near(tau.numpy(), expected, EXACT)
+    assert near(robot.gravity(states[0], gravity=gravity).numpy(), held, EXACT)
+    same = robot.gravity(Foreign(q[:1]), gravity=gravity[0].tolist()).numpy()
+    assert near(same, held[:1], EXACT)
+    at_rest = robot.inverse_dynamics(*states, theta_b=thetas).numpy()
+    other.gravity.linear = robot.gravity_acceleration
+    own = [pin.rnea(other, data, *each) for each in zip(q, qd, qdd, strict=True)]
+    assert near(at_rest, scale * np.array(own), EXACT)
+
+    with pytest.raises(InputError, match=r"^inverse_dynamics: theta_b has shape \(2, \d\), expected \(200, "):
+        robot.inverse_dynamics(*states, theta_b=thetas[:2])
+    with pytest.raises(InputError, match=r"^gravity: gravity has shape \(2,\), expected \(200, 3\)"):
+        robot.gravity(states[0], gravity=[0.0, 9.81])
+
+
 def test_results_go_into_given_arrays(robot: CudaRobot, motion: Any) -> None:
     q = Foreign(motion["q"])
     outs = (Foreign(np.zeros((STATES, 1, 3))), Foreign(np.zeros((STATES, 1, 3, 3))))
@@ -228,6 +263,10 @@ def test_wrong_calls_are_refused(robot: CudaRobot, motion: Any) -> None:
         robot.forward_kinematics(q, out=q)
     with pytest.raises(InputError, match=r"^stream is a str"):
         robot.inverse_dynamics(q, q, q, stream="0")
+    with pytest.raises(InputError, match="inverse_dynamics_theta_rows was not compiled for the GPU"):
+        robot.inverse_dynamics(q, q, q, theta_b=np.ones((STATES, robot.l)))
+    with pytest.raises(InputError, match="has no input gravity"):
+        robot.inverse_dynamics(q, q, q, gravity=q)
     with pytest.raises(InputError, match="gravity was not compiled for the GPU"):
         robot.gravity(q)
     with pytest.raises(
@@ -245,8 +284,8 @@ def test_wrong_targets_are_refused(gpus: None, monkeypatch: pytest.MonkeyPatch) 
     for target, message in {"cuda:2": "no GPU 2: the driver finds 2", "cuda:x": "target is 'cuda:x'"}.items():
         with pytest.raises(InputError, match=message):
             psdmc.compile(model, target=target)
-    with pytest.raises(InputError, match=r"target 'cuda' has no option gravity_input"):
-        psdmc.compile(model, target="cuda", gravity_input=True)
+    with pytest.raises(InputError, match=r"target 'cuda' has no option friction"):
+        psdmc.compile(model, target="cuda", friction=True)
     monkeypatch.setenv("FAKE_CUDA_BROKEN", "1")
     with pytest.raises(
         ToolchainError, match=r"^cuInit: the driver of the GPU says: an error of the fake driver"
