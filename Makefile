@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-learning bench-save bench-compare calibrate-demo campaign clean test-intervals test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-examples test-pages audit fuzz mutate test-sanitize planted-faults
+.PHONY: help venv docs dist demo test coverage check golden bench bench-legged bench-contacts bench-accelerator bench-learning bench-save bench-compare calibrate-demo campaign clean test-intervals test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-adapters test-examples test-pages audit fuzz mutate test-sanitize planted-faults
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -192,6 +192,10 @@ $(LEARNING)/ready: pyproject.toml
 
 bench-learning: $(LEARNING)/ready ## time forward dynamics and its gradient in JAX and PyTorch beside frax, adam, jaxsim and MJX; ONLY='psdmc in JAX,frax' for some
 	$(LEARNING)/bin/python benchmarks/learning.py --adam $(LEARNING)/adam/bin/python --only '$(ONLY)'
+
+bench-accelerator: $(READY) ## compare all functions on an NVIDIA GPU with the CPU, then time them, as shares of the bandwidth
+	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cuda]'
+	$(RUN)/python benchmarks/accelerator.py --json $(GENERATED)/bench-accelerator.json
 
 bench-save: $(READY) ## rewrite benchmarks/baseline.json: operations and instructions, not times
 	$(RUN)/python -m psdmc.bench.gate save

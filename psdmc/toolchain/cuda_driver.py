@@ -22,6 +22,9 @@ MAJOR, MINOR = 75, 76
 POINTERS_DEVICE, NO_VALUE = 9, 1
 """Number of the attribute of an address that names its GPU, and status if the address belongs to no GPU."""
 
+LONGEST_NAME = 100
+"""Characters of the name of a GPU that are kept."""
+
 DEFAULT_STREAM = 1
 """Handle of the stream on which work without another stream runs."""
 
@@ -45,6 +48,10 @@ class Driver:
             scale * self._attribute(number, device) for scale, number in ((10, MAJOR), (1, MINOR))
         )
         """Ten times the compute capability of the GPU, such as 90."""
+        text = ctypes.create_string_buffer(LONGEST_NAME)
+        self._check("cuDeviceGetName", text, LONGEST_NAME, device)
+        self.name = text.value.decode()
+        """Name of the GPU, such as NVIDIA H200."""
 
     def kernels(self, code: bytes, symbols: Sequence[str]) -> list[ctypes.c_void_p]:
         """Load machine code, and return the handles of its kernels by their names."""
@@ -88,6 +95,11 @@ class Driver:
         size = ctypes.c_size_t(array.nbytes)
         self._call("cuMemcpyDtoH_v2", ctypes.c_void_p(array.ctypes.data), ctypes.c_uint64(place), size)
         return array
+
+    def copy(self, to: int, place: int, size: int, stream: int) -> None:
+        """Start a copy of `size` bytes from one address of the GPU to another one."""
+        words = ctypes.c_uint64(to), ctypes.c_uint64(place), ctypes.c_size_t(size)
+        self._call("cuMemcpyDtoDAsync_v2", *words, ctypes.c_void_p(stream))
 
     def device_of(self, place: int) -> int | None:
         """Return the number of the GPU that has memory at this address; None: it is memory of the CPU."""

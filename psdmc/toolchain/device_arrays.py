@@ -90,6 +90,7 @@ class DeviceArray:
     `torch.as_tensor(x, device="cuda")`, `jax.numpy.asarray(x)`. `x.numpy()` copies it to the CPU.
 
     shape, dtype  as of a NumPy array
+    place         address on the GPU
     stream        handle of the stream on which it is computed
     kept          arrays that live as long as this one
     """
@@ -100,29 +101,29 @@ class DeviceArray:
         self.shape, self.dtype, self.stream = shape, dtype, stream
         self.kept: Any = None
         self._driver = driver
-        self._place = driver.allocated(math.prod(shape) * dtype.itemsize)
+        self.place = driver.allocated(math.prod(shape) * dtype.itemsize)
 
     def __del__(self) -> None:
         with suppress(Exception):  # at the end of a program, the driver may be gone before
-            self._driver.free(self._place)
+            self._driver.free(self.place)
 
     @classmethod
     def of(cls, driver: Driver, array: NDArray[Any]) -> DeviceArray:
         """Return a copy of an array of the CPU."""
         made = cls(driver, array.shape, array.dtype)
-        driver.copy_in(made._place, np.ascontiguousarray(array))
+        driver.copy_in(made.place, np.ascontiguousarray(array))
         return made
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
         """Return the description of the array by which other libraries read it."""
-        place, text = (self._place, False), self.dtype.str
+        place, text = (self.place, False), self.dtype.str
         return {"shape": self.shape, "typestr": text, "data": place, "version": 3, "stream": self.stream}
 
     def numpy(self) -> NDArray[Any]:
         """Wait for the result, and return a copy as a NumPy array."""
         self._driver.wait(self.stream)
-        return self._driver.copy_out(self._place, self.shape, self.dtype)
+        return self._driver.copy_out(self.place, self.shape, self.dtype)
 
     def __repr__(self) -> str:
         return f"DeviceArray {self.shape} {self.dtype} on GPU {self._driver.ordinal}"

@@ -4,9 +4,12 @@ same source for the CPU, and runs kernels when their stream is waited for. No te
 from __future__ import annotations
 
 import ctypes
+import json
 import pickle
+import runpy
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +32,7 @@ pytestmark = pytest.mark.needs("g++")
 STATES, EXACT, SOLVED = 200, 1e-12, 1e-10
 """More states than a block has, and errors relative to the largest value. SOLVED: where the mass matrix is inverted."""
 
+BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
 STREAM = 7
 FUNCTIONS = ("inverse_dynamics", "forward_dynamics", "semi_implicit_euler", "forward_kinematics")
 
@@ -221,6 +225,30 @@ def test_others_are_compiled_later_and_in_float32(gpus: None, monkeypatch: pytes
     assert found.dtype == np.float32
     assert repr(robot).startswith("CudaRobot 'two_link': 2 joints, float32")
     assert repr(found) == "DeviceArray (3,) float32 on GPU 1"
+
+
+def test_the_benchmark_compares_and_times(
+    gpus: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Times of the fake driver mean nothing."""
+    bench = runpy.run_path(str(BENCHMARKS / "accelerator.py"))
+    own = bench["main"].__globals__
+    names = ("inverse_dynamics", "forward_dynamics")
+    changed = {"FUNCTIONS": names, "TIMED": names, "SHORTEST": 1e-4, "COMPARED": 150}
+    changed["models"] = lambda given: [("two_link", bundled_model("two_link"))]
+    for key, value in changed.items():
+        monkeypatch.setitem(own, key, value)
+    words = ["--batches", "130", "--copy", "4096", "--json", str(tmp_path / "found.json")]
+
+    assert bench["main"](words) == 0
+    said, rows = capsys.readouterr().out, json.loads((tmp_path / "found.json").read_text())["rows"]
+    assert "GPU no GPU; a copy reads and writes" in said
+    assert {row["layout"] for row in rows} == {"rows", "states", "method"}
+    assert [row["bytes per state"] for row in rows] == [4 * 8] * 6 + [8 * 8] * 6
+
+    monkeypatch.setitem(own, "EXACT", {"float32": 1e-12, "float64": 1.0})
+    assert bench["main"](words) == 1
+    assert "WRONG" in capsys.readouterr().out
 
 
 WRONG = {

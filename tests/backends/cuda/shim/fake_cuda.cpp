@@ -68,6 +68,7 @@ API cuInit(unsigned) { return getenv("FAKE_CUDA_BROKEN") ? NOT_FOUND : OK; }
 API cuGetErrorString(int, const char **text) { return *text = "an error of the fake driver", OK; }
 API cuDeviceGetCount(int *count) { return *count = GPUS, OK; }
 API cuDeviceGet(int *device, int ordinal) { return *device = ordinal + 40, OK; }
+API cuDeviceGetName(char *name, int size, int) { return strncpy(name, "no GPU", size), OK; }
 API cuDeviceGetAttribute(int *value, int attribute, int)
 {
     return *value = attribute == 75 ? 9 : 0, attribute == 75 || attribute == 76 ? OK : INVALID_VALUE;
@@ -118,6 +119,11 @@ API cuMemcpyDtoH_v2(void *to, uint64_t from, size_t size)
 {
     NEEDS_CONTEXT;
     return finish(1), memcpy(to, (void *)from, size), OK;
+}
+API cuMemcpyDtoDAsync_v2(uint64_t to, uint64_t from, size_t size, void *stream)
+{
+    NEEDS_CONTEXT;
+    return streams[(intptr_t)stream].push_back([=] { memcpy((void *)to, (void *)from, size); }), OK;
 }
 API cuPointerGetAttribute(int *value, int attribute, uint64_t place)
 {
