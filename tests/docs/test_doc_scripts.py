@@ -31,10 +31,10 @@ def test_a_script_of_the_documents_starts(script: str):
 def test_the_long_log_is_made_of_the_robots_own_torques(monkeypatch: pytest.MonkeyPatch):
     """Less friction, the model's at the same states but for the noise of 0.3 N m."""
     monkeypatch.syspath_prepend(str(DOCS))
-    from long_log import ROBOT, synthetic_log
+    from long_log import ROBOT, rows_of_log
 
     model = psdmc.derive(ROBOT)
-    log = synthetic_log(model, 20_000, 1000.0)
+    log = rows_of_log(model, 0, 20_000, 1000.0)
 
     time, q, effort = (
         log.time[::20],
