@@ -99,8 +99,8 @@ def main() -> None:
         if options.kill is None:
             return
         with (
-            LocalCluster(n_workers=2, threads_per_worker=1, local_directory=folder) as cluster,
-            Client(cluster) as client,
+            LocalCluster(n_workers=2, threads_per_worker=1, local_directory=folder) as cluster,  # type: ignore[no-untyped-call]
+            Client(cluster) as client,  # type: ignore[no-untyped-call]
         ):
             timer = Timer(options.kill, lambda: os.kill(min(client.run(os.getpid).values()), signal.SIGKILL))
             timer.start()
