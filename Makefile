@@ -193,7 +193,7 @@ $(LEARNING)/ready: pyproject.toml
 bench-learning: $(LEARNING)/ready ## time forward dynamics and its gradient in JAX and PyTorch beside frax, adam, jaxsim and MJX; ONLY='psdmc in JAX,frax' for some
 	$(LEARNING)/bin/python benchmarks/learning.py --adam $(LEARNING)/adam/bin/python --only '$(ONLY)'
 
-bench-accelerator: $(READY) ## compare all functions on an NVIDIA GPU with the CPU, then time them, as shares of the bandwidth
+bench-accelerator: $(READY) ## compare functions on an NVIDIA GPU with those of the CPU, then time them, as shares of the bandwidth
 	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[cuda]'
 	$(RUN)/python benchmarks/accelerator.py --json $(GENERATED)/bench-accelerator.json
 

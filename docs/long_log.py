@@ -102,11 +102,14 @@ def main() -> None:
             LocalCluster(n_workers=2, threads_per_worker=1, local_directory=folder) as cluster,  # type: ignore[no-untyped-call]
             Client(cluster) as client,  # type: ignore[no-untyped-call]
         ):
-            timer = Timer(options.kill, lambda: os.kill(min(client.run(os.getpid).values()), signal.SIGKILL))
+            victim = min(client.run(os.getpid).values())
+            timer = Timer(options.kill, os.kill, (victim, signal.SIGKILL))
             timer.start()
             at = ("--scheduler", cluster.scheduler_address)
             together = _calibrated(model, log, Path(folder) / "together.npz", *at)
-            timer.join()
+            if timer.is_alive():
+                timer.cancel()
+                sys.exit(f"the command ended within {options.kill:g} s, before a worker was killed")
             largest = max(client.run(_largest_memory).values())
         same = "the same file" if together == alone else "ANOTHER FILE"
         print(f"with a worker killed after {options.kill:g} s: {same}; workers: {largest:.0f} MiB at most")
@@ -121,7 +124,8 @@ def _calibrated(model: Path, log: Path, out: Path, *more: str) -> bytes:
         _, status, used = os.wait4(started.pid, 0)
         lasted = time.perf_counter() - begin
         said.seek(0)
-        print("\n".join(line for line in said.read().decode().splitlines() if "verdict:" in line))
+        lines = said.read().decode().splitlines()
+        print("\n".join(line for line in lines if status or line.startswith("verdict:")))
     print(
         f"exit {os.waitstatus_to_exitcode(status)}: {lasted:.0f} s, of CPU {used.ru_utime:.0f} s and of the system "
         f"{used.ru_stime:.0f} s, {used.ru_maxrss / 1024:.0f} MiB at most"

@@ -25,10 +25,10 @@ from psdmc.toolchain.interface import Origin
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompileRequest:
-    """The arguments of `compile`: in the place of a compiled robot they go to other processes, which open the library from
+    """The arguments of `compile`. Instead of a compiled robot, they go to other processes, which open the library from
     their cache or compile it.
 
-    model       the model, or its file's content, compressed, which is read only where there is something to compile
+    model       the model, or its file's content, compressed, which is read only if psdmc compiles
     model_hash  the model's content hash
     names       of the functions to compile at once
     """

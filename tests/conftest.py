@@ -44,8 +44,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     part, parts = map(int, config.getoption("--part").split("/"))
     chosen = [zlib.crc32(item.nodeid.partition("[")[0].encode()) % parts == part for item in items]
     config.hook.pytest_deselected(items=[item for item, own in zip(items, chosen, strict=True) if not own])
-    items[:] = [item for item, own in zip(items, chosen, strict=True) if own]
+    kept = [item for item, own in zip(items, chosen, strict=True) if own]
+    items[:] = sorted(kept, key=lambda item: not item.nodeid.startswith(SHARED))
 
+
+SHARED = "tests/functions/"
+"""Tests that share compiled robots: they come first, so that one worker runs them all."""
 
 LONG_TESTS = Path(__file__).parent / "long_tests.txt"
 

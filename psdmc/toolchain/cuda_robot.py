@@ -25,6 +25,9 @@ from psdmc.toolchain.interface import Interface
 from psdmc.toolchain.nvrtc import machine_code
 from psdmc.toolchain.stubs import documentation
 
+OF_MODEL = object()
+"""Stands for the gravity of the model, if a call gives no other."""
+
 
 @dataclass(frozen=True, slots=True)
 class CudaSource:
@@ -54,17 +57,19 @@ class CudaRobot(RobotFacts):
     out     array of the GPU into which psdmc writes the result, or a tuple of arrays, which overlap no input. Without it,
             results are DeviceArrays
     stream  stream on which the function runs, of CuPy or PyTorch, or its handle; None: the default stream
-    gravity acceleration of gravity in m/s^2, (3,) or (..., 3), along the axes of the base frame. Only robots that were
-            compiled with gravity_input=True take it. Without it, gravity is that of the model
+    gravity  acceleration of gravity in m/s^2, (3,) from the CPU or (..., 3), along the axes of the base frame. Only robots
+            that were compiled with gravity_input=True take it. Without it, gravity is that of the model
 
-    The methods return without waiting for the GPU. If a matrix such as the mass matrix is not positive definite, the results
-    of this state are NaN. Quaternions in q must have length one: psdmc does not check them.
+    The methods return without waiting for the GPU. Only calls that copy an input and have the argument `out` wait. If a
+    matrix such as the mass matrix is not positive definite, the results of this state are NaN. Quaternions in q must have
+    length one: psdmc does not check them.
     """
 
     def __init__(self, source: CudaSource, driver: Driver, more: Callable[[str], CudaSource] | None) -> None:
         super().__init__(source.interface)
         self._driver, self._more = driver, more
         self._kernels: dict[str, tuple[ctypes.c_void_p, bool]] = {}
+        self._own_gravity: DeviceArray | None = None
         self._add(source)
 
     def _add(self, source: CudaSource) -> None:
@@ -96,7 +101,7 @@ class CudaRobot(RobotFacts):
     ) -> Any:
         """Call a generated function; `function` is an entry of `psdmc.functions.SIGNATURES`."""
         handle = handle_of(stream)
-        own = self._interface.gravity if self._interface.gravity_input else None
+        own = OF_MODEL if self._interface.gravity_input else None
         function, inputs = with_gravity(self.name, function, inputs, gravity, own)
         named = list(zip(function.inputs, inputs, strict=True))
         variant = ""
@@ -137,6 +142,9 @@ class CudaRobot(RobotFacts):
         for k, (quantity, given) in enumerate(named):
             tail = self._interface.sizes.shape(quantity.axes)
             whole = tail if quantity is THETA_B else lead + tail
+            if given is OF_MODEL:
+                found[k] = self._gravity_of(lead, stream)
+                continue
             array = found[k]
             if array is None:
                 copies.append(DeviceArray.of(self._driver, self._copied(what[k], quantity, given, whole)))
@@ -144,12 +152,19 @@ class CudaRobot(RobotFacts):
             found[k] = self._checked(what[k], array, whole, stream)
         return lead, [each for each in found if each is not None], copies
 
+    def _gravity_of(self, lead: tuple[int, ...], stream: int) -> Seen:
+        """The model's gravity for each state. It is kept for further calls with as many states."""
+        if self._own_gravity is None or self._own_gravity.shape[:-1] != lead:
+            whole = np.full((*lead, 3), self._interface.gravity, self.dtype)
+            self._own_gravity = DeviceArray.of(self._driver, whole)
+        return seen("gravity", self._own_gravity, stream)
+
     def _copied(self, what: str, quantity: Quantity, given: Any, shape: tuple[int, ...]) -> Any:
         """Numbers of the CPU as an array of this shape, and of the robot's dtype."""
         array = np.asarray(given, self.dtype)
-        is_number = not array.shape and (not quantity.axes or quantity.default is not None)
-        is_for_all = is_number or (quantity is GRAVITY and array.shape == shape[-1:])
-        if array.shape != shape and not is_for_all:
+        repeats = quantity is GRAVITY or not quantity.axes or quantity.default is not None
+        single = shape[-1:] if quantity is GRAVITY else ()
+        if array.shape != shape and not (repeats and array.shape == single):
             raise InputError(f"{what} has shape {array.shape}, expected {shape}", "give an array")
         return np.full(shape, array)
 
@@ -200,7 +215,7 @@ class CudaRobot(RobotFacts):
         if stem not in self._kernels and f"{stem}_theta" not in self._kernels and self._more is not None:
             self._add(self._more(stem))
         if name not in self._kernels:
-            hint = f"compiled are {', '.join(self._kernels)}: add names to the argument functions, or give theta_b"
+            hint = f"compiled are {', '.join(self._kernels)}: add {name} or others to the argument functions"
             raise InputError(f"{self.name}: {name} was not compiled for the GPU", hint)
         return self._kernels[name]
 
@@ -208,7 +223,11 @@ class CudaRobot(RobotFacts):
 def _is_of_cpu(quantity: Quantity, given: Any) -> bool:
     """Whether an input is numbers of the CPU, which a call copies."""
     is_copied = quantity in (THETA_B, THETAS, GRAVITY)
-    return np.isscalar(given) or (is_copied and isinstance(given, (np.ndarray, list, tuple)))
+    return (
+        given is OF_MODEL
+        or np.isscalar(given)
+        or (is_copied and isinstance(given, (np.ndarray, list, tuple)))
+    )
 
 
 def _shape(what: str, given: Any, stream: int) -> tuple[int, ...]:

@@ -33,8 +33,10 @@ from psdmc.toolchain.interface import interface_of
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
 """`make test-accuracy`: more robots, and all that are compiled whole optimised."""
 
-ARM = "kr6" if WHOLE else "scara"
+ARM = "kr6" if WHOLE else "sliding"
 """The arm of tests that need one."""
+
+ARMS = tuple(dict.fromkeys((ARM, "sliding")))
 
 ROBOTS = ("two_link", "scara", *(("kr6", "Panda", "UR5") if WHOLE else ()), "sliding", "first slides")
 SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
@@ -43,8 +45,8 @@ SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 SINGLE = (*(("scara", "kr6") if WHOLE else ()), "sliding")
 """Robots that are compiled in float32 too."""
 
-SINGLE_TOO = [("sliding", "float32")] if WHOLE else []
-COMPILED = {("scara", "float64"), (ARM, "float64"), ("sliding", "float64"), *SINGLE_TOO}
+ALSO = [("scara", "float64"), ("kr6", "float64"), ("sliding", "float32")] if WHOLE else []
+COMPILED = {("sliding", "float64"), *ALSO}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
 OPTIMISED = COMPILED if WHOLE else {("two_link", "float64")}

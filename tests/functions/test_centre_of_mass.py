@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_it_is_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("centre_of_mass", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_the_centre_moves_as_its_jacobian_says(robot: str) -> None:
     own = bench(robot)
     q, qd, step = own.given["q"], own.given["qd"], 1e-5

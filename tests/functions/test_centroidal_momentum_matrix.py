@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_it_is_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("centroidal_momentum_matrix", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_momentum_about_the_centre_and_about_the_base(robot: str) -> None:
     """L_O = L_C + c x p, and p is the mass times how the centre moves."""
     own = bench(robot)

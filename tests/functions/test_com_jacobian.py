@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_it_is_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("com_jacobian", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_the_centre_gives_gravitys_torques(robot: str) -> None:
     """Gravity pulls at the centre of mass: g(q) = -J^T (total mass) (gravity's acceleration)."""
     own = bench(robot)

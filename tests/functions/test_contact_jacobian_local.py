@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -13,7 +13,7 @@ def test_they_are_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("contact_jacobian_local", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_they_are_turned(robot: str) -> None:
     """Every named frame is a point here."""
     own = bench(robot)

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import (
+    ARM,
+    ARMS,
+    INTERPRETED,
+    SEVERAL,
+    bench,
+    matches_pinocchio,
+    program_matches_pinocchio,
+)
 from fifty_digits import fifty_digit_jacobian
 
 from psdmc.lower.kernels import lower
@@ -37,7 +45,7 @@ def test_it_is_what_fifty_digit_differences_say() -> None:
             np.testing.assert_allclose(found[f"grad_{by}"], expected, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_gradient_times_tangent_is_cotangent_times_slope(robot: str) -> None:
     """Reverse against forward mode."""
     own = bench(robot)

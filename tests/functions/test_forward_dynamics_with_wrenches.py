@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, ARMS, EVERY, bench, matches_pinocchio
 from wide_robots import is_pinocchios
 
 from psdmc.errors import InputError
@@ -19,7 +19,7 @@ def test_it_is_pinocchios_where_joints_have_several_coordinates() -> None:
     is_pinocchios("forward_dynamics_with_wrenches", "small", 1e-9, in_c=True)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_torques_under_the_wrenches_lead_back(robot: str) -> None:
     own = bench(robot)
     g = own.given

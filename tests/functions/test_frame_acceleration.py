@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 from wide_robots import is_pinocchios
 
 
@@ -17,7 +17,7 @@ def test_it_is_pinocchios_where_joints_have_several_coordinates() -> None:
     is_pinocchios("frame_acceleration", "small", 1e-11, in_c=True)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_it_is_the_jacobian_times_qdd_and_the_drift(robot: str) -> None:
     own = bench(robot)
     q, qd, qdd = (own.given[name] for name in ("q", "qd", "qdd"))

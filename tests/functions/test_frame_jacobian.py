@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_jacobians_are_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("frame_jacobian", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_columns_are_rates_of_forward_kinematics(robot: str) -> None:
     """Position's derivative, and the angular velocity w with dR/dq R^T = [w], by central differences."""
     own = bench(robot)

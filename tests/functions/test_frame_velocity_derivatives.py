@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_they_are_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("frame_velocity_derivatives", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_they_are_the_slopes_of_the_jacobian_times_qd(robot: str) -> None:
     own = bench(robot)
     q, qd, step = own.given["q"], own.given["qd"], 1e-6
@@ -23,7 +23,7 @@ def test_they_are_the_slopes_of_the_jacobian_times_qd(robot: str) -> None:
         np.testing.assert_allclose(found[..., j], slope, atol=1e-7 * np.abs(found).max())
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_along_the_motion_they_are_the_drift(robot: str) -> None:
     own = bench(robot)
     q, qd = own.given["q"], own.given["qd"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARMS, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), SEVERAL)
@@ -17,7 +17,7 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
     program_matches_pinocchio("gravity_derivatives", robot)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_they_are_the_slopes_of_gravity(robot: str) -> None:
     own = bench(robot)
     q, step = own.given["q"], 1e-5

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARMS, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), SEVERAL)
@@ -17,7 +17,7 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
     program_matches_pinocchio("inverse_dynamics_jvp", robot)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_it_is_the_slope_along_the_direction(robot: str) -> None:
     own, step = bench(robot), 1e-6
     g, call = own.given, own.robot.inverse_dynamics_jvp

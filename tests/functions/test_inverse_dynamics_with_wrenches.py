@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_torques_are_pinocchios_with_fext(robot: str, real: str) -> None:
     matches_pinocchio("inverse_dynamics_with_wrenches", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_a_wrench_takes_off_what_the_jacobian_carries(robot: str) -> None:
     own = bench(robot)
     g = own.given

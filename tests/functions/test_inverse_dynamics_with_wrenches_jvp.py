@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARMS, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 from wide_robots import is_pinocchios
 
 
@@ -22,7 +22,7 @@ def test_it_is_pinocchios_where_joints_have_several_coordinates() -> None:
     is_pinocchios("inverse_dynamics_with_wrenches_jvp", "small", 1e-11, in_c=False)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_it_is_the_slope_along_the_direction(robot: str) -> None:
     own, step = bench(robot), 1e-6
     g, call = own.given, own.robot.inverse_dynamics_with_wrenches_jvp

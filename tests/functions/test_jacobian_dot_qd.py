@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -12,7 +12,7 @@ def test_drifts_are_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("jacobian_dot_qd", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_the_drift_is_the_jacobians_rate_times_qd(robot: str) -> None:
     own = bench(robot)
     q, qd, step = own.given["q"], own.given["qd"], 1e-6

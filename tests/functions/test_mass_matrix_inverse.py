@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import (
+    ARM,
+    ARMS,
+    INTERPRETED,
+    SEVERAL,
+    bench,
+    matches_pinocchio,
+    program_matches_pinocchio,
+)
 from direct import Direct
 
 
@@ -18,7 +26,7 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
     program_matches_pinocchio("mass_matrix_inverse", robot)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_it_takes_the_mass_matrix_to_one(robot: str) -> None:
     own = bench(robot)
     mass = own.model.mass_matrix(own.given["q"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from against_pinocchio import ARMS, EVERY, bench, matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), EVERY)
@@ -14,7 +14,7 @@ def test_the_energy_is_pinocchios_but_for_that_at_zero(robot: str, real: str) ->
     matches_pinocchio("potential_energy", robot, real)
 
 
-@pytest.mark.parametrize("robot", [ARM, "sliding"])
+@pytest.mark.parametrize("robot", ARMS)
 def test_its_slope_is_gravitys_torque_and_it_vanishes_at_zero(robot: str) -> None:
     own = bench(robot)
     q, n, step = own.given["q"], own.model.n, 1e-5

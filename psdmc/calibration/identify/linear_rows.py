@@ -67,7 +67,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
         ahead = target[own] if start is None else target[own] - block.columns @ start
         flat = (block.columns * weight[:, :, None]).reshape(-1, l)
         together = np.column_stack([flat, (ahead * weight).reshape(-1)])
-        triangle = np.asarray(np.linalg.qr(together, mode="r"))
+        triangle = _triangle(together)
         if block.noise is None:
             return triangle, None
         wrong = (block.noise * weight[:, :, None]).reshape(-1, l)
@@ -81,6 +81,16 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
         noise = wrong if noise is None or wrong is None else noise + wrong
     whole = np.vstack([triangle, np.zeros((max(l - len(triangle), 0), l + 1))])
     return Reduced(whole[:l, :l], whole[:l, l], noise)
+
+
+IN_CACHE = 2048
+"""Rows of which LAPACK computes one QR decomposition. Twice as many rows leave the cache."""
+
+
+def _triangle(rows: Array) -> Array:
+    """R of the QR decomposition of many rows."""
+    pieces = [np.linalg.qr(rows[k : k + IN_CACHE], mode="r") for k in range(0, len(rows), IN_CACHE)]
+    return np.asarray(pieces[0] if len(pieces) == 1 else np.linalg.qr(np.vstack(pieces), mode="r"))
 
 
 def residual_of(rows: Rows, target: Array, values: Array) -> Array:
@@ -144,8 +154,8 @@ def with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:
         start += len(block)
 
 
-BLOCK_SAMPLES = 256
-"""Samples that come as one block: LAPACK's QR of more rows leaves the cache and takes twice as long by row."""
+BLOCK_SAMPLES = 2048
+"""Samples that come as one block."""
 
 
 class KeptRows:

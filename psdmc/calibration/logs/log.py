@@ -26,7 +26,8 @@ LARGEST_NUMBER = 1e20
 
 
 MOST_STEPS = 1_000_000
-"""Steps of time of which the median is taken."""
+RUNS = 100
+"""Steps of time of which the median is taken, and consecutive ones in a long log."""
 
 
 class Timed:
@@ -45,10 +46,14 @@ class Timed:
 
     @property
     def period(self) -> float:
-        """Median time between rows, s; in a long log between evenly spread ones."""
-        every = -(-len(self) // MOST_STEPS) | 1
-        before = self.time[:-1:every]
-        return float(np.median(self.time[1::every] - before)) if len(self) > 1 else np.inf
+        """Median time between rows, s; in a long log, of evenly spread runs of rows."""
+        if len(self) < 2:
+            return np.inf
+        if len(self) <= MOST_STEPS:
+            return float(np.median(np.diff(self.time)))
+        length = MOST_STEPS // RUNS
+        runs = [self.time[k : k + length] for k in np.linspace(0, len(self) - length, RUNS, dtype=int)]
+        return float(np.median(np.diff(runs)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

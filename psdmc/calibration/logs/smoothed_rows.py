@@ -1,4 +1,4 @@
-"""Low-pass filtered values at few rows of a long log, at less cost than the filter has on all rows.
+"""Computes low-pass filtered values at few rows of a long log, at less cost than the filter has on all rows.
 
 The filter's response to one sample is a sum of oscillations that decay on both sides, one for each pole. So the samples
 of a block act on later and on earlier blocks by a few weighted sums. See Oppenheim and Schafer, Discrete-Time Signal
@@ -18,6 +18,8 @@ from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.low_pass import LowPass
 
+AT_ONCE_GONE = 1e-14
+"""Size of a pole that stands for zero: filters of odd order at a quarter of the sampling rate have one."""
 AT_ONCE = 8192
 """Rows whose values are computed at once: a multiple of BLOCK."""
 BLOCK = 256
@@ -75,15 +77,17 @@ class Decays:
     @staticmethod
     def of(low_pass: LowPass) -> Decays:
         """Return the partial fractions of H(z) H(1/z) for the filter's transfer function H(z)."""
-        zeros, poles, gain = low_pass.zeros, low_pass.poles, low_pass.gain
+        zeros, gain = low_pass.zeros, low_pass.gain
+        poles = np.where(np.abs(low_pass.poles) < AT_ONCE_GONE, AT_ONCE_GONE, low_pass.poles)
         kept, sizes = poles[poles.imag >= 0.0], []
         for pole in kept:
             others = poles[poles != pole]
             forward = np.prod(pole - zeros) / np.prod(pole - others)
             backward = np.prod(1.0 / pole - zeros) / np.prod(1.0 / pole - poles)
             sizes.append(gain**2 * forward * backward / pole * (2.0 if pole.imag else 1.0))
-        at_once = gain**2 * np.prod(-zeros) / np.prod(-poles)
-        return Decays(kept, np.array(sizes), float((np.sum(sizes) + at_once).real))
+        # A constant signal stays as it is: all responses add up to one.
+        later = np.sum(np.array(sizes) * kept / (1.0 - kept)).real
+        return Decays(kept, np.array(sizes), float(1.0 - 2.0 * later))
 
     def response(self, rows: NDArray[np.intp]) -> Array:
         """Return the response at some numbers of rows before or behind a sample."""

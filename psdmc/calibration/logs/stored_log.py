@@ -149,7 +149,8 @@ def once(log: AnyLog, given: Hashable, of_all_rows: Callable[[], Found]) -> Foun
     read, it is computed once."""
     if not isinstance(log, StoredLog):
         return of_all_rows()
-    key = (given, log.first, len(log), log.places, log.position_at, log.motors_at, log.has_velocity)
+    words = (log.joint_names, log.quantity, log.has_velocity, *log.time[[0, -1]].tolist())
+    key = (given, words, log.first, len(log), log.places, log.position_at, log.motors_at)
     if key not in log.store.kept:
         log.store.kept[key] = of_all_rows()
     found: Found = log.store.kept[key]

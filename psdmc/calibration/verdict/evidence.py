@@ -240,15 +240,18 @@ def _samples(
     window, kernel = kernel_of(options)
     every = max(1, round(2.0 * options.cutoff * log.duration / most))
 
+    # The workers of a cluster get what this function reads: neither the log nor the model.
+    tool, mechanism, nv = motion.tool, model.mechanism, model.nv
+
     def sampled(stretch: Stretch) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
         """Return the samples of a part, those with torques of other times, and the squares of what the filter
         removed."""
         states, at = stretch.states, stretch.at
         speed = states.qd if coupling is None else coupling.to_motors(states.qd)
         sign = states.low_pass(np.tanh(speed / SIGN_SPEED))
-        other = np.zeros((len(at), model.nv))
-        if motion.tool is not None:
-            other = other + payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)
+        other = np.zeros((len(at), nv))
+        if tool is not None:
+            other = other + payload_torque(mechanism, states.q[at], tool.mass, tool.com)
         if springs is not None:
             other = other + springs(states, at)
         torque = motors.torque(states.effort)[at] - other

@@ -236,6 +236,7 @@ def test_the_benchmark_compares_and_times(
     names = ("inverse_dynamics", "forward_dynamics")
     changed = {"FUNCTIONS": names, "TIMED": names, "SHORTEST": 1e-4, "COMPARED": 150}
     changed["models"] = lambda given: [("two_link", bundled_model("two_link"))]
+    models = own["models"]
     for key, value in changed.items():
         monkeypatch.setitem(own, key, value)
     words = ["--batches", "130", "--copy", "4096", "--json", str(tmp_path / "found.json")]
@@ -249,6 +250,9 @@ def test_the_benchmark_compares_and_times(
     monkeypatch.setitem(own, "EXACT", {"float32": 1e-12, "float64": 1.0})
     assert bench["main"](words) == 1
     assert "WRONG" in capsys.readouterr().out
+    monkeypatch.setitem(own, "models", models)
+    assert bench["main"](["KR6"]) == 2
+    assert "there is no robot 'KR6'" in capsys.readouterr().err
 
 
 WRONG = {

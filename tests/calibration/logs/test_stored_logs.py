@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +12,14 @@ from calibration.conftest import smooth_log
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.logs.filter import even_grid, filtered, independent_rows, stretches
+from psdmc.calibration.logs.filter import even_grid, filtered, independent_rows, noticed, stretches
 from psdmc.calibration.logs.formats import WRITTEN, npz, parquet, text
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
-from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.stored_log import RowStore, StoredLog
+from psdmc.calibration.logs.log_survey import surveyed
+from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
+from psdmc.calibration.logs.stored_log import RowStore, StoredLog, without_start
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 
@@ -84,9 +86,9 @@ def test_in_stretches_the_answer_is_that_of_the_log_held_whole(
     known = np.isfinite(whole)
 
     limit = np.full_like(whole, 1e-9 * np.abs(whole[known]).max())
-    if (
-        physical
-    ):  # the solver stops at a relative gap of 1e-8: its square root, of a deviation or of a value without
+    # The cone solver stops at a relative gap of 1e-8. So values differ by up to sqrt(1e-8) of their standard deviation,
+    # or of themselves if they have none.
+    if physical:
         sizes = np.where(np.isfinite(whole[1]) & (whole[1] > 0.0), whole[1], np.abs(whole[0]))
         limit += 1e-4 * sizes
     assert np.all(np.abs(parts[known] - whole[known]) <= limit[known])
@@ -166,3 +168,66 @@ def test_rows_go_to_disk_when_they_are_many_and_come_back_as_they_were():
     for start, stop in ((0, 53), (4, 8), (44, 60), (53, 60)):
         assert np.array_equal(few.rows(start, stop), whole[start:stop])
         assert np.array_equal(many.rows(start, stop), whole[start:stop])
+
+
+def test_what_is_kept_of_all_rows_is_of_these_rows(long_log: Log, tmp_path: Path, monkeypatch):
+    """Views of one log on disk give what each of them gives in memory."""
+    stored = in_pieces(long_log, tmp_path, ".npz", monkeypatch)
+    renamed = replace(stored, joint_names=("one", "two"))
+    effort = replace(stored, quantity="current")
+    views = [stored, stored.ordered(("elbow", "shoulder")), without_start(stored, 3.0), renamed, effort]
+    options = FilterOptions(cutoff=8.0)
+
+    for view in (*views, *views):
+        held = view.held()
+        ours, theirs = surveyed(view, 0.02), surveyed(held, 0.02)
+        assert [each.joint for each in ours.saturated] == [each.joint for each in theirs.saturated]
+        for name in ("reach", "motion", "speed", "largest_effort", "steps"):
+            assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
+        grid = even_grid(view)
+        low_pass = LowPass.design(options, grid.period)
+        assert np.array_equal(
+            noticed(view, grid, low_pass, options).motion, noticed(held, grid, low_pass, options).motion
+        )
+    kept = len(stored.store.kept)
+    surveyed(stored, 0.02)
+    assert kept == len(stored.store.kept) == 2 * len(views)
+
+
+def test_one_uneven_step_is_found_in_any_block(long_log: Log, monkeypatch):
+    monkeypatch.setattr(sys.modules["psdmc.calibration.logs.filter"], "TIMES_AT_ONCE", 1000)
+    time = long_log.time.copy()
+    assert even_grid(replace(long_log, time=time)).same
+    time[2500] += 1e-3 * long_log.period
+    assert not even_grid(replace(long_log, time=time)).same
+
+
+def test_the_period_of_a_long_log_is_that_of_all_its_rows(long_log: Log, monkeypatch):
+    """Times in ms of 300 Hz repeat every three rows: 3, 4 and 3 ms."""
+    module = sys.modules["psdmc.calibration.logs.log"]
+    log = replace(long_log, time=np.round(np.arange(len(long_log)) / 300.0, 3))
+    expected = np.median(np.diff(log.time))
+    monkeypatch.setattr(module, "MOST_STEPS", 2000)
+    monkeypatch.setattr(module, "RUNS", 20)
+    for first in range(3):
+        assert log.rows(first, len(log)).period == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_cluster_gets_no_log(arm, long_log: Log, tmp_path: Path, monkeypatch):
+    """What workers run can be pickled for a log on disk, and has no rows of a log in memory."""
+    cloudpickle = pytest.importorskip("cloudpickle")
+    stored = in_pieces(long_log, tmp_path, ".npz", monkeypatch)
+    sizes = []
+
+    def each_part(parts, work):
+        sizes.append(len(cloudpickle.dumps(work)))
+        return ((part, work(part)) for part in parts)
+
+    for name in ("identify.linear_problem", "verdict.delivered", "verdict.evidence"):
+        monkeypatch.setattr(sys.modules[f"psdmc.calibration.{name}"], "each_part", each_part)
+    options = CalibrateOptions(physical=False, linear=LinearOptions(stretch=STRETCH))
+    for log in (stored, long_log):
+        calibrate_logs(arm.model, [log], options, arm.regressor, None, lambda step: None)
+
+    assert len(sizes) == 6
+    assert sizes[:3] == sizes[3:]
