@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from scipy import interpolate
 from psdmc.calibration.identify.motor_model import Coupling, Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.logs.filter import States, Stretch, stretches
+from psdmc.calibration.logs.filter import States, Stretch, even_grid, independent_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.log_survey import Saturated, surveyed
@@ -187,12 +188,27 @@ def evidence_of(
     springs  function from the states of a log and row indices to the springs' torques (rows, n); None: no springs
     """
     most = max(1, MOST_SHIFTED // model.nv // len(motions))
-    parts = [_samples(model, motion, motors, options, coupling, springs, most) for motion in motions]
+    logs = [checked(motion.log, model.mechanism, options.cutoff) for motion in motions]
+    counts = [len(independent_rows(even_grid(log), options, log)) for log in logs]
+    step, firsts = max(1, -(-sum(counts) // MOST_ROWS)), accumulate(counts, initial=0)
+    parts = [
+        _samples(
+            model,
+            log,
+            motion.tool,
+            motors,
+            options,
+            coupling,
+            springs,
+            most,
+            slice(-first % step, None, step),
+        )
+        for log, motion, first in zip(logs, motions, firsts, strict=False)
+    ]
     q, qd, qdd, sign, torque = (np.concatenate(x) for x in zip(*(part[:5] for part in parts), strict=True))
     noise = np.sqrt(np.mean([part[5] ** 2 for part in parts], axis=0))
     shifted = tuple(part[6] for part in parts)
     share = CheckOptions().saturated_share
-    logs = [motion.log.ordered(model.v_names) for motion in motions]
     units = dict(
         zip(model.v_names, (j.type.effort_unit for j in model.mechanism.leading_joints), strict=True)
     )
@@ -203,8 +219,7 @@ def evidence_of(
         for log in logs
         for found in surveyed(log, share).saturated
     )
-    whole = Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling, shifted, piled)
-    return whole.thinned(MOST_ROWS)
+    return Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling, shifted, piled)
 
 
 def delays_tried(cutoff: float) -> Array:
@@ -226,22 +241,24 @@ def kernel_of(options: FilterOptions) -> tuple[Array, Array]:
 
 def _samples(
     model: DynamicsModel,
-    motion: Motion,
+    log: AnyLog,
+    tool: Load | None,
     motors: Motors,
     options: FilterOptions,
     coupling: Coupling | None,
     springs: Torque | None,
     most: int,
+    wanted: slice,
 ) -> tuple[Array, Array, Array, Array, Array, Array, Shifted]:
-    """For one motion: q, qd, qdd, sign and torque of its samples, the RMS noise that passes the filter if noise has the
-    same density below the cut-off as above, and at most about so many samples with torques of other times."""
-    log = checked(motion.log, model.mechanism, options.cutoff)
+    """For a checked log: q, qd, qdd, sign and torque of the wanted ones of its samples, the RMS noise that passes the
+    filter if noise has the same density below the cut-off as above, and at most about so many samples with torques of
+    other times."""
     lags = delays_tried(options.cutoff)
     window, kernel = kernel_of(options)
     every = max(1, round(2.0 * options.cutoff * log.duration / most))
 
     # The workers of a cluster get what this function reads: neither the log nor the model.
-    tool, mechanism, nv = motion.tool, model.mechanism, model.nv
+    mechanism, nv = model.mechanism, model.nv
 
     def sampled(stretch: Stretch) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
         """Return the samples of a part, those with torques of other times, and the squares of what the filter
@@ -265,9 +282,12 @@ def _samples(
         above = np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
         return (states.q[at], states.qd[at], states.qdd[at], sign[at], torque), moved, above
 
-    parts, moved, above, count = [], [], np.zeros(model.nv), 0
+    parts, moved, above, count, first = [], [], np.zeros(model.nv), 0, wanted.start
     for stretch, (part, others, removed) in each_part(stretches(log, options), sampled):
-        parts.append(part)
+        parts.append(
+            [values[first :: wanted.step].copy() for values in part]
+        )  # a view would keep all of them
+        first = (first - len(stretch.at)) % wanted.step
         moved.append(others)
         above += removed
         count += int(stretch.at[-1] + 1 - stretch.at[0])
