@@ -169,7 +169,8 @@ def judged(
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []
     for k, name in enumerate(joint_names):
-        rows = np.arange(len(x)) if use is None else np.flatnonzero(use[:, k])
+        rows: slice | NDArray[np.intp]
+        rows = slice(None) if use is None else np.flatnonzero(use[:, k])  # without copies: logs may be long
         m, p, is_out = measured[rows, k], predicted[rows, k], out[rows]
         joints[name] = JointQuality(quality(m[~is_out], p[~is_out]), quality(m[is_out], p[is_out]))
         samples.append(Sample(name, abscissa, x[rows], m, p, is_out))

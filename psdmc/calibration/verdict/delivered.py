@@ -30,7 +30,14 @@ from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.state_friction import PARAMETERS, friction_torque
 from psdmc.calibration.identify.steps import Robot, StepOptions, judged, step_of
-from psdmc.calibration.logs.filter import States, Stretch, held_out_of, stretches
+from psdmc.calibration.logs.filter import (
+    States,
+    Stretch,
+    even_grid,
+    held_out_of,
+    independent_rows,
+    stretches,
+)
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.parts import each_part
@@ -243,12 +250,17 @@ def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) 
     chain, step = found.model.mechanism, found.step
     parts = [predicted_rows(found, log, check) for log in logs]
     time, measured, predicted = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "measured", "predicted")
+        _joined([getattr(part, name) for part in parts]) for name in ("time", "measured", "predicted")
     )
     out = np.concatenate(
         [held_out_of(log, len(part.time), step.split) for log, part in zip(logs, parts, strict=True)]
     )
     return judged("All", chain.v_names, time, measured, predicted, out)
+
+
+def _joined(arrays: list[Array]) -> Array:
+    """All arrays in one; a single one is not copied, as it may be large."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def predicted_rows(
@@ -258,7 +270,7 @@ def predicted_rows(
 
     motors  factors from logged effort to torque; None: those of the model's file
     """
-    step, motors, parts = found.step, motors or found.motors, []
+    step, motors = found.step, motors or found.motors
     friction = None if found.prediction.is_linear else _with_state(found)
 
     def predicted(part: Stretch) -> Array:
@@ -267,10 +279,14 @@ def predicted_rows(
         return _torque_with_state(found, friction, part.states, part.at)
 
     log = checked(log, found.model.mechanism, step.filter.cutoff, check)
+    count, first = len(independent_rows(even_grid(log), step.filter, log)), 0
+    whole = PredictedRows(np.empty(count), *(np.empty((count, len(log.joint_names))) for _ in range(3)))
     for stretch, torque in each_part(stretches(log, step.filter, check), predicted):
         states, at = stretch.states, stretch.at
-        parts.append((states.time[at], states.qd[at], motors.torque(states.effort)[at], torque))
-    return PredictedRows(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+        own = slice(first, first := first + len(at))
+        whole.time[own], whole.qd[own], whole.predicted[own] = states.time[at], states.qd[at], torque
+        whole.measured[own] = motors.torque(states.effort)[at]
+    return whole
 
 
 def _torque(found: Delivered, states: States, rows: slice) -> Array:
