@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import SEVERAL, bench, matches_pinocchio
+from against_pinocchio import ARM, SEVERAL, bench, matches_pinocchio
 from wide_robots import wide_robot
 
 from psdmc.functions import RECIPES
@@ -19,7 +19,7 @@ def test_it_is_pinocchios(robot: str, real: str) -> None:
 
 
 def test_it_has_the_dense_matrix_s_numbers() -> None:
-    own = bench("scara")
+    own = bench(ARM)
     states = [own.given[quantity.name] for quantity in RECIPES[NAME].signature.inputs]
     rows, columns = own.robot.pattern(NAME)
     assert (rows >= columns).all()
