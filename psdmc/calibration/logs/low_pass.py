@@ -78,7 +78,8 @@ class LowPass:
         before, behind = 2 * values[:1] - values[pad:0:-1], 2 * values[-1:] - values[-2 : -pad - 2 : -1]
         there = self._one_way(np.concatenate([before, values, behind]))
         back = self._one_way(there[::-1])[::-1]
-        return np.asarray(back[pad : pad + len(values)])
+        # Not a view in reverse order: sums over its rows would end in other digits once it was sent to a worker.
+        return np.ascontiguousarray(back[pad : pad + len(values)])
 
     def _one_way(self, values: Array) -> Array:
         """From the state in which the first value has always been there."""

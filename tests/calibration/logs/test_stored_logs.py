@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -231,3 +232,11 @@ def test_a_cluster_gets_no_log(arm, long_log: Log, tmp_path: Path, monkeypatch):
 
     assert len(sizes) == 6
     assert sizes[:3] == sizes[3:]
+
+
+def test_parts_are_the_same_once_they_were_sent(arm, long_log: Log):
+    """Pickling makes views contiguous: sums over them must not depend on that."""
+    (part,) = stretches(checked(long_log, arm.model.chain, 8.0), FilterOptions(cutoff=8.0))
+    sent = pickle.loads(pickle.dumps(part.states))
+    for name in ("q", "qd", "qdd", "effort", "raw"):
+        assert getattr(part.states, name).strides == getattr(sent, name).strides, name
