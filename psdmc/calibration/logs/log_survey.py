@@ -117,10 +117,11 @@ def _surveyed(log: AnyLog, saturated_share: float) -> Survey:
     jumps: list[Jump | None] = [None] * n
     of_motors: list[Jump | None] = []
     straight, shortest, longest = 0, np.inf, -np.inf
-    every, period = -(-len(log) // MOST_SLOPES), log.period
+    every = -(-len(log) // MOST_SLOPES)
     slopes: list[Array] = []
     efforts: list[Array] = []
     with np.errstate(all="ignore"):
+        period = log.period
         for start in range(0, len(log), STRETCH_ROWS):
             part = log.rows(max(start - 1, 0), start + STRETCH_ROWS + 1)
             low, high = (

@@ -206,7 +206,6 @@ def test_the_command(tmp_path: Path) -> None:
         (("--with", "wheel"), "cuda has no --with"),
         (("--target", "scalar"), "cuda has no --target"),
         (("--trig", "libm"), "cuda has no --trig"),
-        (("--functions", "gravity_theta_rows"), "cuda has no --functions NAME_theta_rows"),
         (("--real", "float16"), "real is 'float16'"),
         (("--functions", "x"), "x"),
     ],
