@@ -18,7 +18,7 @@ from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.low_pass import LowPass
 
-AT_ONCE_GONE = 1e-14
+ZERO_POLE = 1e-14
 """Size of a pole that stands for zero: filters of odd order at a quarter of the sampling rate have one."""
 AT_ONCE = 8192
 """Rows whose values are computed at once: a multiple of BLOCK."""
@@ -78,7 +78,7 @@ class Decays:
     def of(low_pass: LowPass) -> Decays:
         """Return the partial fractions of H(z) H(1/z) for the filter's transfer function H(z)."""
         zeros, gain = low_pass.zeros, low_pass.gain
-        poles = np.where(np.abs(low_pass.poles) < AT_ONCE_GONE, AT_ONCE_GONE, low_pass.poles)
+        poles = np.where(np.abs(low_pass.poles) < ZERO_POLE, ZERO_POLE, low_pass.poles)
         kept, sizes = poles[poles.imag >= 0.0], []
         for pole in kept:
             others = poles[poles != pole]
