@@ -107,7 +107,7 @@ class CompileRequest:
 
     @property
     def _law(self) -> tuple[object, ...]:
-        """What the friction in the dynamics depends on beside the model."""
+        """Return what the friction in the dynamics depends on beside the model."""
         return self.friction, self.smoothing_speed
 
     def opened(self) -> DynamicsModel:

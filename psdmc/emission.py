@@ -1,4 +1,4 @@
-"""What a back end receives, from a model and the options of `emit` and `compile`: kernels, facts and reference states."""
+"""Makes what a back end receives, from a model and the options of `emit` and `compile`: kernels, facts, reference states."""
 
 from __future__ import annotations
 

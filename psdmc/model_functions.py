@@ -224,7 +224,7 @@ def _values(
 def _values_by_rows(
     model: DynamicsModel, recipe: Recipe, given: Mapping[str, Array], sizes: Sizes
 ) -> Mapping[str, Array]:
-    """The same, each state with its own theta_b, which is one of the quantities given."""
+    """Compute `_values` with a theta_b for each state, which is one of the quantities given."""
     inputs = {name: array for name, array in given.items() if name != THETA_B.name}
     rows = [
         _values(model, recipe, theta, {name: array[k : k + 1] for name, array in inputs.items()}, sizes)

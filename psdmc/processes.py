@@ -36,8 +36,8 @@ def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
 
 
 def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """By one pipe to each worker and no further thread. A pool's thread that writes a long job to a worker which has ended
-    waits for ever (Python before 3.11.5, gh-94777): here writing to an ended worker is an error."""
+    """Compute by one pipe to each worker and no further thread. A pool's thread that writes a long job to a worker which
+    has ended waits for ever (Python before 3.11.5, gh-94777): here writing to an ended worker is an error."""
     spawn = multiprocessing.get_context("spawn")
     processes, pipes = [], []
     try:

@@ -215,7 +215,7 @@ def _entries(path: Path) -> dict[str, object]:
 
 
 def _content(path: Path) -> dict[str, object]:
-    """What a manifest or journal of psdmc's says; empty where there is none."""
+    """Return the content of a manifest or journal of psdmc's; empty if there is none."""
     try:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_LIST:

@@ -1,4 +1,4 @@
-"""What the self-test of a package compares: names of outputs, inputs and tolerances, which are equal in all languages."""
+"""Names, inputs and tolerances of a package's self-test, which are equal in all languages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ROWS = ("6", "nv")
 
 
 def tolerance(function: Signature, real: str) -> str:
-    """Of all outputs of a function."""
+    """Return the tolerance of all outputs of a function."""
     return (FORWARD_TOLERANCES if function.factorises else TOLERANCES)[real]
 
 

@@ -175,7 +175,7 @@ class Runner:
         return seconds * (1e9 / block)
 
     def _work(self, output: Array, count: int) -> Work:
-        """What a loop over `count` states runs over."""
+        """Return the arrays that a loop over `count` states reads and writes."""
         states, function = self._states, self.contestant.function
         inputs = states.inputs(function, self.contestant.lanes, self.contestant.convention)
         q, qd, x, *others = (vector.ctypes.data for vector in inputs)

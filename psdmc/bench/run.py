@@ -202,7 +202,7 @@ def enter(job: tuple[Entrant, Case, bool]) -> list[Contestant | Unavailable]:
 
 
 def _instructions(entrant: Entrant, case: Case) -> dict[tuple[str, str], float]:
-    """By symbol and layout; empty where valgrind is missing or fails: the column then stays empty."""
+    """Count the instructions, by symbol and layout. The result is empty if valgrind is missing or fails."""
     entries = [entry for entry in entrant.contestants(case, counted_flags()) if isinstance(entry, Contestant)]
     try:
         found = instructions(entries, case.chain)

@@ -234,7 +234,7 @@ def require_same_robot(a: Mechanism, b: Mechanism) -> None:
 
 
 def _places(chain: Mechanism) -> list[tuple[Placement, Placement]]:
-    """Of each joint its axis, and its link's frame, in the base frame at q = 0."""
+    """Return each joint's axis, and its link's frame, in the base frame at q = 0."""
     found: list[Placement] = []
     for joint, parent in zip(chain.joints, chain.parents, strict=True):
         found.append(joint.placement if parent < 0 else found[parent] @ joint.placement)

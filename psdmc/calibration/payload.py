@@ -119,7 +119,7 @@ def identify_payload(
 def _of_calibration(
     model: DynamicsModel,
 ) -> tuple[Array, LinearOptions, Array | None, Mapping[str, float] | None]:
-    """Of the model's calibration: theta_b's standard deviations, the fit's options, friction (n, f), torque constants."""
+    """Read the model's calibration: theta_b's standard deviations, the fit's options, friction (n, f), torque constants."""
     kept = model.calibrated
     if kept is None:
         return np.zeros(model.l), LinearOptions(), None, None

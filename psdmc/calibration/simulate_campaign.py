@@ -99,8 +99,8 @@ def simulate_campaign(
 
 
 def torque_constants_for(plant: str | Path, campaign: str | Path) -> list[str]:
-    """Return `JOINT=NUMBER`, N m/A, for each joint of the virtual robot if the campaign cannot find the numbers: it has no
-    runs with a load. The list is empty otherwise."""
+    """Return `JOINT=NUMBER`, N m/A, for each joint of the virtual robot if the campaign has no runs with a load. It then
+    cannot find the numbers. The list is empty otherwise."""
     if any(run.step == "motor" for run in listed_runs(campaign)):
         return []
     robot = load_virtual_robot(plant)

@@ -307,8 +307,8 @@ def _validated(
 
 
 def _is_harmless(ground: Ground, own: Verdict, r2: Mapping[str, float], why: Explanation) -> bool:
-    """Whether what makes a log unfit for a calibration leaves it fit for a test: few samples, if the file and the explained
-    changes predict them (r2, by joint), and torques of an odd size, if a load explains them."""
+    """Return whether a ground that makes a log unfit for a calibration leaves it fit for a test. These are few samples, if
+    the file and the explained changes predict them (r2, by joint), and torques of an odd size, if a load explains them."""
     limits = VerdictOptions()
     fair = all(value >= limits.fair_r2 for value in r2.values())
     if ground.code in ("wrong_gains", "contradicted"):
@@ -342,7 +342,7 @@ def _doubts(found: Delivered, result: Validation, grounds: Sequence[Ground]) -> 
 
 
 def _doubts_of_changes(result: Validation, why: Explanation, test: Changes, unusable: bool) -> list[Remark]:
-    """What may be wrong with the explanation of a significant difference."""
+    """Return remarks on what may be wrong with the explanation of a significant difference."""
     if not test.noticed:
         text = "values differ by more than noise, but the torque of these differences is too small to matter"
         return [Remark(text, "small_change")]

@@ -39,7 +39,7 @@ class EmitCommand(TyperCommand):
 
 
 def _chosen_friction(value: str | None) -> Any:
-    """What the compiler takes: True for --friction alone, else its word."""
+    """Return the compiler's option `friction`: True for --friction alone, else its word."""
     if value not in (None, "", "in-dynamics"):
         raise InputError(f"--friction={value}", "type --friction or --friction=in-dynamics")
     return True if value == "" else value

@@ -1,4 +1,4 @@
-"""What Ctrl-C does: psdmc exits at once while modules load, and prints an error of one line at any other time."""
+"""Handles Ctrl-C: psdmc exits at once while modules load, and prints an error of one line at any other time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `psdmc show` prints of a model or robot file, as text and as JSON."""
+"""Describes a model or robot file for `psdmc show`, as text and as JSON."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def require_closable(robot: Mechanism) -> Array:
 
 
 def _fewer_rows(robot: Mechanism, loop: Loop, q: Array, owners: Sequence[Loop]) -> str:
-    """What to change in a loop that cannot be assembled: its rows that no joint moves in, and a weld in place of a pin."""
+    """Say what to change in a loop that cannot be assembled: rows in which no joint moves, and a weld in place of a pin."""
     sizes = np.nanmax(np.abs(_jacobian(robot, q)), axis=(0, 2))[[each is loop for each in owners]]
     still = [
         ROW_NAMES[row]

@@ -96,7 +96,8 @@ class Arrow:
         return self._summed(list(right), [limb.reduced(self._alone(limb, right)) for limb in self.limbs])
 
     def _reduced_by(self, right: Sequence[Scalar], matrix: Matrix, vector: Sequence[Scalar]) -> list[Scalar]:
-        """The same of right - matrix vector. What a limb's columns give to the core is summed together with T^T y_l."""
+        """Return what `_reduced` returns of right - matrix vector. What a limb's columns give to the core is summed
+        together with T^T y_l."""
         found, reduced = list(right), []
         for k in self.core:
             found[k] = found[k] - _product(matrix[k], vector, self.core)

@@ -54,8 +54,8 @@ def momentum_rate_slopes(
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
 ) -> RateSlopes:
-    """Compute the derivatives of the rates of the bodies' linear momentum and of their angular momentum about the centre of
-    mass, along the axes that the first joint frame turns from. The bodies must be the real ones.
+    """Compute the derivatives of the rates of the bodies' linear momentum, and of their angular momentum about the centre
+    of mass. Components are along the axes that the first joint frame turns from. The bodies must be the real ones.
 
     The rate is A qdd + dA/dt qd with the centroidal momentum matrix A. At qd = 0, with rates in the place of qdd, the rate
     is therefore the momentum at these rates, and the derivatives are those of the momentum.

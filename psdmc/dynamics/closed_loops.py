@@ -207,7 +207,7 @@ class Part:
 
     @cached_property
     def columns(self) -> dict[int, tuple[Vector, Vector]]:
-        """By the number of the rate: the second frame's velocity per unit rate seen from the first one, before R^T."""
+        """Return the second frame's velocity, seen from the first one, per unit of each rate, by its number, before R^T."""
         found: dict[int, tuple[Vector, Vector]] = {}
         placed = joints_in_base(self.frames, self.q, self.root) if self.frames else []
         for end, own in zip(self.ends, (-1, 1), strict=True):

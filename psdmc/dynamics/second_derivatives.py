@@ -157,8 +157,8 @@ def _weighted_composites(
     axes: Sequence[Axis],
     before: Sequence[Motion],
 ) -> list[Composite]:
-    """For each joint the moments of u over the bodies beyond it, in the joint's orientation about its origin: int r u^T and
-    int u in the place of momenta, B in that of a moment."""
+    """Return for each joint the moments of u over the bodies beyond it, in the joint's orientation about its origin. In the
+    place of momenta are int r u^T and int u, and in that of a moment is B."""
     found = [Composite(MASSLESS, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))] * len(frames)
     hung: list[list[Composite]] = [[] for _ in frames]
     joined_to: list[list[Composite]] = [[] for _ in frames]
@@ -216,7 +216,7 @@ class Change(NamedTuple):
     slope: Row
 
     def carried(self, step: Step) -> Change:
-        """The same at the parent's origin, in its orientation."""
+        """Return the change at the parent's origin, in its orientation."""
         moved, pushed, driven = (step.carried(wrench) for wrench in (self.moved, self.pushed, self.driven))
         return Change(moved, pushed, driven, step.carried_row(self.row), step.carried_row(self.slope))
 
@@ -224,7 +224,7 @@ class Change(NamedTuple):
 def _changes(
     frame: Frame, axis: Axis, composite: Composite, own: Composite, before: Motion, qd: Scalar
 ) -> list[Change]:
-    """Those of each of a joint's rates."""
+    """Return the changes by each of a joint's rates."""
     wrenches = wrenches_of_motions(frame, axis, composite, qd)
     driven = [(row.c, row.a) for row in torque_rows(frame, axis, composite)]
     (w, c), (_, b) = own.momenta, own.wrench
@@ -238,8 +238,9 @@ def _changes(
 
 
 def _moved_row(axis: Axis, composite: Composite, w: Matrix, whole: Row, before: Motion, twist: Motion) -> Row:
-    """The derivative of A, B and C as the bodies beyond a joint move with a twist and take along what moves relative to the
-    link before the joint. As seen by them, u gets the field of the bent twist, and r' that of the link's motion."""
+    """Return the derivative of A, B and C if the bodies beyond a joint move with a twist. They take along what moves
+    relative to the link before the joint. As seen by them, u gets the field of the bent twist, and r' that of the link's
+    motion."""
     (slide, turn), (bent, bend) = twist, _bent(before, twist)
     body, (second, first), _ = composite
     force, moment = accelerating(body, bent, bend)
@@ -311,7 +312,7 @@ def _power(motion: Motion, wrench: Wrench) -> Scalar:
 
 
 def _add_half(block: list[list[Scalar]], i: int, j: int, value: Scalar) -> None:
-    """Set an entry to the mean of those of both orders, of which `value` is one: motions of one joint along its own axes do
+    """Set an entry to the mean of those of both orders, of which `value` is one. Motions of one joint along its own axes do
     not commute."""
     if i == j:
         block[i][j] = value

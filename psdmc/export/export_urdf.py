@@ -145,7 +145,7 @@ def _followers(model: DynamicsModel) -> list[str]:
 
 
 def _urdf(model: DynamicsModel, links: PhysicalLinks) -> tuple[Written, str, tuple[str, ...]]:
-    """What is written, the URDF's text, and notes on it."""
+    """Return what is written, the URDF's text, and notes on it."""
     kept = model.provenance
     from_file = kept.get("source_format") == "urdf" and {"source_text", "options"} <= set(kept)
     what = written(model, links, keep_frames=from_file)

@@ -49,7 +49,7 @@ def mjcf_of(what: Written) -> Element:
 
 
 def _base(world: Element, what: Written, body: Body) -> Element:
-    """What a body hangs on that hangs on the base: a free one on the world itself."""
+    """Return the element that contains a body of the base: for a free body, the world itself."""
     if not body.joint.type.about_z:
         return world
     found = world.find("body")

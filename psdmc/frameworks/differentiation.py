@@ -127,8 +127,9 @@ def refuse_constant(function: str, given: str) -> ArgumentError:
 
 
 def _with_gravity(name: str, rule: Rule, moves: bool) -> Rule:
-    """Of a function with gravity as its last input. Torques are linear in gravity: a change of gravity acts on results as
-    its torques at rest do, and at given motor torques as their opposite. Steps with several stages have no such torques."""
+    """Return the rule of a function with gravity as its last input. Torques are linear in gravity: a change of gravity
+    acts on results as its torques at rest do, and at given motor torques as their opposite. Steps with several stages
+    have no such torques."""
     names = [each.name for each in SIGNATURES[name].inputs]
     at = names.index(TAU.name) if TAU.name in names else None
     is_scalar = name == "potential_energy"
@@ -179,8 +180,9 @@ def _times(f: Framework, matrix: Array, vector: Array) -> Array:
 
 
 def _gradient(name: str) -> Rule:
-    """Of inverse and forward dynamics, with wrenches or without, which have functions for both modes. Torques are linear in
-    theta_b: the regressor gives their change, and at fixed torques accelerations change as by the opposite torques."""
+    """Return the rule of inverse or forward dynamics, with wrenches or without, which have functions for both modes.
+    Torques are linear in theta_b: the regressor gives their change, and at fixed torques accelerations change as by the
+    opposite torques."""
     is_inverse = name.startswith("inverse_dynamics")
 
     def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
@@ -210,8 +212,9 @@ def _gradient(name: str) -> Rule:
 
 
 def _contacts(name: str) -> Rule:
-    """Of a function with contacts. Its derivatives take the function's inputs by name, in another order. At fixed torques,
-    a change of theta_b acts as the opposite change of the torques, and in an impact as an impulse of the joints."""
+    """Return the rule of a function with contacts. Its derivatives take the function's inputs by name, in another order.
+    At fixed torques, a change of theta_b acts as the opposite change of the torques, and in an impact as an impulse of
+    the joints."""
     signature, backward, forward = (SIGNATURES[f"{name}{ending}"] for ending in ("", "_vjp", "_jvp"))
     names = [each.name for each in signature.inputs]
     gradients = [each.name for each in backward.outputs]
@@ -275,13 +278,14 @@ def _blocks(name: str) -> Rule:
 
 
 def _step(name: str) -> Rule:
-    """Of a time step, from the matrices A by (q, qd) and B by tau; with contacts, from B_error and force derivatives."""
+    """Return the rule of a time step, from the matrices A by (q, qd) and B by tau; with contacts, from B_error and force
+    derivatives."""
     jacobians, names = f"{name}_derivatives", [each.name for each in SIGNATURES[name].inputs]
     _, _, *others = (output.name for output in _outputs(name))
     known = [output.name for output in _outputs(jacobians)]
 
     def blocks(f: Framework, inputs: Arrays) -> dict[str, Arrays]:
-        """By each input, the derivatives of the state and those of the other outputs."""
+        """Return by each input the derivatives of the state and those of the other outputs."""
         found, nv = dict(zip(known, f.call(jacobians, *inputs), strict=True)), inputs[1].shape[-1]
         own = {"q": found["A"][..., :nv], "qd": found["A"][..., nv:], "tau": found["B"]}
         own |= {each.removeprefix("B_"): found[each] for each in known if each.startswith("B_")}
@@ -318,7 +322,8 @@ def _still(f: Framework, inputs: Arrays, like: Array) -> Arrays:
 
 
 def _bias() -> Rule:
-    """Of gravity(q) and nonlinear_effects(q, qd): inverse dynamics at zero rates, or without accelerations."""
+    """Return the rule of gravity(q) or nonlinear_effects(q, qd): inverse dynamics at zero rates, or without
+    accelerations."""
 
     def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
         like = tangents[0]
@@ -332,8 +337,8 @@ def _bias() -> Rule:
 
 
 def _columns(base: Rule) -> Rule:
-    """Of M(q) or its inverse, which is symmetric: column j is inverse or forward dynamics at rest with unit acceleration or
-    torque j, less those with none. The columns are a leading axis of the calls."""
+    """Return the rule of M(q) or its inverse, which is symmetric. Column j is inverse or forward dynamics at rest with unit
+    acceleration or torque j, less those with none. The columns are a leading axis of the calls."""
 
     def unit(f: Framework, q: Array, like: Array) -> tuple[Arrays, Arrays]:
         nv, zero = like.shape[-1], f.arrays.zeros_like(like)
@@ -361,7 +366,8 @@ def _columns(base: Rule) -> Rule:
 
 
 def _kinetic() -> Rule:
-    """Of T = qd . M qd / 2, where M qd are the torques at rest with the accelerations qd, less those without."""
+    """Return the rule of T = qd . M qd / 2, where M qd are the torques at rest with the accelerations qd, less those
+    without."""
 
     def slopes(f: Framework, inputs: Arrays, by_theta: bool) -> tuple[Array, Array, Array | None]:
         q, qd = inputs
@@ -385,7 +391,7 @@ def _kinetic() -> Rule:
 
 
 def _jacobian(function: str, is_scalar: bool = False) -> Rule:
-    """Of a function of q whose Jacobian, or gradient, another function is."""
+    """Return the rule of a function of q whose Jacobian, or gradient, another function is."""
 
     def jacobian(f: Framework, inputs: Arrays) -> Array:
         (found,) = f.call(function, *inputs)
@@ -403,7 +409,8 @@ def _jacobian(function: str, is_scalar: bool = False) -> Rule:
 
 
 def _poses() -> Rule:
-    """Of forward kinematics, by the frames' Jacobian: an axis of a frame that turns at w moves at w x axis."""
+    """Return the rule of forward kinematics, by the frames' Jacobian: an axis of a frame that turns at w moves at w x
+    axis."""
 
     def along(f: Framework, inputs: Arrays, tangents: Arrays, dtheta: Array | None) -> Arrays:
         (jacobian,) = f.call("frame_jacobian", *inputs)

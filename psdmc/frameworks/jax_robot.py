@@ -173,7 +173,8 @@ class JaxRobot:
         return self._coordinates.normalized(array) if is_wide else array
 
     def _kernel(self, function: Signature, theta: bool, asked: str = "", order: int = 0) -> Kernel:
-        """The same object for the same function: JAX compares the parameters of its primitives."""
+        """Return the kernel, which is the same object for the same function: JAX compares the parameters of its
+        primitives."""
         asked = asked or function.name
         key = (function.name, theta, asked, order)
         return self._kernels.setdefault(key, Kernel(self, function, theta, asked, order))
@@ -356,7 +357,7 @@ def _batched(primitive: Any) -> Callable[..., Any]:
 
 
 def _places_of_theta(kernel: Kernel, count: int, by_theta: bool = False) -> tuple[int, ...]:
-    """Which arguments of a primitive are theta_b or its tangent."""
+    """Return the positions of theta_b and of its tangent in the arguments of a primitive."""
     own = (len(kernel.function.inputs),) if kernel.theta else ()
     return (*own, count - 1) if by_theta else own
 

@@ -241,7 +241,8 @@ for _function in SIGNATURES.values():
 
 @dataclass(frozen=True, slots=True)
 class _Calls:
-    """What rules call: operators of one robot, with the caller's theta_b, for the function that the user asked for."""
+    """The functions that rules call: operators of one robot, with the caller's theta_b, for the function that the user
+    asked for."""
 
     robot: TorchRobot
     asked: str

@@ -53,7 +53,7 @@ def read_law(path: Path) -> dict[str, Any]:
 
 
 def _where(error: Exception, path: Path) -> str:
-    """What went wrong in a file, with the line where there is one."""
+    """Say what went wrong in a file, with the line if there is one."""
     line, trace = getattr(error, "lineno", None), error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == str(path):

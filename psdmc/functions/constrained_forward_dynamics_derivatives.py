@@ -95,8 +95,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def _in_limbs(g: Ingredients) -> Outputs:
-    """The same by thin factors, limb by limb (forward_dynamics_derivatives). Minus the contact forces are further unknowns
-    of the limbs."""
+    """Compute the derivatives by thin factors, limb by limb (forward_dynamics_derivatives). Minus the contact forces are
+    further unknowns of the limbs."""
     q, qd, nv = g.inputs["q"], g.inputs["qd"], len(g.still)
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
     at_rest = torque_derivatives(g, g.still)
@@ -132,8 +132,8 @@ def _in_limbs(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
-    """Return the function's body as loops and two calls: of forward dynamics with contacts, then of the derivatives of
-    forward dynamics, at torques that contain the contact forces. Besides those of `Counts.arrays`, the arrays are:
+    """Return the function's body as loops and two calls. The first is of forward dynamics with contacts, the second of the
+    derivatives of forward dynamics, at torques that contain the contact forces. Besides those of `Counts.arrays`, the arrays are:
 
     load        tau + J^T f
     same        accelerations, again

@@ -70,8 +70,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
-    """Return the function's body: a call of the derivatives of forward dynamics with contacts, whose results are internal
-    arrays (`of_` and the name of those that are copied to outputs), and loops."""
+    """Return the function's body: a call of the derivatives of forward dynamics with contacts, and loops. Results of the
+    call are internal arrays; those that are copied to outputs are named `of_` and the output's name."""
     counts = Counts.of(Constraints(frames, named, loops))
     nv, rows, errors = counts.nv, counts.rows, counts.contact_rows
     widths = dict(zip((block.name for block in BLOCKS), 2 * (nv, nv, nv, errors), strict=True))

@@ -56,7 +56,7 @@ def traced(
 
 
 def _in_limbs(g: Ingredients) -> Outputs:
-    """The same by thin factors, without a product of n x n matrices."""
+    """Compute the derivatives by thin factors, without a product of n x n matrices."""
     at_rest = _torque_derivatives(g, g.still)
     arrow = eliminated(g.frames, at_rest.by_qdd)
     load = [tau - own for tau, own in zip(g.inputs["tau"], at_rest.gravity, strict=True)]

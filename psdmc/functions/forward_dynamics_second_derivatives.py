@@ -212,8 +212,8 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
-    """From Pinocchio's derivatives, and differences of its gradient of inverse dynamics. Differences of the gradient of
-    forward dynamics would be less exact if the mass matrix is nearly singular."""
+    """Compute the expected values from Pinocchio's derivatives, and differences of its gradient of inverse dynamics.
+    Differences of the gradient of forward dynamics would be less exact if the mass matrix is nearly singular."""
     qdd, *slopes = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
     weights = weighted(given[COTANGENT_OF_QDD.name], slopes[2])
     there = {**given, "qdd": qdd, COTANGENT.name: weights}

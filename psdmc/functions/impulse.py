@@ -78,8 +78,8 @@ def trace(g: Ingredients) -> Outputs:
 def of_limbs(
     g: Ingredients, mass: Rows, rows: Rows
 ) -> tuple[list[Scalar], list[Scalar], list[Scalar], Arrow]:
-    """Return the change of the rates, the impulses, the pivots and signs, and the elimination limb by limb, from the mass
-    matrix and the contact Jacobian."""
+    """Return the change of the rates, the impulses, the pivots and signs, and the elimination limb by limb. Given are the
+    mass matrix and the contact Jacobian."""
     (restitution,) = g.inputs[RESTITUTION.name]
     mask, count = Held.of(g), len(g.still)
     on, shift, one = mask.rows
@@ -94,8 +94,8 @@ def of_limbs(
 
 
 def solved_after(g: Ingredients) -> Solved:
-    """Return what `solved` returns, with the rates after the impact in the place of their change, and with a sign -1 for
-    each contact if restitution is not from 0 to 1."""
+    """Return what `solved` returns, with the rates after the impact in the place of their change. If restitution is not
+    from 0 to 1, the sign of each contact is -1."""
     (restitution,) = g.inputs[RESTITUTION.name]
     found, signs, factors, rows = solved(g)
     after = [rate + change for rate, change in zip(g.inputs[BEFORE.name], found.motion, strict=True)]

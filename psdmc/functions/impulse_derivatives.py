@@ -95,7 +95,7 @@ def _reversed(
 
 
 def _in_limbs(g: Ingredients) -> Outputs:
-    """The same by thin factors, limb by limb (constrained_forward_dynamics_derivatives)."""
+    """Compute the derivatives by thin factors, limb by limb (constrained_forward_dynamics_derivatives)."""
     q, before, nv = g.inputs["q"], g.inputs[BEFORE.name], len(g.still)
     (restitution,) = g.inputs[RESTITUTION.name]
     jacobian = contacts.contact_jacobian(g.frames, g.named, q, g.root)

@@ -1,5 +1,5 @@
-"""Constraints and costs that keep links physically possible in a fit: positive definite pseudo-inertias, positive
-drive inertias, and a small distance from the bodies in the robot file."""
+"""Constraints and costs that keep links physically possible in a fit. These are positive definite pseudo-inertias,
+positive drive inertias, and a small distance from the bodies in the robot file."""
 
 from __future__ import annotations
 

@@ -110,8 +110,8 @@ def _likeness(blocks: Sequence[Block], z: Array) -> float:
 
 
 def _rounder(block: Block) -> Block:
-    """The block with a diagonal to resemble, none of whose entries is small beside the others: a thin one would leave no
-    digits for the shift."""
+    """Return the block with a diagonal to resemble, none of whose entries is small beside the others. A thin one would leave
+    no digits for the shift."""
     diagonal = np.diag(block.near)
     return replace(block, near=np.diag(np.maximum(diagonal, ROUND * diagonal.max())), weight=1.0)
 

@@ -132,7 +132,7 @@ def _blocks(model: DynamicsModel, start: Array, free: Array) -> list[Block]:
 
 
 def _resembled(link: Array, held: list[int]) -> tuple[Array, bool]:
-    """What a link should resemble: the file's body where it is one, else what the physical fit takes for it."""
+    """Return what a link should resemble: the file's body if it can exist, else what the physical fit takes for it."""
     if np.isfinite(link).all() and _is_body(link) and _least_share(link) > RESEMBLED:
         return np.array(pseudo_inertia(link[:BODY_PARAMETERS].tolist()))[np.ix_(held, held)], True
     return reference_body(link, held)

@@ -1,4 +1,4 @@
-"""Which functions psdmc can generate for a model. Some need a positive definite mass matrix, or links whose parameters
+"""Tells which functions psdmc can generate for a model. Some need a positive definite mass matrix, or links whose parameters
 are all known. Code that contains theta_b as constants needs a known theta_b."""
 
 from __future__ import annotations

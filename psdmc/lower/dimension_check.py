@@ -189,7 +189,8 @@ class _Measured:
 
 
 def _theta_dimensions(lift: Array, frames: Sequence[Frame]) -> tuple[list[Dimension], list[Dimension]]:
-    """Those of base parameters, each that of the first standard parameter that it is a part of, and of standard ones."""
+    """Return the dimensions of base and of standard parameters. A base parameter has that of its first standard
+    parameter."""
     standard = [
         Dimension(1, frame.joint.drive_order) if name == DRIVE else each
         for frame in frames

@@ -422,7 +422,7 @@ class _Lowered:
         yield from traced
 
     def _with_digits(self, frames: Sequence[Reframed], theta: bool = False) -> Sequence[Reframed]:
-        """Those in which a regressor keeps its digits."""
+        """Return the frames in which a regressor keeps its digits."""
         search = self._search(theta)
         return [each for each in frames if search.keeps_digits(each)] or [self.geometry.unmoved]
 

@@ -92,8 +92,8 @@ class Place:
     is_first: bool = False
 
     def constant(self, values: Sequence[float]) -> Scalar:
-        """Return one constant for this place, from the numbers of its joints: the number itself, or a constant with one
-        value per limb (such as a leg)."""
+        """Return one constant for this place, from the numbers of its joints. It is the number itself, or a constant with
+        one value per limb (such as a leg)."""
         return values[0] if self.group is None else lanes(self.group, values)
 
     def placed(self, frames: Sequence[Placement]) -> LinkFrame | Placement:

@@ -330,7 +330,7 @@ class _Trace:
         return slot
 
     def _products(self, found: Mapping[Slot, Scalar]) -> Iterator[ThinProducts]:
-        """What is multiplied behind the stages, for each kind of columns; nothing where the robot has no core."""
+        """Yield the products behind the stages, one for each kind of columns; none if the robot has no core."""
         rates = self._along("nv")
         core = [k for k, (group, _) in enumerate(rates) if group is None]
         if not self.groups or not self.signature.thin or not core:

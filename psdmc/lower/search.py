@@ -310,8 +310,8 @@ class Search:
             yield replace(plain, choices=choices)
 
     def _units(self, found: Arrangement) -> Iterator[Arrangement]:
-        """Each length of the robot as the unit, or none: with sliding joints, variables would need scaling, and the pitch of
-        a screw is in m."""
+        """Yield the arrangement with each length of the robot as the unit. With sliding joints there is none: variables
+        would need scaling, and the pitch of a screw is in m."""
         frames = found.reframed.frames
         if any(frame.joint.length_order or frame.joint.has_length for frame in frames):
             return

@@ -37,7 +37,7 @@ class Answers:
     __slots__ = ()
 
     def _answer(self, name: str, *given: Any, **named: Any) -> Any:
-        """What one of these functions gives."""
+        """Return what one of these functions computes."""
         return _PROVIDERS[0]().bound(self, name)(*given, **named)
 
     def __getattr__(self, name: str) -> Any:

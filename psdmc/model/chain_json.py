@@ -84,7 +84,7 @@ def _frames_to_json(chain: Mechanism) -> dict[str, Any]:
 
 
 def _tree_to_json(chain: Mechanism) -> dict[str, Any]:
-    """What each joint hangs on and follows, and where the tip is."""
+    """Return what each joint hangs on and follows, and where the tip is."""
     if is_plain_chain(chain):
         return {}
     followed = [

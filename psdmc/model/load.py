@@ -308,7 +308,7 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
 
 
 def _calibrated(manifest: Mapping[str, Any], chain: Mechanism) -> Calibrated | None:
-    """What a calibration found; ValueError unless its joints are the chain's."""
+    """Read what a calibration found. Raises ValueError unless its joints are the chain's."""
     if "calibration" not in manifest:
         return None
     found = from_json(manifest["calibration"])

@@ -116,7 +116,7 @@ def _drawn(model: DynamicsModel) -> tuple[Array, Array, Array]:
 
 
 def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
-    """(poses,) whether M is positive definite, each joint in the unit in which its own inertia is one, so that a
+    """Return (poses,) whether M is positive definite. Each joint is in the unit in which its own inertia is one, so that a
     finger's inertia does not count as rounding of its arm's. `smallest` (nv,) is the inertia below which a rate has
     none."""
     inertias = np.einsum("pii->pi", mass)
@@ -160,7 +160,7 @@ def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
 
 
 def _travels(mechanism: Mechanism, travel: Array) -> list[Any]:
-    """Of each joint how far its own coordinates go; a follower's is that of its leader by its ratio, and its offset."""
+    """Return how far each joint's own coordinates go. A mimic joint has its leader's, times its ratio, and its offset."""
     own = dict(zip(mechanism.own_joints, positions(frames_of(mechanism), travel.tolist()), strict=True))
     return [
         own[i]

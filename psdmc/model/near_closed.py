@@ -61,8 +61,8 @@ def near_closed(robot: Mechanism, rng: np.random.Generator, count: int) -> Array
 def _stepped(
     frames: Sequence[Frame], loops: Sequence[Loop], q: Array, moving: Sequence[int], damping: float
 ) -> tuple[Array, Array, Array]:
-    """q after one Newton step of these rates, the step's squared length before it was shortened, and the smallest share of a
-    row's square that the rows after it do not explain."""
+    """Return q after one Newton step of these rates, and the step's squared length before it was shortened. The third result
+    is the smallest share of a row's square that the rows after it do not explain."""
     errors = loop_error(frames, loops, list(q.T))
     rows = [[row[k] for k in moving] for row in loop_jacobian(frames, loops, list(q.T))]
     wide = [[inner_product(a, b) for b in rows] for a in rows]

@@ -128,7 +128,7 @@ def number(*given: Known) -> Known:
 
 
 def angle(y: Known, x: Known) -> Known:
-    """That of the angle of two alike."""
+    """Return the dimension of the angle of two values of one dimension."""
     alike(y, x)
     return NUMBER
 

@@ -12,7 +12,7 @@ from enum import StrEnum
 
 
 class Structure(StrEnum):
-    """Which entries of a symmetric matrix are zero at every state.
+    """The entries of a symmetric matrix that are zero at every state.
 
     DENSE   no entry is zero at every state
     LIMBS   branches (limbs) on a common body: the entry of two joints is zero if neither joint carries the other.

@@ -85,7 +85,7 @@ def traced_stage_costs(
 def _needed(
     steps: Sequence[Step], stored: Sequence[tuple[Slot, int]], partial_of: Mapping[int, int]
 ) -> tuple[bytearray, list[int]]:
-    """Which steps some output needs, through sums, too, and the values that are summed. A value precedes its sum."""
+    """Return which steps some output needs, through sums, too, and the values that are summed. A value precedes its sum."""
     needed, partials = bytearray(len(steps)), []
     for _, index in stored:
         needed[index] = 1

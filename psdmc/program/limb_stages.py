@@ -63,7 +63,7 @@ class _Split:
         return groups
 
     def _levels(self) -> list[int]:
-        """Of each value how many sums it depends on, one behind the other."""
+        """Return how many sums each value depends on, one behind the other."""
         stored = dict(self.program.outputs)
         levels = [0] * len(self.program)
         for _ in range(len(self.program) + 1):
@@ -87,7 +87,7 @@ class _Split:
         return vector in self.owner or vector in self.partial_of
 
     def _stored(self) -> dict[Place, list[tuple[Slot, int]]]:
-        """What each stage puts out of what the whole PROGRAM does."""
+        """Return the outputs of each stage, of those of the whole PROGRAM."""
         stored: dict[Place, list[tuple[Slot, int]]] = {}
         for slot, i in self.program.outputs:
             group = self.owner.get(slot.vector, THE_CORE)

@@ -73,7 +73,7 @@ class _Cut:
         self.leaving, self.computed = self._leaving(), self._computed()
 
     def _stored_at(self, groups: Sequence[Collection[Slot]], late: bool) -> dict[Slot, int]:
-        """Of each output the position in the order behind which it is stored."""
+        """Return for each output the position in the order behind which it is stored."""
         last = len(self.order) - 1
         if late:
             return {slot: last for slot, _ in self.program.outputs}
@@ -119,7 +119,7 @@ class _Cut:
         return {before, behind} <= {Op.SIN, Op.COS}
 
     def _crossing_at(self) -> list[int]:
-        """Of each position how many values from before it are read from it on."""
+        """Return for each position how many values from before it are read from it on."""
         last = list(self.position)
         for position, i in enumerate(self.order):  # ascending: the last one stays
             for a in self.program.body[i].args:
@@ -195,7 +195,7 @@ class _Cut:
         return slots, lengths
 
     def _leaving(self) -> list[list[int]]:
-        """Of each part the values that it stores for later ones."""
+        """Return for each part the values that it stores for later ones."""
         leaving: list[list[int]] = [[] for _ in self.outputs]
         for i in filter(self.read_in.__contains__, self.order):
             home = self._home(i)
@@ -204,7 +204,7 @@ class _Cut:
         return leaving
 
     def _computed(self) -> list[list[int]]:
-        """Of each part the values that it computes."""
+        """Return for each part the values that it computes."""
         computed: list[list[int]] = [[] for _ in self.outputs]
         for i in self.order:
             if self.program.body[i].op is not Op.LOAD:

@@ -147,7 +147,7 @@ class Quantity:
 
     @property
     def dimension(self) -> Dimension:
-        """What all entries have in common."""
+        """Return the dimension that all entries have in common."""
         return dimension_of(self.unit)
 
     def dimensions(self, axes: Mapping[str, Sequence[Dimension]]) -> list[Dimension]:
@@ -298,7 +298,7 @@ class Signature:
 
     @property
     def of_limbs(self) -> Signature:
-        """What traces with limbs give."""
+        """Return the signature of traces with limbs."""
         if not self.thin:
             return self
         factors = Quantity(THIN, ("nv", "nv"), unit="1", powers=(1, -1))

@@ -1,4 +1,4 @@
-"""What the functions of closed loops have in common."""
+"""The common parts of the functions of closed loops."""
 
 from __future__ import annotations
 

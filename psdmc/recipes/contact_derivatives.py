@@ -153,8 +153,8 @@ def pushed_motion(
 
 
 def held_inverse(of: Constraints, motion: str, forces: str) -> Iterator[Region]:
-    """Loops that change the array `motion` from M^-1 to the derivatives of the motion with contacts by the load, and store
-    those of the contact forces."""
+    """Yield loops that change the array `motion` from M^-1 to the derivatives of the motion with contacts by the load. They
+    store those of the contact forces, too."""
     counts = Counts.of(of)
     nv, rows = counts.nv, counts.rows
     seen, push = Block("seen", nv), Block("push", nv)
@@ -197,7 +197,7 @@ def minus(rows: Rows) -> list[list[Scalar]]:
 def changed_on_arrays(
     robot: RobotOnArrays, given: Mapping[str, Array], loads: Sequence[Array], wanted: Sequence[Array]
 ) -> tuple[list[Array], list[Array], tuple[Array, Array, Array]]:
-    """Return the derivatives of the motion and of the contact forces, in NumPy, for k states, from those of the load,
+    """Return the derivatives of the motion and of the contact forces, in NumPy, for k states. Given are those of the load,
     (k, nv, columns) each, and of the prescribed motion, (k, rows, columns) each.
 
     The last result is the inverse mass matrix on the contacts, the derivatives of the forces by the load, and the
@@ -237,8 +237,8 @@ def slopes_on_arrays(
     of_loops: Array | None = None,
     kp: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Return, for k states, the derivatives by q of J^T f, (k, nv, nv), and those by q and by qd of the accelerations
-    J motion + dJ/dt qd of contacts and loops, (k, rows, nv).
+    """Return two kinds of derivatives for k states. They are those of J^T f by q, (k, nv, nv), and those of the accelerations
+    J motion + dJ/dt qd of contacts and loops, by q and by qd, (k, rows, nv).
 
     of_loops  the motion in the loops' rows; left out: `motion`
     kp        what multiplies the loops' errors, which are added to their accelerations, (k,); left out: 0

@@ -119,8 +119,8 @@ class ContactFunction:
         return self.gradient_and_adjoint(g)[0]
 
     def gradient_and_adjoint(self, g: Ingredients) -> tuple[Outputs, list[Scalar]]:
-        """Return the gradient function's outputs, and the adjoint of the motion: the nv derivatives of the weighted sum by
-        r, the right-hand side of M x - J^T f = r."""
+        """Return the gradient function's outputs, and the adjoint of the motion. The adjoint has the nv derivatives of the
+        weighted sum by r, the right-hand side of M x - J^T f = r."""
         found, signs, factors, _ = self.solved(g)
         motion, forces = (g.inputs[each.name] for each in self.weights)
         load, push = solved_again(factors, found, motion, [-each for each in forces], Held.of(g).rows[0])
@@ -188,6 +188,6 @@ class ContactFunction:
         return values
 
     def _plain(self, found: Arrays) -> Arrays:
-        """What is no derivative."""
+        """Return the arrays that are no derivatives."""
         names = {*(output.name for output in self.outputs), PIVOTS}
         return {name: values for name, values in found.items() if name in names}

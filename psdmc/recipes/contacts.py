@@ -173,8 +173,8 @@ class Held(NamedTuple):
         return [sums[kind] for kind in kinds]
 
     def signs(self, positive: Sequence[Scalar]) -> list[Scalar]:
-        """Return a sign for each contact: -1 if a number of one of its rows is not positive, or if active or mu is not
-        allowed, else 1."""
+        """Return a sign for each contact. It is -1 if a number of one of its rows is not positive, or if active or mu is
+        not allowed, else 1."""
         signs, left = [], iter(positive)
         for sign, count in zip(self.allowed(), self.counts, strict=True):
             for value in islice(left, count):

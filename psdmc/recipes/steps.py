@@ -88,7 +88,7 @@ def semi_implicit(
 
 
 def _moved(rows: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]) -> list[list[Scalar]]:
-    """What rates' rows, times dt, move the end of the step by."""
+    """Return the motion of the step's end by rates' rows, times dt."""
     found: list[list[Scalar]] = []
     for own in slopes:
         block = [[dt * x for x in row] for row in rows[len(found) :][: 1 if own is None else len(own.by_way)]]

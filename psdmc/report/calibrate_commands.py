@@ -1,4 +1,4 @@
-"""What the commands `psdmc excite`, `simulate` and `calibrate` do: read files, compute, and write files."""
+"""Runs the commands `psdmc excite`, `simulate` and `calibrate`: read files, compute, and write files."""
 
 from __future__ import annotations
 

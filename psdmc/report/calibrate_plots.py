@@ -95,7 +95,7 @@ def excitation_panels(
 
 
 def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()) -> bytes:
-    """The same four in one SVG file."""
+    """Draw the same four pictures in one SVG file."""
 
     def draw(figure: Figure) -> None:
         panels = _excitation(found, joint_names, limits)
@@ -115,7 +115,7 @@ def limit_lines(limits: Sequence[Limits]) -> tuple[list[tuple[float, float]], ..
 def _excitation(
     found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits]
 ) -> list[tuple[str, Callable[[Axes], None]]]:
-    """What each picture says and how it is drawn."""
+    """Return what each picture says and how it is drawn."""
     motion = found.motion.sampled(tuple(joint_names), found.motion.duration / 400)
     positions, speeds, accelerations = limit_lines(limits)
 

@@ -1,4 +1,4 @@
-"""What `psdmc validate` and `psdmc compare` print, and the same results as an HTML page and as JSON."""
+"""Writes what `psdmc validate` and `psdmc compare` print, and the same results as an HTML page and as JSON."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def page_of(found: Validation | Comparison) -> PageView:
 
 
 def validation_page(found: Validation) -> PageView:
-    """What the page of a validation shows."""
+    """Return the HTML page of a validation."""
     in_amperes = any(math.isfinite(j.rms_current) for j in found.joints)
     head = ["Joint", "R²", "RMS error", "Largest", "Moving +", "Moving -", "R² refitted"]
     head += ["RMS [A]", "Largest [A]"] if in_amperes else []
@@ -187,7 +187,7 @@ def _labelled(axis: Axes, joint: JointError | Curve, what: str, x: str = "") -> 
 
 
 def comparison_page(found: Comparison) -> PageView:
-    """What the page of a comparison shows."""
+    """Return the HTML page of a comparison."""
     joints = [
         [
             *(j.joint, f"{j.rms:.3g} {j.unit}", f"{j.share:.1%}"),

@@ -369,7 +369,7 @@ def _segment(
 
 
 def _links(chain: Mechanism) -> list[dict[str, Any]]:
-    """From joint to joint, and from the last joints to named frames."""
+    """Draw links from joint to joint, and from the last joints to named frames."""
     here = (0.0, 0.0, 0.0)
     joints = [((parent, here), (k, here), chain.parent_link(k)) for k, parent in enumerate(chain.parents)]
     ends: list[tuple[Any, Any, str]] = [

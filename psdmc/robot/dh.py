@@ -32,7 +32,7 @@ UNKNOWN = math.nan
 
 @dataclass(frozen=True, slots=True)
 class DhLink:
-    """The inertia of one link of a DH table: mass in kg, com in m in the link's frame, and inertia_com in kg m^2 about
+    """The inertia of one link of a DH table: mass in kg, and com in m in the link's frame. inertia_com is in kg m^2 about
     the centre of mass (INERTIA_NAMES). Unknown numbers are NaN."""
 
     mass: float = UNKNOWN
@@ -62,8 +62,8 @@ class DhJoint:
 
 @dataclass(frozen=True, slots=True)
 class DhRobot:
-    """The content of a DH file: name, convention, rows, gravity in m/s^2 along the axes of the base frame, and tables of
-    closed loops (closed_loops.py)."""
+    """The content of a DH file: name, convention, rows, and gravity in m/s^2 along the axes of the base frame. There are
+    also tables of closed loops (closed_loops.py)."""
 
     name: str
     convention: Convention

@@ -17,7 +17,7 @@ from psdmc.robot.urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
 
 def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> dict[str, float]:
-    """Return the position, rad or m, of each locked joint: joints in `lock`, mimic joints that follow one of them, and
+    """Return the position, rad or m, of each locked joint. These are joints in `lock`, mimic joints that follow one, and
     mimic joints with a multiplier of zero.
 
     Raises InputError if `lock` names no movable joint or a position that the joint cannot have, and for joints of a

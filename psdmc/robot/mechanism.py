@@ -122,8 +122,8 @@ ROW_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 def contact_names(
     contacts: Iterable[tuple[str, int]], loops: Iterable[tuple[str, Sequence[int]]] = ()
 ) -> dict[str, tuple[str, ...]]:
-    """Return names of entries by the word of their axis: contacts, their rows (such as 'foot.x'), rows of loops, rows of
-    both, and both in the words of messages."""
+    """Return names of entries by the word of their axis. These are contacts, their rows (such as 'foot.x'), rows of
+    loops, rows of both, and both in the words of messages."""
     own, closed = tuple(contacts), tuple(loops)
     rows = tuple(f"{name}.{axis}" for name, count in own for axis in ROW_NAMES[:count])
     others = tuple(f"{name}.{ROW_NAMES[row]}" for name, places in closed for row in places)

@@ -87,7 +87,7 @@ class Reference:
 
     @property
     def weightless(self) -> Reference:
-        """The same robot without gravity."""
+        """Return the robot without gravity."""
         model = self.model.copy()
         model.gravity = pinocchio.Motion.Zero()
         return replace(self, model=model)
@@ -140,8 +140,8 @@ class Reference:
         return self.forward_dynamics(q, qd, tau, wrenches), by_q, by_qd, by_tau
 
     def second_derivatives(self, gradient: Callable[..., Sequence[Array]], *states: Array) -> Array:
-        """Return (..., 3 nv, 3 nv) second derivatives from this gradient by q, qd and a third vector: its central
-        differences, for q of eighth order and along `integrate`. The gradient may be at most quadratic in qd and the third
+        """Return (..., 3 nv, 3 nv) second derivatives from this gradient by q, qd and a third vector. They are
+        its central differences, for q of eighth order and along `integrate`. The gradient may be at most quadratic in qd and the third
         vector: then these differences are exact. Joints with several coordinates: the mean of both orders."""
         nv = self.model.nv
         columns = []

@@ -127,7 +127,7 @@ def _masses(function: Signature) -> list[str]:
 
 
 def _failures(function: Signature) -> list[str]:
-    """What happens where a matrix is not positive definite: paragraphs."""
+    """Return paragraphs on what happens if a matrix is not positive definite."""
     found = []
     for matrix in function.factorises:
         if matrix.error:

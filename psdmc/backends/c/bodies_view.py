@@ -1,5 +1,5 @@
-"""C text for the functions that compute theta_b (the base parameters) from the masses and inertias of all bodies, and add
-a load to it."""
+"""Makes C text for functions of theta_b, the base parameters. They compute it from all bodies' masses and inertias, and
+add a load to it."""
 
 from __future__ import annotations
 

@@ -50,8 +50,8 @@ class Expr(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Which values of a PROGRAM (the list of operations to generate) become C variables, decided before any expression
-    is written.
+    """Tells which values of a PROGRAM (the list of operations to generate) become C variables. This is decided before any
+    expression is written.
 
     named    for each value, whether it becomes a variable: outputs, and values that are used more than once
     uniform  for each value, whether it is equal for all states of a batch

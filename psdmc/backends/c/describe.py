@@ -90,7 +90,7 @@ def _arrays(info: PackageInfo) -> tuple[str, ...]:
 
 
 def _forms(target: Target) -> tuple[str, ...]:
-    """What a call may overlap, and the meaning of the variants' names."""
+    """Return lines that say what a call may overlap, and what the variants' names mean."""
     if not target.has_batches:
         return ("input.", "  _theta      with the base parameters theta_b given at run time")
     return (

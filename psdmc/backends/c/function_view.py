@@ -40,7 +40,7 @@ class FunctionView:
 
     @property
     def products(self) -> tuple[Multiplication, ...]:
-        """Those of all kernels."""
+        """Return the products of all kernels."""
         return tuple(p for kernel in self.kernels for p in kernel.single_body.products)
 
     @property

@@ -65,7 +65,7 @@ class VectorWidth:
 
 
 def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
-    """Those of the target, widest first."""
+    """Return the vector widths of the target, widest first."""
     integer = "long long" if options.real == "float64" else "int"
     return tuple(
         VectorWidth(unit.bytes // options.real_bytes, unit, integer) for unit in options.target.vectors

@@ -41,7 +41,7 @@ class Rows:
 
     @property
     def written(self) -> Iterator[tuple[int, Lane | None]]:
-        """What is stored, in its order."""
+        """Yield each stored entry with the lane that holds it, in the order of memory."""
         for limb, (first, width) in enumerate(zip(self.at, self.widths, strict=True)):
             for k in range(width):
                 slot = self.slots[k]
@@ -69,7 +69,7 @@ class Packed:
 
     @property
     def written(self) -> Iterator[tuple[int, Lane | None]]:
-        """What is stored, in its order."""
+        """Yield each stored entry with the lane that holds it, in the order of memory."""
         lanes = [(self.group.number, slot, limb) for limb in range(self.group.count) for slot in self.slots]
         yield from enumerate(lanes, self.first)
 
@@ -84,7 +84,7 @@ class Gathered:
 
     @property
     def written(self) -> Iterator[tuple[int, Lane | None]]:
-        """What is stored, in its order."""
+        """Yield each stored entry with the lane that holds it, in the order of memory."""
         yield from enumerate(self.lanes, self.first)
 
 

@@ -192,7 +192,7 @@ class StageView:
 
     @property
     def header(self) -> str:
-        """What the body's macros mean."""
+        """Return the header that defines the body's macros."""
         return f"limbs{self.count}.h" if self.count else "one_state.h"
 
 

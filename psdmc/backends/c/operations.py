@@ -36,7 +36,7 @@ class CallView:
         return ", ".join(self.parameters)
 
     def single(self, suffix: str) -> str:
-        """What the macro is for one state."""
+        """Return what the macro stands for if the code computes one state."""
         return (
             f"{self.function('real')}({self.arguments})"
             if self.has_header

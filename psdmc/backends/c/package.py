@@ -251,8 +251,8 @@ class PackageView:
 
     @property
     def has_calls_apart(self) -> bool:
-        """Return whether the code calls static functions that must not be inlined: parts of long functions, or a second
-        code for states that limbs (such as legs) in lanes cannot compute."""
+        """Return whether the code calls static functions that must not be inlined. These are parts of long functions, or
+        a second code for states that limbs (such as legs) in lanes cannot compute."""
         return self.has_parts or any(each.limbs and each.limbs.checked for each in self._all_kernels)
 
     @property

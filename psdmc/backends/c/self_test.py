@@ -264,7 +264,7 @@ class SelfTestView:
 
     @property
     def load_tolerance(self) -> str:
-        """Of the functions that give theta_b."""
+        """Return the tolerance of the functions that give theta_b."""
         return TOLERANCES[self.options.real]
 
     @property

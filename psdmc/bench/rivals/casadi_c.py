@@ -110,9 +110,9 @@ def _generated(case: Case) -> Path:
 
 @lru_cache
 def program_on_symbols(file: str, text: str) -> Path:
-    """A C++ program that runs Pinocchio on CasADi's symbols, from the name and text of its file, which may include
-    pinocchio_model.hpp and serial_joints.hpp. It is compiled once for all robots, unoptimised: it runs for a tenth of a
-    second."""
+    """Compile a C++ program that runs Pinocchio on CasADi's symbols, from the name and text of its file. The text may
+    include pinocchio_model.hpp and serial_joints.hpp. It is compiled once for all robots, unoptimised: it runs for a tenth
+    of a second."""
     casadi, prefix = _casadi(), pinocchio_prefix()
     name = Path(file).stem
     sources = {file: text} | {each: source(each) for each in ("pinocchio_model.hpp", "serial_joints.hpp")}
@@ -164,7 +164,7 @@ def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
 
 
 def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
-    """The same C compiled as C++, with a vector as its number type."""
+    """Compile the C as C++, with a vector as its number type."""
     size = {way: outputs_of(case, function) for function, ways in ways_of(case, WAYS).items() for way in ways}
     lines = [
         '#include "loops.hpp"',
@@ -202,7 +202,7 @@ def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
 
 
 def _names(way: str) -> tuple[str, ...]:
-    """Of a way's inputs."""
+    """Return the names of a way's inputs."""
     return ("q", "qd", "x", "y") if way in FOURTH else ("q", "qd", "x")
 
 

@@ -227,7 +227,7 @@ def _own_laws(given: object, folder: Path | None, faults: list[str]) -> list[Any
 
 
 def _terms(law: Law, table: TomlTable, chain: Mechanism) -> list[tuple[int, Term]]:
-    """What [friction] says of a law: which joints have it, and with which numbers."""
+    """Read what [friction] says of a law: which joints have it, and with which numbers."""
     value, where, number = table.content[law.name], f"{table.where}: {law.name}", law.number
     if number is None:
         joints = joints_of(value, where, chain, table.faults)
@@ -253,8 +253,8 @@ def _terms(law: Law, table: TomlTable, chain: Mechanism) -> list[tuple[int, Term
 def _with_offsets(
     content: Content, laws: Mapping[str, Law], chain: Mechanism, offsets: bool
 ) -> dict[str, Any]:
-    """Where some joints have a law instead of an offset and the table speaks of no offsets, the other joints have them: an
-    asymmetry and an offset differ near rest only. Offsets of all joints that plain friction has not are listed."""
+    """Add an offset to each joint that has no law instead of one, if the table speaks of no offsets. An asymmetry and an
+    offset differ near rest only. Offsets of all joints that plain friction has not are listed."""
     key = OPTIONAL.name
     said = content.get(key)
     if said is True and not offsets:

@@ -58,8 +58,8 @@ class Motion:
 
 
 class Effect(Protocol):
-    """What one entry of a log description, such as a spring, adds to the motor torques. It is a sum of unknown values,
-    each times the torque per unit of the value."""
+    """The torques that one entry of a log description, such as a spring, adds to those of the motors. They are a sum of
+    unknown values, each times the torque per unit of the value."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]: ...

@@ -178,7 +178,7 @@ def _owner(name: str, joint_names: Sequence[str] | None) -> str | None:
 def _by_joint(
     found: Mapping[str, Mapping[What, int]], joint_names: Sequence[str] | None
 ) -> dict[str, Mapping[What, int]]:
-    """By the model's joints: what has their name, else numbered columns in order."""
+    """Assign columns to the model's joints: those with a joint's name, else numbered columns in order."""
     numbered = sorted((joint for joint in found if joint.startswith("#")), key=lambda joint: int(joint[1:]))
     if joint_names is None:
         own = {joint: places for joint, places in found.items() if joint not in numbered}

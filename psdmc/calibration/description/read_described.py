@@ -179,7 +179,7 @@ def _side_by_side(
     clock: tuple[str, int] | None,
     dates: bool,
 ) -> Iterator[Array]:
-    """The same of several tables, row by row; InputError where they differ in length."""
+    """Yield blocks of the kept columns of several tables, row by row. Raises InputError if they differ in length."""
     whole: dict[int, Array] = {}
     lengths = {}
     for name, table in tables.items():
@@ -202,8 +202,8 @@ def _side_by_side(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """The columns that are kept of a log file, in the order position, velocity (if all joints have one), motor position
-    (if a joint has one), effort. Each of these has one column for each joint.
+    """The columns that are kept of a log file, one for each joint and quantity. The order is position, velocity (if all
+    joints have one), motor position (if a joint has one), effort.
 
     columns   the columns of the file
     factors   (columns,) SI value = factor * (number - zero)
@@ -253,7 +253,7 @@ def in_si(
 
 
 def _maps(layout: Layout, coupling: CouplingEntry) -> list[Callable[[Array], Array]]:
-    """What turns a quantity's columns into the joints', in the order of a store's quantities."""
+    """Return functions that turn a quantity's columns into the joints', in the order of a store's quantities."""
     motions = [coupling.position, *([coupling.velocity] if layout.has_velocity else [])]
     maps = [_same if found is None else found.to_joints for found in map(coupling_of, motions)]
     torques = coupling_of(coupling.effort)

@@ -246,7 +246,8 @@ def step_sizes(p: Array) -> Array:
 
 
 def _covariance(jac: Array, residual: Array) -> Array:
-    """Of the scaled unknowns; a direction that the data do not see gets a huge variance, never none."""
+    """Return the covariance of the scaled unknowns. A direction that the data do not see gets a huge variance, never
+    none."""
     variance = float(residual @ residual) / max(len(residual) - jac.shape[1], 1)
     curvature, directions = np.linalg.eigh(jac.T @ jac)
     seen = np.maximum(curvature, UNSEEN_CURVATURE * curvature[-1])

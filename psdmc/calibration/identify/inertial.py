@@ -208,8 +208,8 @@ class Late:
 
 
 def friction_slopes(found: JointFriction, speed: Array, period: float) -> list[Array]:
-    """Return the change of a joint's friction torque along its speed (N,) per unit of each of the seven values, by
-    one-sided differences that keep the bounds."""
+    """Return the change (N,) of a joint's friction torque per unit of each of the seven values, over its speed. One-sided
+    differences keep the bounds."""
     slopes, unmoved = [], friction_torque(found.friction, speed, period)
     values, std = found.friction, found.std
     for j in range(7):

@@ -99,7 +99,7 @@ def _with_two_encoders(log: AnyLog) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elasticity:
-    """What was found of elastic joints: values with standard deviations, and remarks for the user."""
+    """The identified values of elastic joints with standard deviations, and remarks for the user."""
 
     rows: tuple[NumberRow, ...] = ()
     notes: tuple[str, ...] = ()
@@ -175,7 +175,7 @@ class _Samples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Efforts:
-    """What turns a log's efforts into torques: motors, and what friction runs of the named joints gave."""
+    """The data that turn a log's efforts into torques: motors, and what friction runs of the named joints gave."""
 
     motors: Motors
     names: tuple[str, ...]

@@ -1,5 +1,5 @@
-"""What a user knows of the links before the fit. It is the accuracy of the robot file's values, and bounds of masses
-and centres of mass. It comes from the tables `prior` and [[bodies]] of a log description."""
+"""A user's knowledge of the links before the fit: the accuracy of the robot file's values, and bounds of masses and
+centres of mass. It comes from the tables `prior` and [[bodies]] of a log description."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ HINT = "docs/how-to/priors.md describes these tables"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Knowledge:
-    """What a user knows of the links before the fit.
+    """A user's knowledge of the links before the fit.
 
     confidence  accuracy of the file's values for a link, by the index of the link; empty: none is stated
     bounds      bounds of masses and centres of mass

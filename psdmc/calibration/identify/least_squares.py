@@ -217,8 +217,8 @@ class _Solved:
         )
 
     def _by_inner(self, inner: Array) -> Array:
-        """(l, l) change of the values per unit of the score, where errors depend on the columns: by the rows whose psi'
-        is one, A'A of them, and not by the mean of psi' (Huber and Ronchetti 2009, chapter 7)."""
+        """Return the change (l, l) of the values per unit of the score, for errors that depend on the columns. It is the
+        inverse of A'A of the rows whose psi' is one, not of the mean of psi' (Huber and Ronchetti 2009, chapter 7)."""
         by_seen = np.linalg.pinv(self.inverse.T @ inner @ self.inverse, hermitian=True)
         return np.asarray(self.inverse @ by_seen @ self.inverse.T)
 

@@ -22,7 +22,7 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class ElasticityOptions:
-    """What a log description says about elastic joints.
+    """The statements of a log description about elastic joints.
 
     asked          whether the description asks for joint stiffnesses; then a log without two encoders is refused
     joints         joints whose stiffness is asked for; empty: all joints with two encoders

@@ -119,7 +119,7 @@ def nearest_physical(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Demands:
-    """What the solution must fulfil beside being physical, as of nearest_physical."""
+    """The conditions that the solution must fulfil beside being physical, as in `nearest_physical`."""
 
     never_negative: NDArray[np.bool_]
     limits: Array

@@ -87,7 +87,7 @@ def widening(residual: Array, use: NDArray[np.bool_]) -> Array:
 
 
 def _samples_per_effective(residual: Array, use: NDArray[np.bool_]) -> float:
-    """Of one joint: 1 + 2 sum of autocorrelations, by Geyer's initial positive and monotone sequence."""
+    """Return 1 + 2 sum of autocorrelations for one joint, by Geyer's initial positive and monotone sequence."""
     counted = use.astype(np.float64)
     kept = np.where(use, residual, 0.0)
     products, pairs = (signal.correlate(x, x, method="fft")[len(x) - 1 :] for x in (kept, counted))

@@ -27,7 +27,7 @@ NAMED = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visibility:
-    """What the data show of each of m unknowns of a fit.
+    """Remarks on what the data show of each of the m unknowns of a fit.
 
     words       m remarks: "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
     determined  (m,) True: the data determine the unknown by itself, however weakly. The unknown then has a standard

@@ -26,7 +26,7 @@ from psdmc.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class SplitOptions:
-    """Which samples are held out for validation.
+    """The choice of samples that are held out for validation.
 
     held_out   share of the samples; the paper (Denso-2022) holds out 15 %
     blocks     0: the last part of the log; else the log is divided into this many blocks, and a share of them, evenly

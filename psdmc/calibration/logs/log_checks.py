@@ -73,8 +73,8 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looked:
-    """The inputs of the checks of a log: the log, its statistics, the robot, the cut-off of the filter (Hz) that will be
-    applied to the log, and the limits."""
+    """The inputs of the checks of a log: the log, its statistics, the robot, and the limits. `cutoff` is that of the filter
+    (Hz) that will be applied to the log."""
 
     log: AnyLog
     survey: Survey

@@ -73,7 +73,7 @@ class LowPass:
         return int(np.ceil(np.log(FORGOTTEN) / np.log(np.abs(self.poles).max())))
 
     def __call__(self, values: Array) -> Array:
-        """What scipy.signal.sosfiltfilt gives, but the start states are found once a filter, not once a call."""
+        """Return what scipy.signal.sosfiltfilt returns. The start states are found once for a filter, not in each call."""
         pad = min(len(values) - 1, 3 * (2 * len(self.sections) + 1) * 8)
         before, behind = 2 * values[:1] - values[pad:0:-1], 2 * values[-1:] - values[-2 : -pad - 2 : -1]
         there = self._one_way(np.concatenate([before, values, behind]))
@@ -82,7 +82,7 @@ class LowPass:
         return np.ascontiguousarray(back[pad : pad + len(values)])
 
     def _one_way(self, values: Array) -> Array:
-        """From the state in which the first value has always been there."""
+        """Filter once, from the state in which the first value has always been there."""
         settled = self.settled.reshape(*self.settled.shape, *(1,) * (values.ndim - 1)) * values[:1]
         filtered, _ = signal.sosfilt(self.sections, values, axis=0, zi=settled)
         return np.asarray(filtered)

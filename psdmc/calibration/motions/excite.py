@@ -210,7 +210,7 @@ def _best_allowed(
 
 
 def _faults(motion: SineSum, space: LimitedSines, allowed: Allowed) -> list[str]:
-    """Of one period, and of resting anywhere on it, which its slow beginning and end come near to."""
+    """Return the faults of one period, and of rest anywhere on it, as the slow beginning and end are nearly at rest."""
     period = motion.duration / (FINER * space.samples)
     once = motion.sampled(allowed.chain.joint_names, period)
     found = replace(allowed, torque_margin=SPARE * allowed.torque_margin).faults(once)

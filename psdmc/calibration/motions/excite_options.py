@@ -31,7 +31,7 @@ def chosen_objective(condition: bool, log_det: bool) -> Objective:
 
 @dataclass(frozen=True, slots=True)
 class ExciteOptions:
-    """Which motions are searched, and for how long.
+    """The choice of motions that are searched, and the limits of the search.
 
     duration       s, the period of the motion
     harmonics      multiples of 1/duration that each joint's sines have

@@ -47,8 +47,8 @@ class Placed:
 
 
 class LimitedSines:
-    """The coordinates that describe a motion: for each joint the weights of sines and cosines, the used share of its
-    limits, and the position of its centre."""
+    """The coordinates that describe a motion. For each joint, these are the weights of sines and cosines, the used share of
+    its limits, and the position of its centre."""
 
     def __init__(self, chain: Mechanism, options: ExciteOptions) -> None:
         limits = [joint.limits for joint in chain.joints]
@@ -140,8 +140,9 @@ def _norm_slope(shares: Array, norm: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SineSum:
-    """A periodic motion, q_i(t) = centre_i + sum over k of a_ik sin(w_k t) + b_ik cos(w_k t), w_k = 2 pi harmonic_k /
-    duration.
+    """A periodic motion, a sum of sines and cosines for each joint.
+
+    q_i(t) = centre_i + sum over k of a_ik sin(w_k t) + b_ik cos(w_k t), w_k = 2 pi harmonic_k / duration
 
     centre (n,), sine (n, h), cosine (n, h): rad (m). As amplitude and phase: A sin(w t + phi), A = hypot(a, b).
     """

@@ -1,5 +1,5 @@
-"""Reads the files of a virtual (simulated) robot: the plant file with motors, friction, sensors and cable harness, and
-the DH table or URDF that it names.
+"""Reads the files of a virtual (simulated) robot. These are the plant file with motors, friction, sensors and cable
+harness, and the DH table or URDF that it names.
 
 This module has its own code to read a DH table, and Pinocchio reads a URDF. So the virtual robot shares no code with
 the calibration that it tests.

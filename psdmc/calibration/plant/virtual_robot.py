@@ -311,7 +311,7 @@ def _with_state(
 
 
 def _motion_function(coefficients: Array, h: float) -> Callable[[float], tuple[Array, Array, Array]]:
-    """What _at gives at one time, quickly, from the coefficients of _quintic."""
+    """Return a fast function of one time that computes what `_at` does, from the coefficients of `_quintic`."""
     pieces = np.ascontiguousarray(coefficients.transpose(1, 0, 2))
     last = len(pieces) - 1
 

@@ -75,8 +75,8 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class LoadChange:
-    """A load at the tip that explains the logs: mass in kg (negative if a load was removed), and centre of mass (3,)
-    in m in the tip frame, NaN for what the logs do not show."""
+    """A load at the tip that explains the logs: mass, kg, and centre of mass (3,), m, in the tip frame. If a load was
+    removed, the mass is negative. A value that the logs do not show is NaN."""
 
     mass: float
     mass_std: float

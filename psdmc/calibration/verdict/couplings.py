@@ -218,8 +218,8 @@ class _Samples:
         return 0 <= j < self.n and self.units[j] == self.units[i]
 
     def design(self, entries: Entries, of_motors: bool) -> Array:
-        """Return the torques of the motors (N, n, l + 3 n) per unit of base parameters, and of Coulomb and viscous
-        friction and offset of each motor."""
+        """Return the torques of the motors (N, n, l + 3 n) per unit of each unknown. The unknowns are base parameters,
+        and Coulomb friction, viscous friction and offset of each motor."""
         n = self.n
         coupling = Coupling.of(_matrix(n, entries).tolist())
         speed, sign, rigid = self.qd, self.sign.copy(), self.as_logged

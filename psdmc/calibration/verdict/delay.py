@@ -95,8 +95,8 @@ def _delay(
 
 
 def _deviation(rate: Array, left: Array) -> float:
-    """Standard deviation of the delay from the residuals (N, n) and their change per delay: of stretches of time, and of
-    joints left out one at a time, as a joint's friction may look like a delay."""
+    """Return the standard deviation of the delay, from the residuals (N, n) and their change per delay. It comes from
+    stretches of time, and from joints left out one at a time, as a joint's friction may look like a delay."""
     power, pull = (rate**2).sum(axis=0), (rate * left).sum(axis=0)
     by_time = float(clustered((rate * left).sum(axis=1)[:, None])[0, 0]) / float(power.sum()) ** 2
     others = power.sum() - power

@@ -212,7 +212,7 @@ def delivered_quality(
 
 
 def _read(found: Delivered, given: Sequence[AnyLog | str | Path]) -> Sequence[AnyLog] | Runs:
-    """What was given, with paths read."""
+    """Return the given logs; paths are read."""
     paths = [Path(each) for each in given if isinstance(each, str | Path)]
     names, law = found.model.v_names, found.prediction
     campaign = campaign_of(paths) if paths else None

@@ -250,9 +250,9 @@ def _samples(
     most: int,
     wanted: slice,
 ) -> tuple[Array, Array, Array, Array, Array, Array, Shifted]:
-    """For a checked log: q, qd, qdd, sign and torque of the wanted ones of its samples, the RMS noise that passes the
-    filter if noise has the same density below the cut-off as above, and at most about so many samples with torques of
-    other times."""
+    """Return q, qd, qdd, sign and torque of the wanted samples, the filtered RMS noise, and samples with torques of other
+    times. The log is a checked one. The noise is that of a density which is the same below the cut-off as above.
+    The samples with other times are at most about `most`."""
     lags = delays_tried(options.cutoff)
     window, kernel = kernel_of(options)
     every = max(1, round(2.0 * options.cutoff * log.duration / most))
@@ -303,7 +303,7 @@ def _samples(
 def _at_other_times(
     states: States, at: NDArray[np.intp], lags: Array, every: int
 ) -> tuple[NDArray[np.intp], Array]:
-    """Which of some rows have efforts at all these times from them (every so many of those), and these (rows, D, n)."""
+    """Return the rows that have efforts at all `lags` from them, one in `every`, and these efforts (rows, D, n)."""
     used, times = states.time[states.use], states.time[at]
     some = np.flatnonzero((times >= used[0] - lags[0]) & (times <= used[-1] - lags[-1]))[::every]
     later = interpolate.CubicSpline(states.time, states.effort)(times[some, None] + lags)

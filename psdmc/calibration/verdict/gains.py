@@ -1,5 +1,5 @@
-"""Checks unit and sign of each joint's torque: its gain (measured torque over the torque from the robot file's
-theta_b), and the power that friction takes."""
+"""Checks unit and sign of each joint's torque, by its gain and by the power that friction takes. The gain is the measured
+torque over the torque from the robot file's theta_b."""
 
 from __future__ import annotations
 

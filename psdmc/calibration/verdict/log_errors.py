@@ -1,5 +1,5 @@
-"""Finds errors of a log, or of the robot file's base, that the fit hides: a zero position, a scale, a tilted base, or a
-load that the file does not state.
+"""Finds errors of a log, or of the robot file's base, that the fit hides. These are a zero position, a scale, a tilted
+base, and a load that the file does not state.
 
 Each error is a hypothesis with one or a few columns: the change of all joint torques by a small error. The base
 parameters, friction and offsets are fitted together with these columns. The likelihoods with and without the columns are
@@ -86,8 +86,8 @@ class LogError:
 
 @dataclass(frozen=True, slots=True)
 class UnstatedLoad:
-    """A load at the tip that the robot file does not state: mass and standard deviation, kg, and the share of the
-    difference from the file that the load explains."""
+    """A load at the tip that the robot file does not state: mass and standard deviation, kg. `explains` is the share of
+    the difference from the file that the load explains."""
 
     mass: float
     std: float

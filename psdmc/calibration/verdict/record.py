@@ -297,8 +297,8 @@ def _chosen(rows: Sequence[NumberRow], wanted: NDArray[np.bool_]) -> tuple[Numbe
 
 
 def _kept_at(model: DynamicsModel, values: Array, scale: Array, start: Array | None = None) -> list[str]:
-    """The value that each unseen parameter is kept at, in words: theta_b at the file's, what follows it at `start`, zero
-    where that is None."""
+    """Return the value that each unseen parameter is kept at, in words. theta_b is kept at the file's value, and what
+    follows it at `start`, or at zero if that is None."""
     prior = np.zeros(len(values)) if start is None else start.copy()
     known, unknown = model.file_theta_b, model.unknown_base_parameters
     prior[: model.l] = 0.0 if known is None else known

@@ -143,7 +143,7 @@ def _shares_a_factor(terms: list[tuple[int, list[int]]]) -> bool:
 
 
 def _factors(body: tuple[Instr, ...], uses: Sequence[int], index: int) -> list[int]:
-    """Of a product that nothing else uses, left to right."""
+    """Return the factors of a product that nothing else uses, left to right."""
     factors: list[int] = []
     stack = [index]
     while stack:

@@ -34,7 +34,7 @@ class BatchCall:
 
 @dataclass(frozen=True, slots=True)
 class BatchArray:
-    """An input or output array of a function: its name, the shape `tail` for one state, its meaning `means`, and whether
+    """An input or output array of a function: name, shape `tail` for one state, and meaning `means`. If it is `batched`,
     it can have one more axis for many states. Texts show users the shape of many states."""
 
     name: str

@@ -99,7 +99,7 @@ def needed(functions: Sequence[Signature], wide: bool, theta: bool = False) -> l
 
 
 def needed_by_theta(functions: Sequence[Signature], wide: bool) -> list[str]:
-    """The same for functions that take theta_b."""
+    """Return what `needed` returns, for functions that take theta_b."""
     return needed(functions, wide, theta=True)
 
 

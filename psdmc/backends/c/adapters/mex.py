@@ -1,5 +1,5 @@
-"""The adapter for MATLAB, Octave and Simulink: a MEX function with a help text for each generated function, and an
-S-function for each generated function whose inputs and outputs are vectors.
+"""The adapter for MATLAB, Octave and Simulink. It writes a MEX function with a help text for each generated function,
+and an S-function for each generated function whose inputs and outputs are vectors.
 
 MEX functions call the C functions for many states, whose states are columns of MATLAB's arrays. A matrix of the C
 package is row-major, and MATLAB's are column-major, so the MEX functions change the order of the entries.

@@ -23,7 +23,7 @@ FILES = {
 
 
 def needed(functions: Sequence[Signature], wide: bool) -> list[str]:
-    """What the two controllers compute."""
+    """Return the names of the functions that the two controllers call."""
     return ["gravity", "inverse_dynamics"]
 
 

@@ -343,7 +343,8 @@ class TextTable:
             return self._one_by_one(text, line, places)
 
     def _one_by_one(self, text: str, line: int, places: Sequence[int]) -> Array:
-        """The same where cells have decimal commas; else the InputError of the first cell that is no number."""
+        """Read the rows of a block whose cells have decimal commas. Raises InputError at the first cell that is no
+        number."""
         found = []
         for number, words in enumerate(text.split("\n"), start=line):
             if not words.strip():

@@ -1,4 +1,4 @@
-"""What a file format for a robot's controller consists of, and a planned motion at the rate of such a format."""
+"""The parts of a file format for a robot's controller, and a planned motion at the rate of such a format."""
 
 from __future__ import annotations
 
