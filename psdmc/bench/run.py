@@ -139,7 +139,7 @@ def checked(
         count = checked_states(contestant.outputs)
         states = drawn.setdefault(count, States.random(case.chain, count, seed))
         error = disagreement(Runner(contestant, states), states)
-        if error <= tolerance(contestant.function):
+        if error <= tolerance(contestant.function, states):
             right.append(contestant)
             errors.append(error)
         else:
@@ -233,8 +233,10 @@ FEWEST = 64
 
 SOLVED = 1e-7
 STRICT = 1e-10
-"""Largest error of an output relative to its largest value; forward dynamics amplifies rounding by the mass matrix's
-condition number."""
+"""Largest error of an output relative to its largest value, if the function divides by the mass matrix, and otherwise."""
+
+ROUNDINGS = 100
+"""Rounding errors that the mass matrix's condition number may amplify, where that is more than `SOLVED`."""
 
 SMALL = 1e-3
 """Outputs that stay below this share of the largest one are compared on its scale: they may be zero."""
@@ -269,6 +271,9 @@ def relative_error(found: Array, expected: Array) -> float:
     return float(np.max(error)) if np.isfinite(error).all() else float("inf")
 
 
-def tolerance(function: str) -> float:
-    """Largest relative error with which the outputs of a function still count as equal to the expected ones."""
-    return SOLVED if RECIPES[function].needs is Needs.POSITIVE_MASS else STRICT
+def tolerance(function: str, states: States) -> float:
+    """Return the largest relative error with which the outputs of a function still count as equal to the expected ones.
+    If the function divides by the mass matrix, the error grows with the condition number of that matrix."""
+    if RECIPES[function].needs is not Needs.POSITIVE_MASS:
+        return STRICT
+    return max(SOLVED, ROUNDINGS * float(np.finfo(np.float64).eps) * states.condition)

@@ -107,6 +107,12 @@ class States:
         return self._robot.torques(self.q, self.qd, self.qdd, self._robot.base_acceleration)
 
     @cached_property
+    def condition(self) -> float:
+        """The largest condition number of the mass matrix at these states."""
+        masses = self.expected("mass_matrix").reshape(self.count, self.nv, self.nv)
+        return float(np.max(np.linalg.cond(masses)))
+
+    @cached_property
     def _robot(self) -> RobotOnArrays:
         return RobotOnArrays(self.chain, self.chain.parameters.reshape(-1), np.zeros((0, 0)))
 

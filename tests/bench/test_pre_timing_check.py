@@ -10,10 +10,11 @@ import pytest
 from psdmc.bench.build import native_flags
 from psdmc.bench.contestant import Runner
 from psdmc.bench.rivals import psdmc_c
-from psdmc.bench.run import checked, relative_error
+from psdmc.bench.run import checked, relative_error, tolerance
 from psdmc.bench.states import States
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Op, Program
+from psdmc.robot.load import load_robot
 
 
 def with_a_wrong_sign(kernel: Kernel) -> Kernel:
@@ -77,3 +78,25 @@ def test_an_output_that_is_always_zero_is_compared_on_the_others_scale():
 
     assert relative_error(np.array([[1e-12, 100.0]]), expected) < 1e-10
     assert relative_error(np.array([[1.0, 100.0]]), expected) > 1.0
+
+
+GANTRY = """<robot name="gantry"><link name="base"/>
+<link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="b"><inertial><mass value="1e-9"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="x" type="prismatic"><parent link="base"/><child link="a"/><axis xyz="1 0 0"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="y" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_a_nearly_singular_mass_matrix_allows_larger_errors(tmp_path, two_link):
+    """The slides of a gantry carry both masses and the last one, and do not act on each other."""
+    (tmp_path / "gantry.urdf").write_text(GANTRY)
+    gantry = States.random(load_robot(tmp_path / "gantry.urdf").chain, 64, seed=1)
+    arm = States.random(two_link.chain, 64, seed=1)
+
+    assert gantry.condition == pytest.approx(1e9 + 1, rel=1e-6)
+    assert tolerance("forward_dynamics", gantry) == pytest.approx(100 * 2.0**-52 * 1e9, rel=1e-6)
+    assert tolerance("inverse_dynamics", gantry) == 1e-10
+    assert tolerance("forward_dynamics", arm) == 1e-7
