@@ -80,10 +80,11 @@ class Problem:
     def rolled_out(self, x: np.ndarray, u: np.ndarray, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
         """States and inputs for every share of the step: (steps + 1, k, 2 n), (steps, k, m)."""
         states, inputs = [np.tile(self.start, (len(SHARES), 1))], []
-        for k in range(self.steps):
-            open_loop = SHARES[:, None] * gains.feed[k]
-            inputs.append(u[k] + open_loop + (states[k] - x[k]) @ gains.back[k].T)
-            states.append(self.step(states[k], inputs[k]))
+        with np.errstate(over="ignore", invalid="ignore"):  # too long a step may run away
+            for k in range(self.steps):
+                open_loop = SHARES[:, None] * gains.feed[k]
+                inputs.append(u[k] + open_loop + (states[k] - x[k]) @ gains.back[k].T)
+                states.append(self.step(states[k], inputs[k]))
         return np.array(states), np.array(inputs)
 
 

@@ -1,4 +1,5 @@
-"""python -m psdmc.bench.legged [NAME ...] [--rounds N] [--json FILE]: time derivatives and matrices of legged robots.
+"""python -m psdmc.bench.legged [NAME ...] [--functions NAME ...] [--rounds N]: time derivatives and matrices of robots
+with legs.
 
 The inertias are those of the robot files. The benchmark times calls for one state, and psdmc's batches.
 """
@@ -41,6 +42,9 @@ def main() -> int:
     """Run the benchmark with the options of the command line, and return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.legged", description=__doc__)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(LEGGED)}; all where none is named")
+    parser.add_argument(
+        "--functions", nargs="+", choices=tuple(THEIRS), default=tuple(THEIRS), help="all by default"
+    )
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="trials that count (default %(default)s)")
     parser.add_argument("--json", type=Path, help="write everything measured there")
     options = parser.parse_args()
@@ -48,7 +52,7 @@ def main() -> int:
 
 
 def _measure(options: argparse.Namespace) -> int:
-    cases = list(legged_cases(tuple(THEIRS), options.names, on_standard_error))
+    cases = list(legged_cases(tuple(options.functions), options.names, on_standard_error))
     result = run(cases, Settings(rounds=options.rounds, rivals=RIVALS), on_standard_error)
     print(as_text(result, cases))
     if options.json:

@@ -132,8 +132,9 @@ def _in_limbs(g: Ingredients) -> Outputs:
 
 
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
-    """Return the function's body as loops and two calls. The first is of forward dynamics with contacts, the second of the
-    derivatives of forward dynamics, at torques that contain the contact forces. Besides those of `Counts.arrays`, the arrays are:
+    """Return the function's body as loops and two calls. The first is of forward dynamics with contacts, the second of
+    the derivatives of forward dynamics, at torques that contain the contact forces. Besides those of `Counts.arrays`, the
+    arrays are:
 
     load        tau + J^T f
     same        accelerations, again

@@ -57,6 +57,10 @@ BUDGET, BUDGET_OF_LARGE = 80, 20
 """Exchanges tried per function and way to see limbs, at some 10 ms each, for robots of up to MANY_JOINTS joints and of
 more, whose exchanges take longer."""
 
+PRODUCT = 1.35
+"""Weight of an operation of a matrix product behind the stages: its factors come from memory, and its results go there
+(decision record 0215)."""
+
 LIKELY = 1.1
 """Ways to see limbs that cost this much more than another one are left before exchanges, which save 3 % at most."""
 
@@ -68,7 +72,7 @@ def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
     """
     found = weight_of_stages(limbs.groups, stage_costs(limbs), lanes, costs)
     products = sum(for_lanes(costs).weight(each.cost) for each in limbs.products)
-    return found + products * max(1.0, AT_ONCE / lanes)
+    return found + PRODUCT * products * max(1.0, AT_ONCE / lanes)
 
 
 def weight_of_stages(

@@ -237,8 +237,8 @@ def slopes_on_arrays(
     of_loops: Array | None = None,
     kp: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Return two kinds of derivatives for k states. They are those of J^T f by q, (k, nv, nv), and those of the accelerations
-    J motion + dJ/dt qd of contacts and loops, by q and by qd, (k, rows, nv).
+    """Return two kinds of derivatives for k states. They are those of J^T f by q, (k, nv, nv), and those of the
+    accelerations J motion + dJ/dt qd of contacts and loops, by q and by qd, (k, rows, nv).
 
     of_loops  the motion in the loops' rows; left out: `motion`
     kp        what multiplies the loops' errors, which are added to their accelerations, (k,); left out: 0

@@ -140,9 +140,9 @@ class Reference:
         return self.forward_dynamics(q, qd, tau, wrenches), by_q, by_qd, by_tau
 
     def second_derivatives(self, gradient: Callable[..., Sequence[Array]], *states: Array) -> Array:
-        """Return (..., 3 nv, 3 nv) second derivatives from this gradient by q, qd and a third vector. They are
-        its central differences, for q of eighth order and along `integrate`. The gradient may be at most quadratic in qd and the third
-        vector: then these differences are exact. Joints with several coordinates: the mean of both orders."""
+        """Return (..., 3 nv, 3 nv) second derivatives from this gradient by q, qd and a third vector. They are its
+        central differences, for q of eighth order and along `integrate`. The gradient may be at most quadratic in qd and
+        the third vector: then these differences are exact. Joints with several coordinates: the mean of both orders."""
         nv = self.model.nv
         columns = []
         for which, size in enumerate((DIFFERENCE, 1.0, 1.0)):

@@ -198,6 +198,7 @@ def test_a_function_that_shares_an_arrangement_has_its_limbs_in_it() -> None:
 def test_four_legs_pay_and_two_stubs_on_an_arm_do_not() -> None:
     legs = kernels("four legs of a floating body")
     assert legs["inverse_dynamics"].limbs is not None
+    assert legs["mass_matrix"].limbs is not None
     assert legs["forward_dynamics"].limbs is not None
     arm = limbed(3, "RRRRRR", [(5, "P", 2)])
     made = lower(
