@@ -27,6 +27,7 @@ from psdmc.robot.reference import Reference
 
 INVERSE, FORWARD = DERIVATIVES[:5], DERIVATIVES[5:]
 WITH_SECOND = (*FORWARD, "forward_dynamics_second_derivatives")
+JACOBIANS = ("inverse_dynamics_derivatives", "forward_dynamics_derivatives")
 COUNT = 11
 """States: no whole number of vectors."""
 
@@ -34,13 +35,13 @@ EXACT = {"float64": 1e-12, "float32": 2e-4}
 """Of an output's largest entry."""
 
 
-def almost_equal_legs() -> RandomTree:
+def almost_equal_legs(seed: int = 1, length: int = 3, spread: float = 1e-9) -> RandomTree:
     """Four legs that differ by a billionth: numbers of limbs that are nearly one number stay a number for each."""
-    tree = limbed(1, *SHAPES["four legs of a floating body"])
+    tree = limbed(seed, "F", [(0, "R" * length, 4)])
     rng = np.random.default_rng(5)
-    for joint in range(4, tree.n):
-        like = 1 + (joint - 1) % 3
-        place, near = tree.places[like], 1.0 + 1e-9 * rng.uniform(-1.0, 1.0, 13)
+    for joint in range(1 + length, tree.n):
+        like = 1 + (joint - 1) % length
+        place, near = tree.places[like], 1.0 + spread * rng.uniform(-1.0, 1.0, 13)
         tree.places[joint] = Placement(place.rotation, place.translation * near[:3])
         tree.parameters[joint] = tree.parameters[like] * near[3:]
     tree.model, tree.joints = tree._pinocchio()
@@ -48,7 +49,22 @@ def almost_equal_legs() -> RandomTree:
     return tree
 
 
+def random_limbs(seed: int) -> RandomTree:
+    """By turns: limbs of equal structure, limbs of other lengths and joint types, legs that are equal or nearly so."""
+    rng = np.random.default_rng(seed)
+    if seed % 3 == 2:
+        return almost_equal_legs(seed, int(rng.integers(2, 4)), float(rng.choice([0.0, 1e-12, 1e-9, 1e-3])))
+    trunk = str(rng.choice(["F", "FR", "FRP", "R", "SR"]))
+    chains = ["".join(rng.choice(list("RRRP"), rng.integers(1, 4))) for _ in range(2 + 2 * (seed % 3))]
+    bodies = sorted(rng.integers(len(trunk), size=len(chains)).tolist(), reverse=True)  # Pinocchio's order
+    counts = rng.integers(1, 4, len(chains)).tolist()
+    return limbed(seed, trunk, list(zip(bodies, chains, counts, strict=True)))
+
+
+RANDOM = [f"random limbs {seed}" for seed in range(100)]
+
 TREES: dict[str, Callable[[], RandomTree]] = {
+    **{name: lambda seed=seed: random_limbs(seed) for seed, name in enumerate(RANDOM)},  # type: ignore[misc]
     **{name: lambda name=name: limbed(1, *SHAPES[name]) for name in SHAPES},  # type: ignore[misc]
     "almost equal legs": almost_equal_legs,
     "legs of three, two and one joint": lambda: limbed(
@@ -65,7 +81,11 @@ CASES = [
     *((name, INVERSE, "float64", "clang") for name in (EQUAL, UNEQUAL)),
     (EQUAL, FORWARD, "float64", "gcc"),
     (UNEQUAL, FORWARD, "float64", "clang"),
-    *((name, WITH_SECOND, "float64", "gcc") for name in TREES),
+    *((name, WITH_SECOND, "float64", "gcc") for name in TREES if name not in RANDOM),
+    *(
+        (name, JACOBIANS, ("float64", "float32")[seed // 2 % 2], ("gcc", "clang")[seed % 2])
+        for seed, name in enumerate(RANDOM)
+    ),
 ]
 QUICK = [
     (EQUAL, FORWARD, "float64", "gcc"),
@@ -83,7 +103,7 @@ def test_derivatives_are_pinocchios_in_every_layout(
     tree = TREES[name]()
     model = derive_model(tree.mechanism(), expand=False)
     kernels = lowered(model, "factored", functions, theta_variants=functions is INVERSE)
-    assert any(kernels[function].limbs for function in functions)
+    assert name in RANDOM or any(kernels[function].limbs for function in functions)
     package = package_view(package_info(model), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
     compiled = Direct(package, shared_library(package, tmp_path, ["-O0", "-march=native"], compiler))
     sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
@@ -97,7 +117,9 @@ def test_derivatives_are_pinocchios_in_every_layout(
     for function in functions:
         expected = RECIPES[function].pinocchio(oracle, {k: v.astype(float) for k, v in given.items()})
         exact = EXACT[real]
-        if function.startswith("forward_dynamics_second_derivatives"):  # solves with the mass matrix twice
+        if function.startswith("forward_dynamics_second_derivatives") or (
+            name in RANDOM and RECIPES[function].signature.factorises
+        ):  # solves with the mass matrix twice
             worst = np.linalg.cond(oracle.mass_matrix(given["q"].astype(float))).max()
             exact = max(exact, 2 * sizes.nv * float(worst) * float(np.finfo(real).eps))
         for way, found in _every_layout(compiled, package, function, given, sizes, variants):
