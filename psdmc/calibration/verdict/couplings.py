@@ -275,10 +275,14 @@ class _Samples:
         left = self.torque * w - whole @ sums.values((0,), w)
         level = np.mean(left**2, axis=0) * widening(left, np.ones(left.shape, dtype=bool)) ** 2
         sizes = np.linalg.norm(whole.reshape(-1, whole.shape[2]), axis=0)
-        scaled = whole / np.where(sizes > 0.0, sizes, 1.0)
+        unit = np.where(sizes > 0.0, sizes, 1.0)
+        scaled = whole / unit
         squares = np.stack([scaled[:, k].T @ scaled[:, k] for k in range(self.n)])
         inverse = np.linalg.pinv(squares.sum(axis=0), rcond=RANK_TOLERANCE**2, hermitian=True)
-        by_noise = np.diag(inverse @ np.tensordot(level, squares, axes=1) @ inverse)[-m:] / sizes[-m:] ** 2
+        by_noise = np.diag(inverse @ np.tensordot(level, squares, axes=1) @ inverse) / unit**2
+        by_noise = np.where(sizes > 0.0, by_noise, np.inf)[
+            -m:
+        ]  # logs that an entry does not change say nothing of it
         return np.asarray(np.sqrt(np.maximum(np.diag(covariance), by_noise)))
 
     def held_out(self, found: _Coupled) -> Array:

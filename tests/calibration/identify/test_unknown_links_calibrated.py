@@ -87,6 +87,7 @@ def test_the_command_names_dropped_links_before_the_verdict(
     assert said.count(said[0]) == 1
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_the_record_s_first_warning_names_dropped_links(true: DynamicsModel) -> None:
     log = log_of(true)
     assert calibrated(model_of(""), log).warnings[0] == DROPPED
