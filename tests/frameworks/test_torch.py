@@ -33,6 +33,7 @@ from psdmc.functions import SIGNATURES
 from psdmc.toolchain.compiled_functions import CompiledFunctions
 
 torch = pytest.importorskip("torch")
+pytest.importorskip("setuptools")  # torch.compile imports it, and it must be there before any other distutils
 func = torch.func
 
 EXACT, SOLVED = 1e-10, 1e-8
