@@ -36,7 +36,7 @@ EXACT = {"float64": 1e-12, "float32": 2e-4}
 
 
 def almost_equal_legs(seed: int = 1, length: int = 3, spread: float = 1e-9) -> RandomTree:
-    """Four legs that differ by a billionth: numbers of limbs that are nearly one number stay a number for each."""
+    """Four legs that differ by this share: numbers of limbs that are nearly one number stay a number for each."""
     tree = limbed(seed, "F", [(0, "R" * length, 4)])
     rng = np.random.default_rng(5)
     for joint in range(1 + length, tree.n):

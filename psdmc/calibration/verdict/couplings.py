@@ -280,10 +280,9 @@ class _Samples:
         squares = np.stack([scaled[:, k].T @ scaled[:, k] for k in range(self.n)])
         inverse = np.linalg.pinv(squares.sum(axis=0), rcond=RANK_TOLERANCE**2, hermitian=True)
         by_noise = np.diag(inverse @ np.tensordot(level, squares, axes=1) @ inverse) / unit**2
-        by_noise = np.where(sizes > 0.0, by_noise, np.inf)[
-            -m:
-        ]  # logs that an entry does not change say nothing of it
-        return np.asarray(np.sqrt(np.maximum(np.diag(covariance), by_noise)))
+        # Torques that an entry does not change say nothing of it.
+        by_noise = np.where(sizes > 0.0, by_noise, np.inf)
+        return np.asarray(np.sqrt(np.maximum(np.diag(covariance), by_noise[-m:])))
 
     def held_out(self, found: _Coupled) -> Array:
         """Return R^2 (n,) of the motors' columns in the last samples, by a fit to the first."""
