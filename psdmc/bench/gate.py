@@ -9,8 +9,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -64,8 +64,8 @@ class Change:
 def changes(before: Baseline, after: Baseline) -> Iterator[Change]:
     """Return all counts that differ between the baseline `before` and the present code `after`, robot by robot.
     Instruction counts are compared only if both were made with one compiler version."""
-    comparable = before.compiler == after.compiler and after.without is None
     for robot in after.counts:
+        comparable = before.compiler == after.compiler and robot not in after.uncounted
         old_robot, new_robot = before.counts.get(robot, {}), after.counts[robot]
         for function in {**old_robot, **new_robot}:
             old, new = old_robot.get(function, {}), new_robot.get(function, {})
@@ -80,9 +80,8 @@ def compare(before: Baseline, after: Baseline) -> tuple[str, bool]:
     """The report, and whether the counts pass."""
     found = list(changes(before, after))
     lines = [str(change) for change in found]
-    if after.without is not None:
-        lines.append(f"instructions were not counted: {after.without}")
-    elif before.compiler != after.compiler:
+    lines += _uncounted_lines(after)
+    if before.compiler != after.compiler:
         lines.append(
             f"instructions were not compared: the baseline is of {before.compiler}, this is {after.compiler}"
         )
@@ -96,6 +95,13 @@ def compare(before: Baseline, after: Baseline) -> tuple[str, bool]:
     else:
         lines.append("counts are those of the baseline")
     return "\n".join(lines), not failed
+
+
+def _uncounted_lines(after: Baseline) -> list[str]:
+    """The robots whose instructions were not counted, and why; a reason that all share is said once."""
+    if len(reasons := set(after.uncounted.values())) == 1 and len(after.uncounted) == len(after.counts):
+        return [f"instructions were not counted: {reasons.pop()}"]
+    return [f"{robot}: instructions were not counted: {reason}" for robot, reason in after.uncounted.items()]
 
 
 def main() -> int:
@@ -118,11 +124,17 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _save(path: Path, names: list[str]) -> int:
-    """Save the baseline. Named robots replace theirs; one without instruction counts never replaces one with."""
+    """Save the baseline. Named robots replace theirs. A robot whose instructions could not be counted keeps the counts of
+    the baseline."""
     after = _counted(names)
-    kept = Baseline.read(path).counts if names and path.is_file() else {}
-    if after.without is not None:
-        print(f"warning: instructions were not counted: {after.without}", file=sys.stderr)
+    known = Baseline.read(path).counts if path.is_file() else {}
+    kept = known if names else {}
+    for line in _uncounted_lines(after):
+        print(f"warning: {line}", file=sys.stderr)
+    for robot in after.uncounted:
+        for function, table in known.get(robot, {}).items():
+            instructions = {what: value for what, value in table.items() if what.startswith("instructions")}
+            after.counts[robot].get(function, {}).update(instructions)
     make_folder(path.parent)
     write_whole(path, Baseline(after.compiler, {**kept, **after.counts}).to_json())
     print(f"wrote {path}")
@@ -151,11 +163,11 @@ Counts = dict[str, dict[str, dict[str, float]]]
 @dataclass(frozen=True, slots=True)
 class Baseline:
     """Operation and instruction counts of all robots and functions, and the compiler with which instructions were
-    counted. `without` says why instruction counts are missing; None: they are there."""
+    counted. `uncounted` names the robots without instruction counts, each with the reason."""
 
     compiler: str
     counts: Counts
-    without: str | None = None
+    uncounted: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
         content: dict[str, Any] = {"schema": SCHEMA, "compiler": self.compiler, "counts": self.counts}
@@ -183,19 +195,22 @@ def count(
     """Count the operations and instructions per state of every function of each robot, for code that psdmc factors into
     few operations.
 
-    Instructions are left out if they are not wanted or valgrind is not installed; the result then states the reason.
+    Instructions are left out if they are not wanted, or if valgrind is not installed or does not know an instruction of
+    the robot's code; the result then states the reason for each robot.
     """
     counts: Counts = {}
-    without = None if with_instructions else "not asked for"
+    uncounted: dict[str, str] = {}
     for case in cases:
         progress(f"{case.name}: counting")
         counts[case.name] = operations(case)
-        if with_instructions:
-            try:
+        try:
+            if with_instructions:
                 _add_instructions(counts[case.name], case)
-            except ToolchainError as error:
-                without = error.message
-    return Baseline(find_compiler().version.splitlines()[0], counts, without)
+            else:
+                uncounted[case.name] = "not asked for"
+        except ToolchainError as error:
+            uncounted[case.name] = error.message
+    return Baseline(find_compiler().version.splitlines()[0], counts, uncounted)
 
 
 def operations(case: Case) -> dict[str, dict[str, float]]:

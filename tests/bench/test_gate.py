@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from psdmc.bench import gate
 from psdmc.bench.case import DIFFERENTIATED, Case
 from psdmc.bench.cases import EXAMPLES, standard_chains
 from psdmc.bench.gate import BASELINE, Baseline, compare, count
@@ -17,6 +18,8 @@ from psdmc.errors import InputError
 from psdmc.program.program import Instr, Op, Program
 
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
+
+OPERATIONS = {"inverse_dynamics": {"mul": 225, "add": 222}}
 
 ONE = {"KR6": {"inverse_dynamics": {"mul": 225, "add": 222, "instructions state": 885.16}}}
 
@@ -63,14 +66,36 @@ def test_operations_gate_under_any_compiler():
 
 
 def test_missing_valgrind_is_said():
-    after = Baseline(
-        "gcc 12", {"KR6": {"inverse_dynamics": {"mul": 225, "add": 222}}}, "valgrind was not found"
-    )
+    after = Baseline("gcc 12", {"KR6": OPERATIONS}, {"KR6": "valgrind was not found"})
 
     text, passed = compare(baseline(), after)
 
     assert passed
     assert "instructions were not counted: valgrind was not found" in text
+
+
+def test_a_robot_without_instruction_counts_is_named_and_the_others_are_compared():
+    grown = baseline(instructions_state=2000.0).counts
+    after = Baseline("gcc 12", {"talos": OPERATIONS, **grown}, {"talos": "valgrind was killed by SIGILL"})
+    before = Baseline("gcc 12", {"talos": {**ONE["KR6"]}, **ONE})
+
+    text, passed = compare(before, after)
+
+    assert not passed
+    assert "KR6 inverse_dynamics: instructions state 885.16 -> 2000  GREW" in text
+    assert "talos: instructions were not counted: valgrind was killed by SIGILL" in text
+
+
+def test_saving_keeps_instruction_counts_of_a_robot_that_could_not_be_counted(tmp_path, monkeypatch):
+    path = tmp_path / "b.json"
+    path.write_text(baseline().to_json())
+    after = Baseline("gcc 12", {"KR6": {"inverse_dynamics": {"mul": 220}}}, {"KR6": "killed by SIGILL"})
+    monkeypatch.setattr(gate, "_counted", lambda names: after)
+    monkeypatch.setattr("sys.argv", ["gate", "save", "--baseline", str(path)])
+
+    assert gate.main() == 0
+    kept = Baseline.read(path).counts["KR6"]["inverse_dynamics"]
+    assert kept == {"mul": 220, "instructions state": 885.16}
 
 
 def test_a_function_that_the_baseline_lacks_fails():
