@@ -26,8 +26,9 @@ import psdmc
 from psdmc.atomic import write_whole
 from psdmc.backends.cuda.names import symbol_of
 from psdmc.backends.cuda.package import BLOCK
+from psdmc.backends.options import EmitOptions
 from psdmc.bench.cases import LEGGED, robot_data
-from psdmc.emission import cuda_source
+from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import InputError, exit_status_of
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.lower.kernels import wanted
@@ -126,7 +127,7 @@ def timed(
     driver: Driver, model: DynamicsModel, real: Any, device: str, batches: Sequence[int]
 ) -> Iterator[tuple[str, str, int, float, int]]:
     """Function, layout, states, seconds of a launch, and bytes of one state."""
-    source = cuda_source(model, "auto", TIMED, real, silent, gravity_input=False)
+    source = cuda_source(model, EmitRequest("auto", TIMED, EmitOptions(real)), silent)
     code = machine_code(source.text, f"{source.robot}_KERNELS", driver.arch)
     robot: Any = psdmc.compile(model, functions=TIMED, real=real, target=device)
     for name in TIMED:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 from weakref import WeakValueDictionary
 
 from psdmc.backends.c.package import PackageView
-from psdmc.emission import emit_options, package_of
+from psdmc.emission import EmitRequest, emit_options, package_of
 from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering, wanted
 from psdmc.model.dynamics_model import DynamicsModel
@@ -47,30 +47,13 @@ class CompileRequest:
 
     def __reduce__(self) -> tuple[Any, ...]:
         filed = self.model if isinstance(self.model, bytes) else zlib.compress(file_bytes(self.model))
-        others = (
-            self.lowering,
-            self.functions,
-            self.real,
-            self.trig,
-            self.target,
-            *self._law,
-            self.gravity_input,
-        )
-        return CompileRequest, (filed, self.model_hash, self.names, *others)
+        _, *others = (getattr(self, field.name) for field in fields(self))
+        return CompileRequest, (filed, *others)
 
     @property
     def key(self) -> str:
         """A text that is equal for two calls of `compile` with equal results: a hash of the model and of all options."""
-        parts = (
-            self.model_hash,
-            self.lowering,
-            self.functions,
-            self.real,
-            self.trig,
-            self.target,
-            *self._law,
-            *((self.gravity_input,) if self.gravity_input else ()),
-        )
+        parts = [getattr(self, field.name) for field in fields(self) if field.name not in ("model", "names")]
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     def compiled(self, progress: Progress = silent) -> CompiledRobot[Any]:
@@ -84,14 +67,21 @@ class CompileRequest:
             )
 
         def make() -> PackageView:
-            given = (self.opened(), self.lowering, self.functions, options, None, progress)
-            own = (self.friction, False, None, self.smoothing_speed, self.gravity_input)
-            package = package_of(*given, False, (), *own)
+            asked = EmitRequest(
+                self.lowering,
+                self.functions,
+                options,
+                friction=self.friction,
+                smoothing_speed=self.smoothing_speed,
+                gravity_input=self.gravity_input,
+            )
+            package = package_of(self.opened(), asked, progress)
             progress("compiling")
             return package
 
         parts = (self.model_hash, self.lowering, options.real, options.trig, *self.names)
-        parts += (f"friction {self._law}",) if self.friction or self.smoothing_speed is not None else ()
+        law = (self.friction, self.smoothing_speed)
+        parts += (f"friction {law}",) if self.friction or self.smoothing_speed is not None else ()
         parts += (f"gravity input {self.gravity_input!r}",) if self.gravity_input is not False else ()
 
         def more(function: str) -> CompiledRobot[Any]:
@@ -104,11 +94,6 @@ class CompileRequest:
         )
         _ROBOTS[self.key] = robot
         return robot
-
-    @property
-    def _law(self) -> tuple[object, ...]:
-        """Return what the friction in the dynamics depends on beside the model."""
-        return self.friction, self.smoothing_speed
 
     def opened(self) -> DynamicsModel:
         """Return the model of this request, which a pickled request stores as compressed bytes."""

@@ -24,7 +24,7 @@ from psdmc.backends.protocol import back_end
 from psdmc.backends.recorded import Differences, differences, recorded_options
 from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.compile_request import CompileRequest
-from psdmc.emission import cuda_robot, emission, emit_options, functions_of, listed
+from psdmc.emission import EmitRequest, cuda_robot, emission, emit_options, functions_of, listed
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
@@ -319,10 +319,20 @@ def _files(
             f"target {options.target.name} has no shared libraries, which {adapters[0]} loads",
             "leave --with out, or emit another package for it",
         )
-    more = chosen(adapters)
-    facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
-    further = (own.get("estimator"), own.get("smoothing-speed"), own.get("gravity-input", False))
-    return language.files(emission(model, lowering, functions, options, name, progress, *facts, *further))
+    asked = EmitRequest(
+        lowering,
+        functions,
+        options,
+        name,
+        payload=own.get("payload", False),
+        adapters=chosen(adapters),
+        friction=own.get("friction", False),
+        bodies=own.get("bodies", False),
+        estimator=own.get("estimator"),
+        smoothing_speed=own.get("smoothing-speed"),
+        gravity_input=own.get("gravity-input", False),
+    )
+    return language.files(emission(model, asked, progress))
 
 
 @overload
@@ -422,11 +432,23 @@ def compile(
     found = model_of(model)
     if isinstance(target, str) and target.partition(":")[0] == "cuda":
         absent = {"trig": trig, "friction": friction, "smoothing_speed": smoothing_speed}
-        return cuda_robot(found, lowering, functions, real, progress, target, gravity_input, absent)
+        asked = EmitRequest(lowering, functions, emit_options(lowering, real), gravity_input=gravity_input)
+        return cuda_robot(found, asked, progress, target, absent)
     names = (functions,) if isinstance(functions, str) else functions
     kept = None if names is None else tuple(names)
     chosen_names = wanted(kept, found.mechanism)
     law: Literal[False, "in-dynamics"] = "in-dynamics" if friction else False
-    known = (found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
-    request = CompileRequest(*known, law, smoothing_speed, gravity_input)
+    request = CompileRequest(
+        found,
+        found.content_hash,
+        chosen_names,
+        lowering,
+        kept,
+        real,
+        trig,
+        target,
+        friction=law,
+        smoothing_speed=smoothing_speed,
+        gravity_input=gravity_input,
+    )
     return request.compiled(progress)

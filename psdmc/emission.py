@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 from psdmc.backends.c.adapters import with_needed
 from psdmc.backends.c.package import PackageView, package_view
@@ -31,44 +31,47 @@ if TYPE_CHECKING:
     from psdmc.toolchain.cuda_robot import CudaRobot, CudaSource
 
 
+@dataclass(frozen=True, slots=True)
+class EmitRequest:
+    """What a package is to contain: the options of `compiler.emit_c`, which explains them.
+
+    options  precision, sines and target machine
+    """
+
+    lowering: Lowering
+    functions: Sequence[str] | str | None
+    options: EmitOptions
+    name: str | None = None
+    payload: bool = False
+    adapters: Sequence[str] = ()
+    friction: bool | Literal["in-dynamics"] = False
+    bodies: bool = False
+    estimator: str | None = None
+    smoothing_speed: float | None = None
+    gravity_input: bool = False
+
+
 @collecting_rarely()
-def package_of(*given: Any) -> PackageView:
-    """Return the C package of what `emission` takes."""
-    made = emission(*given)
+def package_of(model: DynamicsModel, asked: EmitRequest, progress: Progress) -> PackageView:
+    """Return the C package of a model."""
+    made = emission(model, asked, progress)
     return package_view(made.info, made.kernels, made.options, made.references, made.adapters)
 
 
-def cuda_source(
-    model: DynamicsModel,
-    lowering: Lowering,
-    functions: Sequence[str] | str | None,
-    real: Real | None,
-    progress: Progress,
-    gravity_input: bool,
-) -> CudaSource:
+def cuda_source(model: DynamicsModel, asked: EmitRequest, progress: Progress) -> CudaSource:
     """Return the CUDA source of a model's functions, for `compile` with the target "cuda"."""
     from psdmc.backends.c.render import render
     from psdmc.backends.cuda.package import cuda_package
     from psdmc.toolchain.cuda_robot import CudaSource  # it makes a method for each function, which takes time
 
-    made = emission(
-        model, lowering, functions, emit_options(lowering, real), None, progress, gravity_input=gravity_input
-    )
-    cuda = cuda_package(replace(made, references=None))
+    cuda = cuda_package(replace(emission(model, asked, progress), references=None))
     text = render("cuda/robot.cuh.jinja", cuda=cuda, package=cuda.package)
     failing = frozenset(kernel.view.name for kernel in cuda.kernels if kernel.view.positive)
     return CudaSource(text, cuda.package.robot, interface_of(cuda.package), failing)
 
 
 def cuda_robot(
-    model: DynamicsModel,
-    lowering: Lowering,
-    functions: Sequence[str] | str | None,
-    real: Real | None,
-    progress: Progress,
-    target: str,
-    gravity_input: bool,
-    absent: Mapping[str, object],
+    model: DynamicsModel, asked: EmitRequest, progress: Progress, target: str, absent: Mapping[str, object]
 ) -> CudaRobot:
     """Return the robot of a target "cuda", the first GPU, or "cuda:N". Raises InputError if the caller chose one of the
     options that are absent there."""
@@ -85,32 +88,19 @@ def cuda_robot(
     driver = Driver(int(number))
 
     def source(names: Sequence[str] | str | None) -> CudaSource:
-        return cuda_source(model, lowering, names, real, progress, gravity_input)
+        return cuda_source(model, replace(asked, functions=names), progress)
 
-    made = source(functions)
+    made = source(asked.functions)
     progress("compiling")
-    return CudaRobot(made, driver, source if functions is None else None)
+    return CudaRobot(made, driver, source if asked.functions is None else None)
 
 
-def emission(
-    model: DynamicsModel,
-    lowering: Lowering,
-    functions: Sequence[str] | str | None,
-    options: EmitOptions,
-    name: str | None,
-    progress: Progress,
-    payload: bool = False,
-    adapters: Sequence[str] = (),
-    friction: bool | Literal["in-dynamics"] = False,
-    bodies: bool = False,
-    estimator: str | None = None,
-    smoothing_speed: float | None = None,
-    gravity_input: bool = False,
-) -> Emission:
-    """Return what a back end receives for a model: the kernels of its functions, facts and reference states. The arguments
-    are those of `compiler.emit_c`. Raises InputError as that does."""
-    names = functions_of(model, functions, adapters, gravity_input)
-    law = _friction_in_dynamics(model, friction, smoothing_speed)
+def emission(model: DynamicsModel, asked: EmitRequest, progress: Progress) -> Emission:
+    """Return what a back end receives for a model: the kernels of its functions, facts and reference states. Raises
+    InputError as `compiler.emit_c` does."""
+    options, estimator, gravity_input = asked.options, asked.estimator, asked.gravity_input
+    names = functions_of(model, asked.functions, asked.adapters, gravity_input)
+    law = _friction_in_dynamics(model, asked.friction, asked.smoothing_speed)
     if estimator and law is not None:
         raise InputError(
             "an estimator cannot have friction in the dynamics: its torques contain no friction",
@@ -119,16 +109,16 @@ def emission(
     _check_gravity_input(gravity_input, estimator)
     require(model, names)
     costs = options.target.costs
-    key = (model.content_hash, lowering, repr(costs), *names)
+    key = (model.content_hash, asked.lowering, repr(costs), *names)
     key += (law.key,) if law else ()
     kernels = lowered_once(
         (*key, "gravity input") if gravity_input else key,
         lambda: lower(
-            model, lowering, names, progress, costs=costs, friction=law, gravity_input=gravity_input
+            model, asked.lowering, names, progress, costs=costs, friction=law, gravity_input=gravity_input
         ),
         gravity_input,
     )
-    shown: dict[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    shown: dict[str, str] = {"lowering": asked.lowering, "real": options.real, "trig": options.trig}
     if estimator:
         shown["estimator"] = estimator
     momenta = None if estimator is None else lower_estimator(model, estimator, costs)
@@ -137,11 +127,11 @@ def emission(
     if gravity_input:
         shown["gravity-input"] = "yes"
     own = None if law is None else law.friction
-    info = package_info(model, name, shown, payload, friction is True, bodies, own)
+    info = package_info(model, asked.name, shown, asked.payload, asked.friction is True, asked.bodies, own)
     references = reference_states(model, names, friction=law, gravity_input=gravity_input)
-    if payload:
+    if asked.payload:
         references = replace(references, load=reference_load(model))
-    return Emission(info, kernels, options, references, tuple(adapters), momenta)
+    return Emission(info, kernels, options, references, tuple(asked.adapters), momenta)
 
 
 def _check_gravity_input(gravity_input: object, estimator: str | None) -> None:

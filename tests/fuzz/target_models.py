@@ -29,4 +29,6 @@ def model(data: bytes, folder: Path, deep: bool) -> None:
     if deep:
         file_bytes(found)
         check_model(found)
-        package_files(emission.package_of(found, "auto", ["gravity"], EmitOptions(), None, silent))
+        package_files(
+            emission.package_of(found, emission.EmitRequest("auto", ["gravity"], EmitOptions()), silent)
+        )

@@ -12,7 +12,8 @@ from machine_code import DERIVATIVES, FILE, counts, kernels_in, version
 from pinocchio_robots import path_of
 
 import psdmc
-from psdmc.emission import cuda_source
+from psdmc.backends.options import EmitOptions
+from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import ToolchainError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE
 from psdmc.progress import silent
@@ -70,7 +71,9 @@ def test_more_than_recorded_is_noticed() -> None:
 def test_compile_at_run_time(arch: int, begin: bytes) -> None:
     """What psdmc.compile(target="cuda") loads: machine code of a GPU that NVRTC knows, and PTX for a newer one."""
     names = ("inverse_dynamics", "forward_dynamics")
-    source = cuda_source(bundled_model("two_link"), "auto", names, "float32", silent, gravity_input=False)
+    source = cuda_source(
+        bundled_model("two_link"), EmitRequest("auto", names, EmitOptions("float32")), silent
+    )
 
     code = nvrtc.machine_code(source.text, f"{source.robot}_KERNELS", arch)
 
