@@ -65,12 +65,14 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 def write_together(root: Path, files: Mapping[str, str] | Mapping[str, str | bytes]) -> None:
     """Write several files that belong together. `files` maps each path, relative to the folder `root`, to the content
     of that file. The content of all files is on disk before the first file is renamed to its final name. The renames
-    follow the order of `files`. Raises the same errors as write_whole."""
+    follow the order of `files`. If writing fails, folders that were made for the files are removed. Raises the same errors
+    as write_whole."""
     with system_errors_at(root), contextlib.ExitStack() as all_of_them:
         ready = []
         for path, text in files.items():
             target = root / path
-            target.parent.mkdir(parents=True, exist_ok=True)
+            for folder in _made_folders(target.parent):
+                all_of_them.callback(_remove_empty, folder)
             own = all_of_them.enter_context(_temporary(target))
             _fill(own, text)
             _settle(own, target)
@@ -85,6 +87,18 @@ def make_folder(path: str | os.PathLike[str]) -> None:
     """Make a folder and its missing parent folders. Raises the same errors as write_whole."""
     with system_errors_at(path):
         Path(path).mkdir(parents=True, exist_ok=True)
+
+
+def _made_folders(path: Path) -> list[Path]:
+    """Make a folder and its missing parents, and return those that were missing, parents first."""
+    missing = [folder for folder in (*reversed(path.parents), path) if not folder.exists()]
+    path.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _remove_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):  # it has files
+        folder.rmdir()
 
 
 def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
@@ -144,8 +158,12 @@ def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
 def unwritable(path: str | os.PathLike[str], error: OSError) -> PsdmcError:
     """Return the error for a `path` that cannot be written. Its hint suggests another path or another disk."""
     what = f"{os.fspath(path)}: cannot be written: {error.strerror or error}"
+    if error.errno == errno.EROFS:
+        return ToolchainError(what, "write to another disk")
     if error.errno in _THE_DISK:
         return ToolchainError(what, "make room there, or write to another disk")
+    if error.errno == errno.ENOTDIR:
+        return InputError(what, "a file is in the place of a folder: give another folder")
     return InputError(what, "give a place that exists and that you may write to")
 
 

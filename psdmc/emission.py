@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class EmitRequest:
-    """What a package is to contain: the options of `compiler.emit_c`, which explains them.
+    """Describes what a package is to contain, by the options of `compiler.emit_c`, which explains them.
 
     options  precision, sines and target machine
     """

@@ -226,8 +226,10 @@ def test_parts_along_a_motion_are_made_again_alike(arm: DynamicsModel, tmp_path:
     assert hashes(tmp_path / "c") == before
     other = circle()
     other.q[7, 1] += 1e-9
-    with pytest.raises(InputError, match="holds another sampling, whose along is"):
+    with pytest.raises(InputError, match="holds another sampling, whose along: numbers is"):
         sample(arm, tmp_path / "c", replace(noisy, along=other))
+    with pytest.raises(InputError, match=r"holds another sampling, whose along: noise is 0\.1, not 0\.2"):
+        sample(arm, tmp_path / "c", replace(noisy, noise=0.2))
 
 
 @pytest.mark.parametrize(
@@ -503,6 +505,10 @@ def test_the_command_says_what_it_wrote(arm: DynamicsModel, tmp_path: Path) -> N
         "columns: q (2), qd (2), qdd (2), inverse_dynamics (2)",
     ]
     assert "; 1 of them were there" in typed(*words, cwd=tmp_path).stdout
+    for option in (("--states", "1e3", "--functions", ""), ("--states", "1e3", "--part-states", "half")):
+        refused = typed(*words[:4], *option, cwd=tmp_path)
+        assert refused.returncode == 2
+        assert "no function is named" in refused.stderr or "--part-states is 'half'" in refused.stderr
     refused = typed(*words[:4], "--states", "1e3.5", cwd=tmp_path)
     assert (refused.returncode, refused.stderr.splitlines()[0]) == (2, "error: --states is '1e3.5'")
 

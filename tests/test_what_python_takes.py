@@ -64,10 +64,11 @@ def test_what_is_no_model_is_refused_by_name(
     with pytest.raises(InputError, match="a robot's file was given where a model is expected") as caught:
         call(path)
     assert caught.value.hint == f"derive it first: psdmc.derive({path!r})"
-    with pytest.raises(InputError, match="a dict was given where a model is expected"):
+    with pytest.raises(InputError, match="an object of the type dict was given where a model is expected"):
         call({})
-    with pytest.raises(InputError, match=r"nowhere\.npz: no such file"):
-        call("nowhere.npz")
+    for missing in ("nowhere.npz", "nowhere.toml"):
+        with pytest.raises(InputError, match=f"{missing}: no such file"):
+            call(missing)
     assert not list(tmp_path.iterdir())
 
 

@@ -101,10 +101,10 @@ def differences(directory: str | os.PathLike[str], files: Mapping[str, str]) -> 
         gone = [path for path in listed(root / MANIFEST) if path not in files]
         added = tuple(path for path in gone if digest_of(root, path) is not None)
     reasons = []
-    if before.get("psdmc_version") != after["psdmc_version"]:
-        reasons.append(
-            f"psdmc {before.get('psdmc_version')} wrote the package, and this is {after['psdmc_version']}"
-        )
+    if not (version := before.get("psdmc_version")):
+        reasons.append(f"{MANIFEST} is damaged: it does not say which psdmc wrote the package")
+    elif version != after["psdmc_version"]:
+        reasons.append(f"psdmc {version} wrote the package, and this is {after['psdmc_version']}")
     if before.get("model_hash") != after["model_hash"]:
         reasons.append("the package was emitted from another model")
     return Differences(

@@ -20,7 +20,6 @@ from psdmc.atomic import (
     remove_leftovers,
     system_errors_at,
     write_together,
-    write_whole,
 )
 from psdmc.backends.manifest import (
     GENERATOR,
@@ -152,7 +151,7 @@ def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Di
     known = {path: sorted(digests) for path, digests in journal.items()}
     for path, text in files.items():
         known[path] = sorted({digest(text), *known.get(path, ())})
-    write_whole(root / JOURNAL, json.dumps({"generator": GENERATOR, "files": known}, indent=1) + "\n")
+    write_together(root, {JOURNAL: json.dumps({"generator": GENERATOR, "files": known}, indent=1) + "\n"})
     try:
         write_together(root, files)
     except BaseException:

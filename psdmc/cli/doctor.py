@@ -49,6 +49,9 @@ OPTIONAL = (
     ("lz4", "calibrate", "compressed ROS bags"),
     ("backports.zstd", "calibrate", "compressed ROS bags, before Python 3.14"),
     ("pyarrow", "sample", "psdmc sample; logs in Parquet files"),
+    ("jax", "jax", "psdmc.jax"),
+    ("torch", "torch", "psdmc.torch"),
+    ("nvidia-cuda-nvrtc-cu12", "cuda", "psdmc.compile for an NVIDIA GPU"),
 )
 """Packages, the extra of psdmc that brings each, and the commands or files that need it."""
 

@@ -194,7 +194,11 @@ def emit(
             estimator=estimator,
         )
     written = len(changed) - len(changed.removed)
-    print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")
+    print(
+        f"{folder}: {written} {'file' if written == 1 else 'files'} written"
+        if changed
+        else f"{folder}: nothing changed"
+    )
     if changed.removed:
         print(f"{folder}: removed, because the package no longer has them: {', '.join(changed.removed)}")
     for path, name_now in changed.kept.items():

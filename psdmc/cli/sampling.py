@@ -54,8 +54,12 @@ def sample(
         ),
     ] = 0.0,
     part_states: Annotated[
-        int | None,
-        typer.Option(metavar="NUMBER", help="states of a file", show_default="a file has up to 64 MiB"),
+        str | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="states of a file, such as 32768 or 1e5",
+            show_default="a file has up to 64 MiB",
+        ),
     ] = None,
     along: Annotated[
         Path | None,
@@ -90,14 +94,14 @@ def sample(
         motion = Motion(str(along), joints, time, *parts)  # type: ignore[arg-type]
     limits = {"position": position, "speed": speed, "acceleration": acceleration, "effort": effort}
     what = Sampling(
-        _count(states),
-        names(functions) or ("inverse_dynamics",),
+        _count("--states", states),
+        ("inverse_dynamics",) if functions is None else names(functions),
         draw,  # type: ignore[arg-type]
         seed,
         real,  # type: ignore[arg-type]
         theta_spread,
         {word: value for word, value in limits.items() if value is not None},
-        part_states,
+        None if part_states is None else _count("--part-states", part_states),
         motion,
         noise,
     )
@@ -109,7 +113,7 @@ def sample(
     print(f"columns: {', '.join(f'{name} ({size})' for name, size in found.columns.items())}")
 
 
-def _count(text: str) -> int:
+def _count(option: str, text: str) -> int:
     """A number of states, also as 1e8."""
     try:
         value = float(text)
@@ -117,4 +121,4 @@ def _count(text: str) -> int:
             return int(value)
     except (ValueError, OverflowError):
         pass
-    raise InputError(f"--states is {text!r}", "give a whole number, such as 100000 or 1e8")
+    raise InputError(f"{option} is {text!r}", "give a whole number, such as 100000 or 1e8")

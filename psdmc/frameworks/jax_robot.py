@@ -158,9 +158,10 @@ class JaxRobot:
             switch = (
                 "" if jax.config.jax_enable_x64 else "set jax_enable_x64 to True with jax.config.update, "
             )
+            is_real = array.dtype in (jnp.float32, jnp.float64)
+            other = f", or make the robot with psdmc.jax(model, real={str(array.dtype)!r})" if is_real else ""
             raise ArgumentError(
-                f"{what} has dtype {array.dtype}, expected {dtype}",
-                f"{switch}convert the array, or make the robot with psdmc.jax(model, real={str(array.dtype)!r})",
+                f"{what} has dtype {array.dtype}, expected {dtype}", f"{switch}convert the array{other}"
             )
         tail = self._sizes.shape(quantity.axes)
         if array.shape[max(array.ndim - len(tail), 0) :] != tail:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -179,6 +179,17 @@ class TorchRobot:
             raise no_function(self, name)
 
 
+def _fault(names: Sequence[str], required: int, given: Sequence[object], named: Mapping[str, object]) -> str:
+    """Return what is wrong with the arguments of a function that takes the arguments `names`, the first few required."""
+    if len(given) > len(names):
+        return f"{len(given)} tensors were given"
+    if unknown := [name for name in named if name not in names]:
+        return f"there is no argument {unknown[0]}"
+    if twice := [name for name in names[: len(given)] if name in named]:
+        return f"{twice[0]} was given twice"
+    return f"{', '.join(name for name in names[len(given) : required] if name not in named)} was not given"
+
+
 def _method(function: Signature) -> Callable[..., Any]:
     names, result = arguments(function), results(function)
     required = len(function.inputs)
@@ -188,8 +199,7 @@ def _method(function: Signature) -> Callable[..., Any]:
         gravity = named.pop(GRAVITY.name, None)
         missing = [name for name in names[len(given) : required] if name not in named]
         if missing or len(given) > len(names) or any(name not in names[len(given) :] for name in named):
-            got = ", ".join([f"{len(given)} tensors", *named])
-            raise TypeError(f"{function.name}({', '.join(names)}): got {got}")
+            raise TypeError(f"{function.name}({', '.join(names)}): {_fault(names, required, given, named)}")
         tensors = [*given, *(named.get(name) for name in names[len(given) :])]
         for k in scalars:
             tensors[k] = _as_scalar(tensors[k], like=tensors[0])

@@ -58,12 +58,10 @@ def default_of(robot: Mechanism) -> tuple[str, ...]:
     return DEFAULT if all(joint.type.about_z for joint in robot.joints) else DEFAULT_WHERE_WIDE
 
 
-def near_names(word: str, names: Sequence[str], otherwise: str | None = None) -> str:
-    """Return the hint for a word that is none of the names: similar names, or `otherwise`, or else all names."""
+def near_names(word: str, names: Sequence[str], otherwise: str) -> str:
+    """Return the hint for a word that is none of the names: similar names, or else `otherwise`."""
     alike = get_close_matches(word.lower().replace("-", "_"), names, n=3)
-    return (
-        f"do you mean {' or '.join(alike)}?" if alike else otherwise or f"psdmc generates {', '.join(names)}"
-    )
+    return f"do you mean {' or '.join(alike)}?" if alike else otherwise
 
 
 def no_function(robot: object, name: str) -> AttributeError:

@@ -155,9 +155,11 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
     known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise InputError(f"function {unknown[0]!r} is not known", near_names(unknown[0], (*RECIPES, *groups)))
+        some = f"the default functions are {', '.join(default)}; the page Functions of the documentation lists all"
+        hint = near_names(unknown[0], (*RECIPES, *groups), some)
+        raise InputError(f"function {unknown[0]!r} is not known", hint)
     if not names:
-        raise InputError("no function is named", f"give default, all, or some of {', '.join(RECIPES)}")
+        raise InputError("no function is named", f"give default, all, or names such as {', '.join(default)}")
     calling = [name for name in names if robot is None or robot.nv > recipe_of(name).straight]
     called = {other for name in calling for other in known[name].calls}
     return tuple(name for name in known if name in names or name in called)

@@ -65,10 +65,10 @@ def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
         return given
     if not isinstance(given, str | Path):
         raise InputError(
-            f"a {type(given).__name__} was given where a model is expected",
+            f"an object of the type {type(given).__name__} was given where a model is expected",
             "psdmc.derive(robot_file) or psdmc.load(model_file) gives one",
         )
-    if Path(given).suffix.lower() in ROBOT_FILES:
+    if Path(given).suffix.lower() in ROBOT_FILES and Path(given).exists():
         raise InputError(
             f"{given}: a robot's file was given where a model is expected",
             f"derive it first: psdmc.derive({str(given)!r})",

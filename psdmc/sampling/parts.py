@@ -153,12 +153,23 @@ def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
     if is_own and known != manifest and not any(folder.glob("part-*.parquet")):
         write_whole(path, json.dumps(manifest, indent=1) + "\n")
         return
-    for key, value in manifest.items():
-        if known.get(key) != value:
-            raise InputError(
-                f"{folder}: holds another sampling, whose {key} is {shown(known.get(key))}, not {shown(value)}",
-                "give -o another folder, or the options, model and versions of its sample.json",
-            )
+    own = {name: known.get(name) for name in manifest}
+    if own != manifest:
+        what, here, value = _first_difference(own, manifest)
+        raise InputError(
+            f"{folder}: holds another sampling, whose {what} is {shown(here)}, not {shown(value)}",
+            "give -o another folder, or the options, model and versions of its sample.json",
+        )
+
+
+def _first_difference(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> tuple[str, Any, Any]:
+    """Return the name of the first entry that differs, and its two values; within entries that are objects, too."""
+    name = next(name for name in {**wanted, **known} if known.get(name) != wanted.get(name))
+    here, value = known.get(name), wanted.get(name)
+    if isinstance(here, Mapping) and isinstance(value, Mapping):
+        within, here, value = _first_difference(here, value)
+        return f"{name}: {within}", here, value
+    return name, here, value
 
 
 def _is_done(path: Path, described: bytes) -> bool:
@@ -178,6 +189,10 @@ def _check_room(folder: Path, size: int) -> None:
         free = shutil.disk_usage(folder).free
     if size > free:
         raise ToolchainError(
-            f"{folder}: the missing parts take {size / 1e9:.1f} GB, and the disk has {free / 1e9:.1f} GB free",
+            f"{folder}: the missing parts take {_shown_bytes(size)}, and the disk has {_shown_bytes(free)} free",
             "make room there, write to another disk, or sample fewer states",
         )
+
+
+def _shown_bytes(size: int) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"

@@ -94,6 +94,9 @@ def test_it_says_if_the_model_or_psdmc_is_another(package: Path) -> None:
         "note: the package was emitted from another model\n"
     )
 
+    (package / MANIFEST).write_text(text.replace('"psdmc_version"', '"psdmc_versiom"'))
+    assert "note: manifest.json is damaged: it does not say which psdmc wrote" in checked(package).stdout
+
 
 @pytest.mark.parametrize(
     ("words", "expected"),

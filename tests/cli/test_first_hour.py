@@ -18,6 +18,7 @@ from command_line import typed
 import psdmc
 from psdmc.backends.manifest import MANIFEST, target_of
 from psdmc.errors import InputError
+from psdmc.functions import DEFAULT
 from psdmc.lower.kernels import wanted
 from psdmc.toolchain.build_package import checks_of
 
@@ -82,7 +83,7 @@ def test_no_function_is_not_the_default_set(given: str, tmp_path: Path) -> None:
     done = typed("emit-c", saved(tmp_path), "--functions", given, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(
-        "error: no function is named\nhint: give default, all, or some of inverse_dynamics, "
+        "error: no function is named\nhint: give default, all, or names such as inverse_dynamics, "
     )
     assert not (tmp_path / "arm").exists()
 
@@ -120,10 +121,11 @@ def test_a_mistyped_function_is_guessed(word: str, hint: str) -> None:
     assert str(refused.value.hint).startswith(f"do you mean {hint}")
 
 
-def test_a_function_like_none_gets_the_whole_list() -> None:
+def test_a_function_like_none_gets_the_default_functions_and_a_page() -> None:
     with pytest.raises(InputError) as refused:
         wanted(["qwxz"])
-    assert {"rk4_step", "all"} <= set(str(refused.value.hint).replace(",", "").split())
+    assert set(DEFAULT) <= set(str(refused.value.hint).replace(",", "").replace(";", "").split())
+    assert "the page Functions of the documentation lists all" in str(refused.value.hint)
 
 
 def test_building_says_what_was_checked_and_the_next_command_needs_no_rights(tmp_path: Path) -> None:

@@ -340,6 +340,14 @@ def test_a_full_disk_leaves_the_old_package(tmp_path: Path, monkeypatch: pytest.
     assert "\n" not in caught.value.message
     assert {name: (tmp_path / name).read_text() for name in _stamps(tmp_path)} == FILES
 
+    calls.clear()
+    with pytest.raises(ToolchainError, match="No space left"):
+        write_package(tmp_path / "new", OTHER)
+    assert not list((tmp_path / "new").iterdir())
+    monkeypatch.undo()
+    write_package(tmp_path / "new", OTHER)
+    assert {name: (tmp_path / "new" / name).read_text() for name in _stamps(tmp_path / "new")} == OTHER
+
 
 def test_edited_files_are_known(tmp_path: Path) -> None:
     assert edited_files(tmp_path) is None
