@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from psdmc.errors import InputError
-from psdmc.robot.limits import ANGLE, LENGTH, joined, shown
+from psdmc.robot.limits import ANGLE, DRIVE_INERTIA, LENGTH, joined, shown
 from psdmc.robot.mjcf_loops import loop_kinds
 from psdmc.robot.mjcf_terms import Names, acting, armatures, armatures_elsewhere, is_active, named, reflected
 
@@ -63,18 +63,18 @@ def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> Non
 
 
 def refuse_armatures(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """Raise InputError with the names of joints and actuators that have negative armatures. MuJoCo accepts them."""
-    own = [(j, float(model.dof_armature[model.jnt_dofadr[j]])) for j in range(model.njnt)]
-    found = [f"joint {shown(names.joint(j))}: armature {value:g}" for j, value in own if value < 0.0]
-    found += [
-        f"actuator {_name(mujoco, model, 'ACTUATOR', k)}: armature {reflected(model, k):g} at its joint"
-        for k in range(len(model.actuator_trntype))
-        if reflected(model, k) < 0.0
-    ]
-    if found:
-        raise InputError(
-            f"{source}: {joined(found)}, expected 0 or more", "give the inertia of the joint's drive"
-        )
+    """Raise InputError with the names of joints and actuators whose armatures are negative or out of range. MuJoCo
+    accepts them."""
+    own = [float(model.dof_armature[address]) for address in model.jnt_dofadr]
+    found = [(f"joint {shown(names.joint(j))}: armature {value:g}", value) for j, value in enumerate(own)]
+    for k in range(len(model.actuator_trntype)):
+        value = reflected(model, k)
+        what = f"actuator {_name(mujoco, model, 'ACTUATOR', k)}: armature {value:g} at its joint"
+        found.append((what, value))
+    faults = [f"{what}, expected 0 or more" for what, value in found if value < 0.0]
+    faults += [f"{what} {fault}" for what, value in found if (fault := DRIVE_INERTIA.fault(max(value, 0.0)))]
+    if faults:
+        raise InputError(f"{source}: {joined(faults)}", "give the inertia of the joint's drive")
 
 
 def _other_equalities(mujoco: Any, model: Any) -> Iterator[str]:

@@ -34,7 +34,8 @@ def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
 
 def reflected(model: Any, actuator: int) -> float:
     """Return an actuator's inertia at the joint: its armature times the square of the gear ratio."""
-    return float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
+    armature, gear = float(model.actuator_armature[actuator]), float(model.actuator_gear[actuator, 0])
+    return armature * gear * gear if armature else 0.0
 
 
 def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -9,11 +10,16 @@ from typing import Any
 
 @contextmanager
 def kept_warnings(mujoco: Any) -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings until the end of the block, in order, one line each."""
+    """Collect MuJoCo's warnings until the end of the block, one line each. MuJoCo gives some of them to a callback, and
+    others to Python's warnings; those come last."""
     said: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: said.append(" ".join(str(text).split())))
     try:
-        yield said
+        with warnings.catch_warnings(record=True) as raised:
+            warnings.simplefilter("always")
+            yield said
     finally:
         mujoco.set_mju_user_warning(before)
+        texts = [" ".join(str(one.message).split()) for one in raised]
+        said += [text for text in dict.fromkeys(texts) if text not in said]

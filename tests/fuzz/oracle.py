@@ -44,6 +44,8 @@ def torque_error(
     if reference is None or not set(model.joint_names) <= set(reference.names):
         return None
     follows = _mimics(text) if source_format == "urdf" else {}
+    if source_format == "urdf":
+        _take_kept_armatures(reference, text)
     reference = _as_told(reference, model.joint_names, given)
     rng = np.random.default_rng(SEED)
     q, qd, qdd = (rng.uniform(-2.0, 2.0, (STATES, size)) for size in (model.nq, model.nv, model.nv))
@@ -57,6 +59,17 @@ def torque_error(
         if not 1e-200 < largest < 1e200:
             return None
         return float(np.abs(model.inverse_dynamics(q, qd, qdd) - expected).max()) / largest
+
+
+def _take_kept_armatures(reference: Any, text: str) -> None:
+    """URDF has no word for armatures: psdmc keeps those of an MJCF file in the MJCF that it appends to its URDF."""
+    armature = np.array(reference.armature)
+    for joint in fromstring(text).iter("joint"):
+        if "armature" in joint.attrib and reference.existJointName(joint.get("name", "")):
+            armature[reference.joints[reference.getJointId(joint.get("name"))].idx_v] = float(
+                joint.get("armature", "0")
+            )
+    reference.armature = armature
 
 
 def _as_told(reference: Any, names: tuple[str, ...], options: LoadOptions) -> Any:
