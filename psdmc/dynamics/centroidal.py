@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.derivatives import swept, wrenches_of_motions
+from psdmc.dynamics.derivatives import composites, swept, wrenches_of_motions
 from psdmc.dynamics.energy import first_moment
 from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import AT_BASE, forward_kinematics
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, scale, transform
-from psdmc.dynamics.slices import first_rates, rates
+from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.twist import momentum
 
 Wrench = tuple[Vector, Vector]
@@ -62,22 +62,23 @@ def momentum_rate_slopes(
 
     A joint's motion requires a wrench on the bodies beyond the joint (derivatives.py); the momentum of other bodies does
     not change. By q the centre of mass c moves too, so that c x force changes."""
-    axes, steps, composites = swept(frames, bodies, q, qd, qdd, ZERO)
+    moving = swept(frames, q, qd, qdd, ZERO)
+    carried = composites(moving, bodies)
     share, placed = 1.0 / _mass(bodies), forward_kinematics(frames, q)
     force = centre = ZERO
-    for i, composite in composites:
+    for i, composite in carried:
         if frames[i].parent == BASE:
-            body, step = composite.body, steps[i]
+            body, step = composite.body, moving.steps[i]
             force = add(force, step.to_link(composite.wrench[0]))
             moved = add(step.to_link(body.moment), scale(step.offset, body.mass))
             centre = add(centre, scale(moved, share))
-    first, own = first_rates(frames), rates(frames, qd)
+    first = first_rates(frames)
     blocks: list[list[tuple[Scalar, ...]]] = [[()] * first[-1] for _ in range(3)]
-    for i, composite in composites:
-        frame, step = frames[i], steps[i]
+    for i, composite in carried:
+        frame, step = frames[i], moving.steps[i]
         axes_of, origin = AT_BASE if frame.parent == BASE else placed[frame.parent]
         before = axes_of, add(origin, scale(centre, -1.0))
-        required = wrenches_of_motions(frame, axes[i], composite, own[i])
+        required = wrenches_of_motions(frame, moving.axes[i], composite, moving.qd[i])
         for k, (by_q, by_qd), twist in zip(
             range(first[i], first[-1]), required, frame.joint.twists, strict=False
         ):

@@ -26,12 +26,13 @@ first of them turns.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, about_z, inward, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, about_z, inward, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -102,35 +103,53 @@ def inverse_dynamics_derivatives(
     joint's rates, while the rates stay constant along the moved frame's own axes. Entries of two joints are exact zeros
     if neither joint carries the other.
     """
-    axes, steps, composites = swept(frames, bodies, q, qd, qdd, base_acceleration, choices, external)
-    first, qd = first_rates(frames), rates(frames, qd)
-    nv = first[-1]
+    moving, first = swept(frames, q, qd, qdd, base_acceleration, choices), first_rates(frames)
+    nv, axes = first[-1], moving.axes
     by_q, by_qd, by_qdd = ([[0.0] * nv for _ in range(nv)] for _ in range(3))
     gravity: list[Scalar] = [0.0] * nv
-    for i, composite in composites:
+    for i, composite in composites(moving, bodies, external):
         for k, row in enumerate(torque_rows(frames[i], axes[i], composite), start=first[i]):
             gravity[k] = dot(row.c, axes[i].up)
-            _fill_row((i, k), frames, axes, steps, row, qd, by_q, by_qd, by_qdd)
-        found = wrenches_of_motions(frames[i], axes[i], composite, qd[i])
+            _fill_row((i, k), moving, row, by_q, by_qd, by_qdd)
+        found = wrenches_of_motions(frames[i], axes[i], composite, moving.qd[i])
         for k, wrenches in enumerate(found, start=first[i]):
-            _fill_column((i, k), frames, steps, wrenches, by_q, by_qd)
+            _fill_column((i, k), moving, wrenches, by_q, by_qd)
         if frames[i].joint.about_z:
             by_qdd[first[i]][first[i]] = by_qdd[first[i]][first[i]] + drive_inertia[i]
     rows, slopes, mass = (tuple(tuple(row) for row in block) for block in (by_q, by_qd, by_qdd))
     return Derivatives(rows, slopes, mass, tuple(gravity))
 
 
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """A robot in motion, as the outward sweep leaves it. Each sequence has one entry per joint.
+
+    q, qd, qdd  position, rate and acceleration of the joint; tuples for joints of several rates
+    forward     motions of the bodies
+    axes        the joint's axis with its derivatives
+    steps       the step from the joint to its parent
+    """
+
+    frames: Sequence[Frame]
+    choices: Choices
+    q: Sequence[Scalar]
+    qd: Sequence[Scalar]
+    qdd: Sequence[Scalar]
+    forward: Forward
+    axes: Sequence[Axis]
+    steps: Sequence[Step]
+
+
 def swept(
     frames: Sequence[Frame],
-    bodies: Sequence[Body],
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
     base_acceleration: Vector,
     choices: Choices = PLAIN,
-    external: Mapping[int, Wrench] = NO_WRENCHES,
-) -> tuple[list[Axis], list[Step], list[tuple[int, Composite]]]:
-    """Return each joint's axis, each joint's step to its parent, and the result of `composites`."""
+) -> Swept:
+    """Compute the motions of the bodies, and each joint's axis and step to its parent, from base to tip. Arguments are
+    those of `inverse_dynamics`."""
     forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
     q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
     axes: list[Axis] = []
@@ -139,31 +158,24 @@ def swept(
         axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
         axes.append(axis)
         steps.append(step)
-    return axes, steps, composites(frames, bodies, q, qd, qdd, forward, choices, steps, external)
+    return Swept(frames, choices, q, qd, qdd, forward, axes, steps)
 
 
 def composites(
-    frames: Sequence[Frame],
-    bodies: Sequence[Body],
-    q: Sequence[Scalar],
-    qd: Sequence[Scalar],
-    qdd: Sequence[Scalar],
-    forward: Forward,
-    choices: Choices,
-    steps: Sequence[Step],
-    external: Mapping[int, Wrench] = NO_WRENCHES,
+    moving: Swept, bodies: Sequence[Body], external: Mapping[int, Wrench] = NO_WRENCHES
 ) -> list[tuple[int, Composite]]:
     """For each joint its number and the composite beyond it, in the joint's orientation about its origin; children
     before parents."""
+    frames, forward = moving.frames, moving.forward
     found: list[tuple[int, Composite]] = []
     hung: list[list[Composite]] = [[] for _ in frames]
     joined_to: list[list[Composite]] = [[] for _ in frames]
     is_leaf = leaves(frames)
     for i in reversed(range(len(frames))):
-        frame, step = frames[i], steps[i]
+        frame, step = frames[i], moving.steps[i]
         whole = at_rest(bodies[i])
         if is_leaf[i] and frame.joint.about_z:
-            whole = at_rest(leaf_body(frame, bodies[i], q[i], step, forward.states[i].turn, choices))
+            whole = at_rest(leaf_body(moving, i, bodies[i]))
             if i in external:
                 whole = relieved(whole, *(inward(forward.compound_turns[i], v) for v in external[i]))
         else:
@@ -176,7 +188,7 @@ def composites(
             for child in joined_to[i]:
                 whole = both(whole, child)
         drive = driven if frame.joint.about_z else driven_freely
-        whole = drive(frame.joint, whole, qd[i], qdd[i])
+        whole = drive(frame.joint, whole, moving.qd[i], moving.qdd[i])
         found.append((i, whole))
         if frame.parent != BASE and step.joins:
             joined_to[frame.parent].append(handed_composite(frame, moved_to(whole, step.offset)))
@@ -186,39 +198,38 @@ def composites(
     return found
 
 
-def leaf_body(
-    frame: Frame, body: Body, q: Scalar, step: Step, turn: Turn | Rotation | None, choices: Choices
-) -> Body:
-    """A body that carries no other one, in its joint's orientation."""
-    angle = joint_angle(frame, q)
-    double = (angle + angle).turn() if choices.fold_double_angle else None
-    body = spun(body, about_z(turn)) if double is None else turned(body, about_z(turn), double)
+def leaf_body(moving: Swept, i: int, body: Body) -> Body:
+    """Body i, which carries no other one, in its joint's orientation."""
+    angle, step = joint_angle(moving.frames[i], moving.q[i]), moving.steps[i]
+    double = (angle + angle).turn() if moving.choices.fold_double_angle else None
+    turn = about_z(moving.forward.states[i].turn)
+    body = spun(body, turn) if double is None else turned(body, turn, double)
     return spun(body, step.turn) if step.joins else body
 
 
 def _fill_row(
     at: tuple[int, int],
-    frames: Sequence[Frame],
-    axes: Sequence[Axis],
-    steps: Sequence[Step],
+    moving: Swept,
     row: Row,
-    qd: Sequence[Scalar],
     by_q: list[list[Scalar]],
     by_qd: list[list[Scalar]],
     by_qdd: list[list[Scalar]],
 ) -> None:
     """Set the row of joint and rate `at`, for the joints between that joint and the base: its torque by their motion."""
     j, k = at
+    frames = moving.frames
     first = first_rates(frames)
     while True:
-        joint, axis = frames[j].joint, axes[j]
-        found = by_own_axes(joint, axis, row, qd[j]) if not joint.about_z else by_axis(joint, axis, row)
+        joint, axis = frames[j].joint, moving.axes[j]
+        found = (
+            by_own_axes(joint, axis, row, moving.qd[j]) if not joint.about_z else by_axis(joint, axis, row)
+        )
         for place, (x, y, z) in enumerate(zip(*found, strict=True), start=first[j]):
             by_q[k][place], by_qd[k][place] = x, y
             by_qdd[k][place] = by_qdd[place][k] = z
         if frames[j].parent == BASE:
             return
-        row, j = steps[j].carried_row(row), frames[j].parent
+        row, j = moving.steps[j].carried_row(row), frames[j].parent
 
 
 def by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tuple[Scalar], tuple[Scalar]]:
@@ -232,14 +243,14 @@ def by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tupl
 
 def _fill_column(
     at: tuple[int, int],
-    frames: Sequence[Frame],
-    steps: Sequence[Step],
+    moving: Swept,
     wrenches: tuple[Wrench, Wrench],
     by_q: list[list[Scalar]],
     by_qd: list[list[Scalar]],
 ) -> None:
     """Set the column of joint and rate `at` for the joints before that joint: their torques by its motion."""
     (moved, pushed), (j, k) = wrenches, at
+    frames, steps = moving.frames, moving.steps
     first = first_rates(frames)
     while frames[j].parent != BASE:
         moved, pushed, j = steps[j].carried(moved), steps[j].carried(pushed), frames[j].parent

@@ -28,16 +28,17 @@ from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.derivatives import (
     Rows,
+    Swept,
     by_axis,
     composites,
     leaf_body,
+    swept,
     torque_rows,
     wrenches_of_motions,
 )
 from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, from_previous, leaves, outward
-from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
-from psdmc.dynamics.motion import Forward, sweep_outward
+from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench
 from psdmc.dynamics.moving_composite import (
     Composite,
     Momenta,
@@ -50,7 +51,7 @@ from psdmc.dynamics.moving_composite import (
 )
 from psdmc.dynamics.own_axes import accelerating, by_own_axes
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, scale, transform
-from psdmc.dynamics.slices import first_rates, positions, rates
+from psdmc.dynamics.slices import first_rates, rates
 from psdmc.dynamics.twist import combined, own_rates
 from psdmc.robot.joints import JointType
 
@@ -99,23 +100,17 @@ def inverse_dynamics_second_derivatives(
     Those by q are of the sum at q (+) x by the entries of x at zero, x constant rates for a second: symmetric also for
     joints of several coordinates. Exact zeros where neither joint carries the other.
     """
-    n, first = len(frames), first_rates(frames)
-    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
-    q, qd, qdd, weights = positions(frames, q), rates(frames, qd), rates(frames, qdd), rates(frames, weights)
-    axes: list[Axis] = []
-    steps: list[Step] = []
+    first, weights = first_rates(frames), rates(frames, weights)
+    moving = swept(frames, q, qd, qdd, base_acceleration, choices)
     before: list[Motion] = []
-    for i in range(n):
-        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
-        axes.append(axis)
-        steps.append(step)
+    for i, step in enumerate(moving.steps):
         before.append(_motion_before(frames, i, step, before, weights))
-    own = _weighted_composites(frames, bodies, q, qd, weights, forward, choices, steps, axes, before)
+    own = _weighted_composites(moving, bodies, weights, before)
     blocks = [[[0.0] * first[-1] for _ in range(first[-1])] for _ in range(4)]
-    for i, composite in composites(frames, bodies, q, qd, qdd, forward, choices, steps):
-        changes = _changes(frames[i], axes[i], composite, own[i], before[i], qd[i])
+    for i, composite in composites(moving, bodies):
+        changes = _changes(frames[i], moving.axes[i], composite, own[i], before[i], moving.qd[i])
         for k, change in enumerate(changes, start=first[i]):
-            _fill(blocks, (i, k), frames, axes, steps, before, change, qd)
+            _fill(blocks, (i, k), moving, before, change)
     return SecondDerivatives(*(tuple(tuple(row) for row in block) for block in blocks))
 
 
@@ -146,30 +141,22 @@ def _after(frame: Frame, motion: Motion, weights: Scalar) -> Motion:
 
 
 def _weighted_composites(
-    frames: Sequence[Frame],
-    bodies: Sequence[Body],
-    q: Sequence[Scalar],
-    qd: Sequence[Scalar],
-    weights: Sequence[Scalar],
-    forward: Forward,
-    choices: Choices,
-    steps: Sequence[Step],
-    axes: Sequence[Axis],
-    before: Sequence[Motion],
+    moving: Swept, bodies: Sequence[Body], weights: Sequence[Scalar], before: Sequence[Motion]
 ) -> list[Composite]:
     """Return for each joint the moments of u over the bodies beyond it, in the joint's orientation about its origin. In the
     place of momenta are int r u^T and int u, and in that of a moment is B."""
+    frames, forward = moving.frames, moving.forward
     found = [Composite(MASSLESS, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))] * len(frames)
     hung: list[list[Composite]] = [[] for _ in frames]
     joined_to: list[list[Composite]] = [[] for _ in frames]
     is_leaf = leaves(frames)
     for i in reversed(range(len(frames))):
-        frame, step = frames[i], steps[i]
+        frame, step = frames[i], moving.steps[i]
         linear, angular = _after(frame, before[i], weights[i])
-        slide, turning = combined(frame.joint, own_rates(frame.joint, qd[i]))
+        slide, turning = combined(frame.joint, own_rates(frame.joint, moving.qd[i]))
         if is_leaf[i] and frame.joint.about_z:
-            body = leaf_body(frame, bodies[i], q[i], step, forward.states[i].turn, choices)
-            whole = _moments(body, add(axes[i].w, turning), (linear, angular))
+            body = leaf_body(moving, i, bodies[i])
+            whole = _moments(body, add(moving.axes[i].w, turning), (linear, angular))
         else:
             turn = forward.compound_turns[i] if frame.joint.about_z else None
             motion = outward(turn, linear), outward(turn, angular)
@@ -270,20 +257,20 @@ def _bent(motion: Motion, twist: Motion) -> Motion:
 def _fill(
     blocks: Sequence[list[list[Scalar]]],
     at: tuple[int, int],
-    frames: Sequence[Frame],
-    axes: Sequence[Axis],
-    steps: Sequence[Step],
+    moving: Swept,
     before: Sequence[Motion],
     change: Change,
-    qd: Sequence[Scalar],
 ) -> None:
     """Set the entries of joint and rate `at` with its own joint and all joints before it."""
     j, k = at
+    frames = moving.frames
     first = first_rates(frames)
     q_q, q_qd, qd_qd, q_qdd = blocks
     while True:
         joint = frames[j].joint
-        turned_row, slope = (_by_joint(joint, axes[j], row, qd[j]) for row in (change.row, change.slope))
+        turned_row, slope = (
+            _by_joint(joint, moving.axes[j], row, moving.qd[j]) for row in (change.row, change.slope)
+        )
         for number, twist in enumerate(joint.twists):
             place, field = first[j] + number, _bent(before[j], twist)
             both_q = _power(field, change.moved) + turned_row[0][number]
@@ -298,7 +285,7 @@ def _fill(
             q_qd[k][place], q_qdd[k][place] = turned_row[1][number], turned_row[2][number]
         if frames[j].parent == BASE:
             return
-        change, j = change.carried(steps[j]), frames[j].parent
+        change, j = change.carried(moving.steps[j]), frames[j].parent
 
 
 def _by_joint(
