@@ -30,7 +30,7 @@ SHOWN = 3
 HEAD = 1 << 20
 """Bytes of a file in which psdmc looks for its own mark."""
 
-_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE)
+_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, errno.EMFILE)
 """Errors of the disk: writing under another name would not help."""
 
 
@@ -71,8 +71,9 @@ def write_together(root: Path, files: Mapping[str, str] | Mapping[str, str | byt
         ready = []
         for path, text in files.items():
             target = root / path
-            for folder in _made_folders(target.parent):
-                all_of_them.callback(_remove_empty, folder)
+            for folder in missing_folders(target.parent):
+                all_of_them.callback(remove_if_empty, folder)  # it keeps the files that were renamed into it
+            target.parent.mkdir(parents=True, exist_ok=True)
             own = all_of_them.enter_context(_temporary(target))
             _fill(own, text)
             _settle(own, target)
@@ -89,15 +90,14 @@ def make_folder(path: str | os.PathLike[str]) -> None:
         Path(path).mkdir(parents=True, exist_ok=True)
 
 
-def _made_folders(path: Path) -> list[Path]:
-    """Make a folder and its missing parents, and return those that were missing, parents first."""
-    missing = [folder for folder in (*reversed(path.parents), path) if not folder.exists()]
-    path.mkdir(parents=True, exist_ok=True)
-    return missing
+def missing_folders(path: Path) -> list[Path]:
+    """Return those of a folder and its parents that do not exist, parents first."""
+    return [folder for folder in (*reversed(path.parents), path) if not folder.exists()]
 
 
-def _remove_empty(folder: Path) -> None:
-    with contextlib.suppress(OSError):  # it has files
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder that has no files. Errors are ignored."""
+    with contextlib.suppress(OSError):
         folder.rmdir()
 
 

@@ -16,7 +16,9 @@ from itertools import count
 from pathlib import Path
 
 from psdmc.atomic import (
+    missing_folders,
     refuse_foreign_folder,
+    remove_if_empty,
     remove_leftovers,
     system_errors_at,
     write_together,
@@ -147,7 +149,7 @@ def _stale(root: Path, files: Mapping[str, str], manifest: Digests, journal: Dig
 
 def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Digests) -> None:
     """Replace the files; the journal is written first, so that a killed emission's files are recognized."""
-    root.mkdir(parents=True, exist_ok=True)
+    missing = missing_folders(root)
     known = {path: sorted(digests) for path, digests in journal.items()}
     for path, text in files.items():
         known[path] = sorted({digest(text), *known.get(path, ())})
@@ -157,6 +159,8 @@ def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Di
     except BaseException:
         if not any(digest_of(root, path) == digest(text) for path, text in files.items()):
             (root / JOURNAL).unlink(missing_ok=True)  # nothing was replaced
+            for folder in reversed(missing):
+                remove_if_empty(folder)
         raise
     for path in stale:
         (root / path).unlink(missing_ok=True)

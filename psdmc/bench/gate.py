@@ -125,10 +125,10 @@ def _compare(options: argparse.Namespace) -> int:
 
 def _save(path: Path, names: list[str]) -> int:
     """Save the baseline. Named robots replace theirs. A robot whose instructions could not be counted keeps the counts of
-    the baseline."""
+    the baseline. Instruction counts of another compiler are not kept."""
     after = _counted(names)
-    known = Baseline.read(path).counts if path.is_file() else {}
-    kept = known if names else {}
+    before = Baseline.read(path) if path.is_file() else Baseline(after.compiler, {})
+    known = before.counts if before.compiler == after.compiler else _without_instructions(before.counts)
     for line in _uncounted_lines(after):
         print(f"warning: {line}", file=sys.stderr)
     for robot in after.uncounted:
@@ -136,9 +136,20 @@ def _save(path: Path, names: list[str]) -> int:
             instructions = {what: value for what, value in table.items() if what.startswith("instructions")}
             after.counts[robot].get(function, {}).update(instructions)
     make_folder(path.parent)
+    kept = known if names else {}
     write_whole(path, Baseline(after.compiler, {**kept, **after.counts}).to_json())
     print(f"wrote {path}")
     return 0
+
+
+def _without_instructions(counts: Counts) -> Counts:
+    return {
+        robot: {
+            function: {what: value for what, value in table.items() if not what.startswith("instructions")}
+            for function, table in functions.items()
+        }
+        for robot, functions in counts.items()
+    }
 
 
 def _counted(names: list[str]) -> Baseline:
@@ -195,8 +206,8 @@ def count(
     """Count the operations and instructions per state of every function of each robot, for code that psdmc factors into
     few operations.
 
-    Instructions are left out if they are not wanted, or if valgrind is not installed or does not know an instruction of
-    the robot's code; the result then states the reason for each robot.
+    Instructions are left out if they are not wanted, or if the compiler or valgrind fails: valgrind 3.19 does not know
+    each instruction of AVX. The result then states the reason for each robot.
     """
     counts: Counts = {}
     uncounted: dict[str, str] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -115,10 +116,9 @@ def sample(
 
 def _count(option: str, text: str) -> int:
     """A number of states, also as 1e8."""
-    try:
-        value = float(text)
-        if value.is_integer():
+    with suppress(ValueError):
+        return int(text)
+    with suppress(ValueError):
+        if (value := float(text)).is_integer():
             return int(value)
-    except (ValueError, OverflowError):
-        pass
     raise InputError(f"{option} is {text!r}", "give a whole number, such as 100000 or 1e8")

@@ -122,12 +122,12 @@ def inverse_dynamics_derivatives(
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """A robot in motion, as the outward sweep leaves it. Each sequence has one entry per joint.
+    """Describes a robot in motion, after the outward sweep. Sequences have one entry per joint.
 
-    q, qd, qdd  position, rate and acceleration of the joint; tuples for joints of several rates
-    forward     motions of the bodies
-    axes        the joint's axis with its derivatives
-    steps       the step from the joint to its parent
+    frames, choices  joint frames, and how the sweep is arranged
+    q, qd, qdd       position, rate and acceleration of the joint; an entry is a tuple if the joint has several rates
+    forward          motions of the bodies
+    axes, steps      the joint's axis with its derivatives, and the step from the joint to its parent
     """
 
     frames: Sequence[Frame]

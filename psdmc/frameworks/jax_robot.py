@@ -155,10 +155,9 @@ class JaxRobot:
         if jnp.issubdtype(array.dtype, jnp.integer):
             array = array.astype(dtype)
         if array.dtype != dtype:
-            switch = (
-                "" if jax.config.jax_enable_x64 else "set jax_enable_x64 to True with jax.config.update, "
-            )
             is_real = array.dtype in (jnp.float32, jnp.float64)
+            is_narrow = is_real and not jax.config.jax_enable_x64
+            switch = "set jax_enable_x64 to True with jax.config.update, " if is_narrow else ""
             other = f", or make the robot with psdmc.jax(model, real={str(array.dtype)!r})" if is_real else ""
             raise ArgumentError(
                 f"{what} has dtype {array.dtype}, expected {dtype}", f"{switch}convert the array{other}"

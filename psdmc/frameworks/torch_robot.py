@@ -187,7 +187,8 @@ def _fault(names: Sequence[str], required: int, given: Sequence[object], named: 
         return f"there is no argument {unknown[0]}"
     if twice := [name for name in names[: len(given)] if name in named]:
         return f"{twice[0]} was given twice"
-    return f"{', '.join(name for name in names[len(given) : required] if name not in named)} was not given"
+    missing = [name for name in names[len(given) : required] if name not in named]
+    return f"{' and '.join(missing)} {'was' if len(missing) == 1 else 'were'} not given"
 
 
 def _method(function: Signature) -> Callable[..., Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -78,6 +79,11 @@ def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, Loa
             "leave --base and --tip out; --lock holds joints",
         )
     gravity = found.gravity if options.gravity is None else options.gravity
+    if not all(map(math.isfinite, gravity)):
+        raise InputError(
+            f"{file.name}: gravity {' '.join(map('{:g}'.format, gravity))} is not finite",
+            "correct gravity in <option>, or give --gravity",
+        )
     floating = options.floating or found.is_free
     loops = merged_loops(found.loops, options.loops)
     return found.text, "urdf", replace(options, gravity=gravity, floating=floating, loops=loops)

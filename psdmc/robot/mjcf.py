@@ -100,7 +100,7 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
     follows = followers(mujoco, model, names)
     return MjcfRobot(
         tree_text(mujoco, model, names, follows, free, notes),
-        gravity(mujoco, model, source),
+        gravity(mujoco, model),
         free is not None,
         tuple(mjcf_loops(mujoco, model, names, free, source)),
     )

@@ -63,18 +63,24 @@ def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> Non
 
 
 def refuse_armatures(mujoco: Any, model: Any, names: Names, source: str) -> None:
-    """Raise InputError with the names of joints and actuators whose armatures are negative or out of range. MuJoCo
-    accepts them."""
-    own = [float(model.dof_armature[address]) for address in model.jnt_dofadr]
-    found = [(f"joint {shown(names.joint(j))}: armature {value:g}", value) for j, value in enumerate(own)]
-    for k in range(len(model.actuator_trntype)):
-        value = reflected(model, k)
-        what = f"actuator {_name(mujoco, model, 'ACTUATOR', k)}: armature {value:g} at its joint"
-        found.append((what, value))
-    faults = [f"{what}, expected 0 or more" for what, value in found if value < 0.0]
-    faults += [f"{what} {fault}" for what, value in found if (fault := DRIVE_INERTIA.fault(max(value, 0.0)))]
+    """Raise InputError with the names of joints and actuators that have negative armatures, and of joints whose drive
+    inertia is out of range. MuJoCo accepts them."""
+    own = [(j, float(model.dof_armature[model.jnt_dofadr[j]])) for j in range(model.njnt)]
+    found = [f"joint {shown(names.joint(j))}: armature {value:g}" for j, value in own if value < 0.0]
+    found += [
+        f"actuator {_name(mujoco, model, 'ACTUATOR', k)}: armature {reflected(model, k):g} at its joint"
+        for k in range(len(model.actuator_trntype))
+        if reflected(model, k) < 0.0
+    ]
+    faults = [f"{what}, expected 0 or more" for what in found] or [
+        f"joint {shown(names.joint(j))}: drive inertia {inertia:g} {fault}"
+        for j, inertia in enumerate(armatures(mujoco, model).tolist())
+        if (fault := DRIVE_INERTIA.fault(inertia))
+    ]
     if faults:
-        raise InputError(f"{source}: {joined(faults)}", "give the inertia of the joint's drive")
+        raise InputError(
+            f"{source}: {joined(faults)}", "correct the armatures of the joint and of its actuators"
+        )
 
 
 def _other_equalities(mujoco: Any, model: Any) -> Iterator[str]:

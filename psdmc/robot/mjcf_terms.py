@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.errors import InputError
-from psdmc.robot.limits import gravity_fault
 from psdmc.robot.names import free_name
 
 Array = NDArray[np.float64]
@@ -69,14 +67,11 @@ def is_active(mujoco: Any, model: Any, equality: int) -> bool:
     return bool(model.eq_active0[equality]) and not off
 
 
-def gravity(mujoco: Any, model: Any, source: str) -> tuple[float, float, float]:
-    """Return gravity in m/s^2 along the world's axes; zero if the file switches it off. Raise InputError if it is out of
-    range."""
+def gravity(mujoco: Any, model: Any) -> tuple[float, float, float]:
+    """Return gravity in m/s^2 along the world's axes; zero if the file switches it off."""
     if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return 0.0, 0.0, 0.0
     x, y, z = model.opt.gravity.tolist()
-    if fault := gravity_fault((x, y, z)):
-        raise InputError(f"{source}: gravity {x:g} {y:g} {z:g} {fault}", "correct gravity in <option>")
     return x, y, z
 
 

@@ -17,9 +17,13 @@ def kept_warnings(mujoco: Any) -> Iterator[list[str]]:
     mujoco.set_mju_user_warning(lambda text: said.append(" ".join(str(text).split())))
     try:
         with warnings.catch_warnings(record=True) as raised:
-            warnings.simplefilter("always")
+            warnings.simplefilter("always", UserWarning)
             yield said
     finally:
         mujoco.set_mju_user_warning(before)
-        texts = [" ".join(str(one.message).split()) for one in raised]
-        said += [text for text in dict.fromkeys(texts) if text not in said]
+        for one in raised:
+            text = " ".join(str(one.message).split())
+            if not issubclass(one.category, UserWarning):
+                warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+            elif text not in said:
+                said.append(text)

@@ -164,7 +164,8 @@ def _begin(folder: Path, manifest: Mapping[str, Any]) -> None:
 
 def _first_difference(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> tuple[str, Any, Any]:
     """Return the name of the first entry that differs, and its two values; within entries that are objects, too."""
-    name = next(name for name in {**wanted, **known} if known.get(name) != wanted.get(name))
+    absent = object()
+    name = next(name for name in {**wanted, **known} if known.get(name, absent) != wanted.get(name, absent))
     here, value = known.get(name), wanted.get(name)
     if isinstance(here, Mapping) and isinstance(value, Mapping):
         within, here, value = _first_difference(here, value)

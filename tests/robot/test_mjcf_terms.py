@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from psdmc.compiler import derive
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
+from psdmc.robot.mujoco_warnings import kept_warnings
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -71,6 +73,10 @@ def test_armatures_of_actuators_elsewhere_are_refused_by_name(tmp_path: Path) ->
     negative = arm(end='<actuator><motor name="m" joint="j1" gear="3" armature="-.1"/></actuator>')
     with pytest.raises(InputError, match=r"actuator 'm': armature -0.9 at its joint, expected 0 or more"):
         load_robot(written(tmp_path, negative))
+    two = '<actuator><motor joint="j1" gear="3e4" armature=".1"/><motor joint="j1" gear="3e4" armature=".1"/></actuator>'
+    for actuators, inertia in ((two, r"1\.8e\+08"), (two.replace("3e4", "1e300"), "inf")):
+        with pytest.raises(InputError, match=f"joint 'j1': drive inertia {inertia} is out of range"):
+            load_robot(written(tmp_path, arm(end=actuators)))
     ball = FLYING.format(
         joint='<joint name="j" type="ball"/>', motor='<motor joint="j" gear="1 0 0" armature=".1"/>'
     )
@@ -196,3 +202,29 @@ def test_efforts_of_two_directions_are_limited_to_the_smaller(
         "limits of efforts differ by direction, the smaller that is not zero is taken for both: 'j1'"
         in mechanism.notes
     ) == (-least != most)
+
+
+def test_an_infinite_gravity_is_refused_unless_another_is_given(tmp_path: Path) -> None:
+    path = written(tmp_path, arm(end='<option gravity="0.3 infinity -9.5"/>'))
+    with pytest.raises(InputError, match=r"gravity 0\.3 inf -9\.5 is not finite"):
+        load_robot(path)
+    assert load_robot(path, gravity=(0.0, 0.0, -1.6)).mechanism.gravity.tolist() == [0.0, 0.0, -1.6]
+
+
+def test_mujoco_s_python_warnings_are_kept_and_those_of_others_are_not() -> None:
+    with kept_warnings(FakeMujoco()) as said:
+        warnings.warn("singular,\n at DOF 6", UserWarning, stacklevel=1)
+    assert said == ["singular, at DOF 6"]
+    with pytest.warns(RuntimeWarning, match="of another"), kept_warnings(FakeMujoco()) as said:
+        warnings.warn("of another", RuntimeWarning, stacklevel=1)
+    assert said == []
+
+
+class FakeMujoco:
+    """MuJoCo's callback for warnings, which no one calls."""
+
+    def get_mju_user_warning(self) -> None:
+        return None
+
+    def set_mju_user_warning(self, callback: object) -> None:
+        pass
