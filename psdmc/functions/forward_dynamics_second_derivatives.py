@@ -251,4 +251,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     regions=regions,
+    beside="forward_dynamics_derivatives",
 )

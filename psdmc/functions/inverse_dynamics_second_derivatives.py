@@ -59,4 +59,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     in_limbs=True,
+    beside="inverse_dynamics_derivatives",
 )

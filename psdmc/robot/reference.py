@@ -16,7 +16,7 @@ from psdmc.robot.coordinates import Following
 from psdmc.robot.joints import REVOLUTE, WIDE_TYPES, JointType
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.mechanism import POINT, Array, Mechanism
-from psdmc.robot.reference_model import loop_frames, reference_model
+from psdmc.robot.reference_model import frame_number, loop_frames, reference_model
 
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Weights of a central difference of eighth order."""
@@ -95,7 +95,7 @@ class Reference:
     @property
     def frame_ids(self) -> list[int]:
         """Pinocchio's numbers of the named frames."""
-        return [self.model.getFrameId(name) for name in self.frame_names or (self.tip_name,)]
+        return [frame_number(self.model, name) for name in self.frame_names or (self.tip_name,)]
 
     @property
     def joint_types(self) -> list[JointType]:
@@ -203,7 +203,7 @@ class Reference:
     def jacobian(self, q: Array) -> Array:
         """Return the Jacobian (..., 6, n) of the tip frame along the axes of the base frame: three linear rows, then
         three angular rows."""
-        frame = self.model.getFrameId(self.tip_name)
+        frame = frame_number(self.model, self.tip_name)
         aligned = pinocchio.LOCAL_WORLD_ALIGNED
 
         def of_tip(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
@@ -229,7 +229,7 @@ class Reference:
         """Return the poses (..., number of links + 1, 4, 4) of all links' frames and of the tip in the base frame."""
         kind = pinocchio.FrameType.BODY
         frames = [self.model.getFrameId(name, kind) for name in link_names]
-        frames.append(self.model.getFrameId(self.tip_name))
+        frames.append(frame_number(self.model, self.tip_name))
 
         def of_links(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
             pinocchio.framesForwardKinematics(model, data, q)
@@ -251,7 +251,7 @@ class Reference:
         parents = list(model.parents)
         ends = [k for k in range(1, model.njoints) if k not in parents]
         at_ends = [f for f, frame in enumerate(model.frames) if frame.parentJoint in ends]
-        tip = model.getFrameId(self.tip_name)
+        tip = frame_number(model, self.tip_name)
         return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
 
     def _loaded(self, function: Callable[..., Array], wrenches: Array | None, *states: Array) -> Array:
@@ -321,8 +321,9 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
     names = tuple(frame.name for frame in loaded.mechanism.frames)
     rows = tuple(frame.rows for frame in loaded.mechanism.frames)
     loops = tuple(
-        (*(model.getFrameId(frame) for frame in loop_frames(loop)), loop.rows)
+        (frame_number(model, first), frame_number(model, second), loop.rows)
         for loop in loaded.mechanism.loops
+        for first, second in [loop_frames(loop)]
     )
     passive = loaded.mechanism.passive_rates
     return Reference(model, loaded.mechanism.tip_name, names, rows, loops, passive)

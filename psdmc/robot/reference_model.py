@@ -67,6 +67,14 @@ def reference_model(
     return _placed_as(chain, model) if snapped else model
 
 
+def frame_number(model: pinocchio.Model, name: str) -> int:
+    """Return the number of the frame of a link, or of a named frame. Pinocchio's own first frame is called "universe", as a
+    link may be called, too."""
+    kinds = (pinocchio.FrameType.BODY, pinocchio.FrameType.OP_FRAME)
+    own = [k for k, frame in enumerate(model.frames) if frame.name == name and frame.type in kinds]
+    return own[-1] if own else int(model.getFrameId(name))
+
+
 def as_written(loaded: LoadedRobot) -> pinocchio.Model:
     """Return the model that Pinocchio makes from the robot file alone, without psdmc's assumptions. psdmc only chooses
     the joints and names them. Links without inertia in the file have none in the model."""
@@ -75,7 +83,7 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
     if loaded.options.tool is not None:
         # The tool frame in the tip's, by Pinocchio's own reading of the angles.
         tool = loaded.options.tool
-        number = model.getFrameId(loaded.mechanism.tip_name)
+        number = frame_number(model, loaded.mechanism.tip_name)
         place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
         above = model.frames[number]
         kind = pinocchio.FrameType.OP_FRAME
@@ -96,10 +104,10 @@ def _add_loop_frame(model: pinocchio.Model, name: str, given: Any, base_name: st
     if "quaternion" in table:
         turn = pinocchio.Quaternion(np.array(table["quaternion"], float)).normalized().toRotationMatrix()
     place = pinocchio.SE3(turn, np.array(table.get("xyz", (0.0, 0.0, 0.0)), float))
-    number = model.getFrameId(table["link"]) if model.existFrame(table["link"]) else 0
+    number = frame_number(model, table["link"]) if model.existFrame(table["link"]) else 0
     above, kind = model.frames[number], pinocchio.FrameType.OP_FRAME
     if above.parentJoint == 0 and model.existFrame(base_name):
-        place = model.frames[model.getFrameId(base_name)].placement.inverse() * above.placement * place
+        place = model.frames[frame_number(model, base_name)].placement.inverse() * above.placement * place
     else:
         place = above.placement * place
     model.addFrame(pinocchio.Frame(name, above.parentJoint, number, place, kind))
