@@ -24,7 +24,14 @@ from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.reproducible import times
-from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, Placement
+from psdmc.robot.mechanism import (
+    BODY_PARAMETERS,
+    PARAMETER_NAMES,
+    PARAMETERS_PER_LINK,
+    Array,
+    Mechanism,
+    Placement,
+)
 
 Long = NDArray[Any]
 
@@ -43,6 +50,9 @@ ROUNDING = 1e-12
 double."""
 
 SCALES = "check the units of masses, inertias and lengths: these do not belong to one robot"
+
+MOMENTS = [PARAMETER_NAMES.index(name) for name in ("Ixx", "Iyy", "Izz")]
+"""Columns of Ixx, Iyy and Izz among a link's parameters."""
 
 DOUBTFUL = 1e-13
 """Where the last digits of a robot's numbers change a torque by more than this share of its largest, the model is
@@ -180,8 +190,11 @@ def _failure(found: Measured, errors: Array) -> DerivationError | InternalError:
 
 
 def _contributions(chain: Mechanism, x: Array, states: States) -> Array:
-    """(n,) largest sum of the magnitudes that all parameters contribute to each joint's torque."""
-    values = np.abs(x.reshape(-1))
+    """(n,) largest sum of the magnitudes that all parameters contribute to each joint's torque. The algorithm computes with
+    second moments, which are differences of the moments of inertia: each of these contributes as much as their sum."""
+    links = np.abs(x.reshape(-1, PARAMETERS_PER_LINK))
+    links[:, MOMENTS] = links[:, MOMENTS].sum(axis=1, keepdims=True)
+    values = links.reshape(-1)
     wanted = frozenset(np.flatnonzero(values).tolist())
     places = [joint.link_frame for joint in chain.joints]
     q, qd, qdd = states
