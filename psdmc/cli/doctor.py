@@ -52,6 +52,7 @@ OPTIONAL = (
     ("jax", "jax", "psdmc.jax"),
     ("torch", "torch", "psdmc.torch"),
     ("nvidia-cuda-nvrtc-cu12", "cuda", "psdmc.compile for an NVIDIA GPU"),
+    ("nvidia-cuda-nvcc-cu12", "cuda", "registers of CUDA packages"),
 )
 """Packages, the extra of psdmc that brings each, and the commands or files that need it."""
 

@@ -28,6 +28,8 @@ def check_report(report: Path | None, *others: Path) -> None:
     """Raise InputError if a report or its JSON file cannot be written. The folder of the report may be missing."""
     if report is None:
         return
+    if not report.name:
+        raise InputError(f"--report is {str(report)!r}, a folder", "call the page FILE.html")
     numbers = report.with_suffix(".json")
     if _is_same(report, numbers):
         raise InputError(

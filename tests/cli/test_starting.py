@@ -114,7 +114,20 @@ def test_the_doctor_says_whether_calls_are_direct_and_why_not(monkeypatch: pytes
 
 
 def test_every_dependency_that_psdmc_declares_for_its_users_is_known_to_the_doctor() -> None:
-    users = ("bench", "calibrate", "cluster", "examples", "fmu", "mjcf", "notebook", "view", "xacro")
+    users = (
+        "bench",
+        "calibrate",
+        "cluster",
+        "cuda",
+        "examples",
+        "fmu",
+        "jax",
+        "mjcf",
+        "notebook",
+        "torch",
+        "view",
+        "xacro",
+    )
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))[
         "project"
     ]

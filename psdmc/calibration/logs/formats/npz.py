@@ -78,7 +78,8 @@ def columns_of_arrays(arrays: Mapping[str, Any], name: str) -> Columns:
         refuse_dates(dates, name)
         names, values = list(found), list(found.values())
         require_equal({names[k]: len(values[k]) for k in places}, name)
-        yield np.column_stack([values[k] for k in places]).astype(np.float64)
+        wanted = [values[k] for k in places]
+        yield np.column_stack(wanted).astype(np.float64) if wanted else np.empty((0, 0))
 
     return Columns(name, tuple(found), len(found), rows)
 
