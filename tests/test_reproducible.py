@@ -40,7 +40,6 @@ DECISIONS = {
     "robot/joints/joint_type.py": "a rank",
     "robot/reference_model.py": "a rank, and the textbook's side of a comparison",
     "robot/inertia.py": "a refusal, whose rounding is not printed",
-    "derivation/reduce.py": "from_callable, an independent derivation that only tests run",
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",

@@ -47,7 +47,7 @@ from psdmc.calibration.verdict.record import (
 )
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError, InternalError
-from psdmc.links.link_terms import PhysicalOptions, require_cvxpy
+from psdmc.links.pseudo_inertias import PhysicalOptions, require_cvxpy
 from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress

@@ -36,7 +36,7 @@ from psdmc.calibration.sources import LogNaming, log_sources
 from psdmc.calibration.verdict.delivered import beside, delivered
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError
-from psdmc.links.link_terms import require_cvxpy
+from psdmc.links.pseudo_inertias import require_cvxpy
 from psdmc.model.calibrated import SHOWN, JointFigures, Verdict, code_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Ground

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.derivation.extended import orthonormal
+from psdmc.derivation.scaled import orthonormal
 from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.derivation.units import length_unit
+from psdmc.derivation.scaled import length_unit
 from psdmc.dynamics.closed_loops import loop_error, loop_jacobian
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.manifold import integrated, restored
@@ -20,9 +20,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InputError
 from psdmc.model.random_states import states_of
 from psdmc.robot.joints import JointType
-from psdmc.robot.mechanism import ROW_NAMES, Loop, Mechanism
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import ROW_NAMES, Array, Loop, Mechanism
 
 STARTS, STEPS, SEED = 256, 60, 29_175
 """Random configurations from which loops are closed, and Newton steps of each."""

@@ -1,6 +1,6 @@
-"""Rewrites torque terms of joints that follow others, as in parallelograms, in the variables of their leaders.
+"""Rewrites torque terms of mimic joints, as in parallelograms, in the variables of their leaders.
 
-A follower's angle is a sum of leaders' angles with whole ratios, so its sine and cosine are sums of products of theirs.
+A mimic joint's angle is a sum of leaders' angles with whole ratios, so its sine and cosine are sums of products of theirs.
 In exponentials, with f q for each frequency f of a leader's angle q, such products are sums of frequencies. The terms of
 a parallelogram then cancel exactly where they must, and frequencies up to two remain: the functions 1, s, c, s c, c^2.
 """
@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from psdmc.derivation.monomials import Integers, Monomials
-from psdmc.derivation.terms import Array, Terms, times_matrix
+from psdmc.derivation.monomials import Integers, Monomials, Terms, times_matrix
 from psdmc.dynamics.frames import Frame
 from psdmc.errors import DerivationError
 from psdmc.reproducible import cosine, sine
 from psdmc.robot.joints.basis import TRIGONOMETRIC
+from psdmc.robot.mechanism import Array
 
 WAVES: tuple[dict[int, complex], ...] = (
     {0: 1.0},
@@ -48,7 +48,7 @@ def coupled(
     """Return the terms of the torques of all joints as terms of the leaders' torques, in the leaders' variables, and the
     numbering of these.
 
-    Sums whose magnitude is at most `zero` are left out. Raises DerivationError if a follower's ratio is no whole number,
+    Sums whose magnitude is at most `zero` are left out. Raises DerivationError if a mimic joint's ratio is no whole number,
     or if a leader's sine and cosine occur with higher powers than two.
     """
     leaders = [i for i, frame in enumerate(frames) if frame.follows is None]

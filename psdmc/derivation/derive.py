@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.derivation.base_parameters import PIVOT_TOLERANCE, Reduction, reduction_for
 from psdmc.derivation.certify import judged, measured
 from psdmc.derivation.closed_loops import require_closable, with_passive_joints
 from psdmc.derivation.expand import (
@@ -19,12 +20,10 @@ from psdmc.derivation.expand import (
     expand,
     precision_for,
 )
-from psdmc.derivation.followers import reduction_for
-from psdmc.derivation.link_by_link import EFFECT
 from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, types_along_ways
-from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
-from psdmc.derivation.rounding import merged
-from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
+from psdmc.derivation.monomials import merged
+from psdmc.derivation.scaled import Scaled, length_unit, parameter_units, scaled
+from psdmc.dynamics.torque_rows import EFFECT
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import under_general_gravity

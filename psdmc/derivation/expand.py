@@ -9,10 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.derivation.base_parameters import Reduction
 from psdmc.derivation.coupled import coupled
-from psdmc.derivation.extended import extended, has_small_entries, is_of_many_scales
-from psdmc.derivation.inertia import Moving, coefficients, column, expanded, mass_matrix_terms, moving
 from psdmc.derivation.interpolate import linear_sizes
+from psdmc.derivation.mass_matrix import (
+    Moving,
+    acceleration_terms,
+    coefficients,
+    column,
+    derivative,
+    expanded,
+    mass_matrix_terms,
+    moving,
+    velocity_terms,
+)
 from psdmc.derivation.memory import (
     available_memory,
     grid_bytes,
@@ -22,12 +32,16 @@ from psdmc.derivation.memory import (
     types_along_ways,
     velocity_bytes,
 )
-from psdmc.derivation.monomials import Monomials
-from psdmc.derivation.reduce import Reduction
-from psdmc.derivation.rounding import merged
-from psdmc.derivation.terms import Array, Terms, joined, summed, times_matrix
-from psdmc.derivation.units import Scaled, monomial_units, parameter_units, torque_units
-from psdmc.derivation.velocity import acceleration_terms, derivative, velocity_terms
+from psdmc.derivation.monomials import Monomials, Terms, joined, merged, summed, times_matrix
+from psdmc.derivation.scaled import (
+    Scaled,
+    extended,
+    has_small_entries,
+    is_of_many_scales,
+    monomial_units,
+    parameter_units,
+    torque_units,
+)
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import carried_by, path_to
@@ -35,10 +49,10 @@ from psdmc.dynamics.regressor import Placed, carried, twist_in
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.model.expansion import Expansion
 from psdmc.progress import Progress
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array
 
 COEFFICIENT_TOLERANCE = 1e-12
-"""Coefficients below this are zero, lengths in the robot's unit (units.py). Six joints with oblique axes have the same
+"""Coefficients below this are zero, lengths in the robot's unit (scaled.py). Six joints with oblique axes have the same
 p for every tolerance from 3e-14 to 1e-9; the smallest true coefficient met is 1e-8 (seven such joints)."""
 
 VALUE_NOISE = 1e-14
@@ -85,7 +99,11 @@ def expand(
     refuse_beyond(max(map(grid_bytes, ways)), available, most, len(types))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
-    mass = _mass_matrix(scaled, chosen, monomials, precision.zero)
+    of_parameters = mass_matrix_terms(scaled.frames, scaled.link_frames, monomials, precision.zero)
+    mass = {
+        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, precision.zero)
+        for pair, terms in of_parameters.items()
+    }
     progress("gravity")
     potential = gravity_terms(scaled.frames, scaled.link_frames, scaled.up, monomials, precision.zero)
     gravity = times_matrix(potential, chosen, precision.zero)
@@ -116,17 +134,6 @@ def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
 def can_be_finest() -> bool:
     """Whether the machine's long doubles have enough digits for the precision FINEST."""
     return bool(np.finfo(np.longdouble).eps < FINEST.zero)
-
-
-def _mass_matrix(
-    scaled: Scaled, chosen: Array, monomials: Monomials, zero: float
-) -> dict[tuple[int, int], Terms]:
-    """The mass matrix's terms in the chosen columns of the span; row 0 throughout."""
-    found = mass_matrix_terms(scaled.frames, scaled.link_frames, monomials, zero)
-    return {
-        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, zero)
-        for pair, terms in found.items()
-    }
 
 
 def assembled(

@@ -15,18 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.derivation.base_parameters import Reduction, reduced
 from psdmc.derivation.expand import COEFFICIENT_TOLERANCE, assembled
 from psdmc.derivation.interpolate import along_axes, interpolation, nodes, quadratic_sizes
 from psdmc.derivation.memory import available_memory, largest_monomial_count, refuse_beyond
-from psdmc.derivation.monomials import Monomials
-from psdmc.derivation.reduce import Reduction, reduced, row_space
-from psdmc.derivation.terms import Terms, joined, restricted
+from psdmc.derivation.monomials import Monomials, Terms, joined, selected
 from psdmc.errors import InputError
 from psdmc.model.expansion import RowBlocks
 from psdmc.robot.joints import JOINT_TYPES
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Array
 
-Array = NDArray[np.float64]
 TorqueFunction = Callable[[Array, Array, Array, Array, float], Array]
 
 PROBE_SEED = 1_907
@@ -34,6 +33,9 @@ PROBE_TOLERANCE = 1e-9
 """Relative error up to which the finished model must reproduce the function at random states."""
 
 PROBES = 32
+
+BLOCK_ROWS = 8192
+"""Rows reduced at once, so that the whole stack is never held as a dense matrix."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,8 +105,8 @@ def derive_from_callable(
     )
     sample = _Sampler(f, monomials, len(names), vectorised, length)
     terms = joined(list(_all_terms(sample)))
-    reduction = reduced(row_space([terms], len(names)))
-    pivots = restricted(terms, reduction.pivots)
+    reduction = reduced(row_space(terms, len(names)))
+    pivots = _restricted(terms, reduction.pivots)
     E, P = assembled(pivots, monomials, np.ones(len(reduction.pivots)), 1.0)
     return _certified(E, P, reduction, names, sample)
 
@@ -156,7 +158,7 @@ class _Sampler:
         positions.
 
         values  (parameters, n, cells) torques for each parameter alone
-        rate    number of the product of joint rates that these torques contain (monomials.py)
+        rate    number of the product of joint rates that these torques contain
         """
         types = self.monomials.types
         joints, sizes = range(len(types)), quadratic_sizes(types)
@@ -187,6 +189,35 @@ def _all_terms(sample: _Sampler) -> Iterator[Terms]:
         for k in range(j + 1, n):
             both = sample.per_parameter(units[j] + units[k], rest, 0.0)
             yield sample.terms(both - squares[j] - squares[k], monomials.velocity_rate(j, k))
+
+
+def row_space(terms: Terms, columns: int) -> Array:
+    """Return the triangular factor R (k, k) of a tall matrix A with k columns of torque coefficients: R^T R = A^T A.
+
+    A has one row for each torque row and monomial of the terms. It is factorized block by block, so it need not fit
+    into memory.
+    """
+    factor: Array = np.zeros((0, columns))
+    if not len(terms.value):
+        return factor
+    key = terms.row * (int(terms.monomial.max()) + 1) + terms.monomial
+    _, place = np.unique(key, return_inverse=True)
+    order = np.argsort(place, kind="stable")
+    place, column, value = place[order], terms.column[order], terms.value[order]
+    for start in range(0, int(place[-1]) + 1, BLOCK_ROWS):
+        first, last = np.searchsorted(place, [start, start + BLOCK_ROWS])
+        rows = np.zeros((int(place[last - 1]) + 1 - start, columns))
+        np.add.at(rows, (place[first:last] - start, column[first:last]), value[first:last])
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
+    return factor
+
+
+def _restricted(terms: Terms, columns: NDArray[np.int64]) -> Terms:
+    """Return the terms of the given columns only, renumbered in the order given."""
+    number = np.full(int(max(terms.column.max(initial=0), columns.max(initial=0))) + 1, -1)
+    number[columns] = np.arange(len(columns))
+    place = number[terms.column]
+    return selected(terms._replace(column=place), place >= 0)
 
 
 def _certified(

@@ -14,12 +14,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.reproducible import cosine, inverse, sine
 from psdmc.robot.joints import JointType
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import Array
 
 DOUBLE = np.dtype(np.float64)
 

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.derivation.interpolate import linear_sizes, quadratic_sizes
-from psdmc.derivation.monomials import Monomials
-from psdmc.derivation.terms import Terms
-from psdmc.derivation.velocity import slope_count
+from psdmc.derivation.mass_matrix import slope_count
+from psdmc.derivation.monomials import Monomials, Terms
 from psdmc.errors import DerivationError
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import BASE

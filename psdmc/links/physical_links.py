@@ -11,9 +11,17 @@ import numpy as np
 
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError
-from psdmc.links.link_bodies import flat_equations, held_rows, pseudo_inertia, reference_body
-from psdmc.links.link_terms import PhysicalOptions, known_inner, link_terms, require_cvxpy
 from psdmc.links.log_det import Block, nearest_definite
+from psdmc.links.pseudo_inertias import (
+    PhysicalOptions,
+    flat_equations,
+    held_rows,
+    known_inner,
+    link_terms,
+    pseudo_inertia,
+    reference_body,
+    require_cvxpy,
+)
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array

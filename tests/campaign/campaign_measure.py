@@ -15,8 +15,7 @@ from campaign_robots import RandomRobot
 
 from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
-from psdmc.derivation.extended import has_small_entries
-from psdmc.derivation.units import scaled
+from psdmc.derivation.scaled import has_small_entries, scaled
 from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel

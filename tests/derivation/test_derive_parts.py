@@ -7,14 +7,13 @@ import pytest
 from bundled import bundled_model
 from random_chains import random_chain
 
+from psdmc.derivation.base_parameters import reduced
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.from_callable import row_space
 from psdmc.derivation.interpolate import along_axes, evaluation, interpolation, nodes, quadratic_basis
+from psdmc.derivation.mass_matrix import derivative, slope_count
 from psdmc.derivation.memory import grid_bytes, largest_monomial_count, velocity_bytes
-from psdmc.derivation.monomials import Monomials
-from psdmc.derivation.reduce import reduced, row_space, triangular
-from psdmc.derivation.rounding import merged
-from psdmc.derivation.terms import Terms, summed, times_matrix
-from psdmc.derivation.velocity import derivative, slope_count
+from psdmc.derivation.monomials import Monomials, Terms, merged, summed, times_matrix
 from psdmc.errors import DerivationError
 from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 
@@ -111,9 +110,9 @@ def test_row_space_in_blocks_is_that_of_the_whole() -> None:
     dense = rng.normal(size=(40, 6)) * (rng.random((40, 6)) < 0.4)
     row, column = np.nonzero(dense)
     whole = Terms(np.zeros(len(row), dtype=np.int64), row, column, dense[row, column])
-    factor = row_space([whole], 6)
+    factor = row_space(whole, 6)
     assert np.allclose(factor.T @ factor, dense.T @ dense)
-    assert np.allclose(np.abs(factor), np.abs(triangular(dense)))
+    assert np.allclose(np.abs(factor), np.abs(np.linalg.qr(dense, mode="r")))
 
 
 def test_values_that_differ_by_rounding_become_the_simple_one() -> None:

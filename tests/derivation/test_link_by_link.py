@@ -10,10 +10,9 @@ import pytest
 from random_chains import Oracle, random_chain, relative_error, states
 
 from psdmc.derivation import memory
+from psdmc.derivation.base_parameters import reduction_link_by_link, sampled_reduction
 from psdmc.derivation.derive import LARGEST_CHAIN, derive_model
-from psdmc.derivation.followers import sampled_reduction
-from psdmc.derivation.link_by_link import reduction_link_by_link
-from psdmc.derivation.units import scaled
+from psdmc.derivation.scaled import scaled
 from psdmc.errors import DerivationError
 from psdmc.robot.mechanism import Mechanism, Placement
 

@@ -11,13 +11,11 @@ from bundled import bundled_robot
 from nearly_parallel import tilted_chain
 from random_chains import Oracle, random_chain, relative_error, states
 
+from psdmc.derivation.base_parameters import reduced, reduction_of, sampled_reduction
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.expand import EXTENDED, IN_DOUBLE, precision_for
-from psdmc.derivation.extended import extended, has_small_entries, orthonormal
-from psdmc.derivation.followers import reduction_of, sampled_reduction
 from psdmc.derivation.interpolate import DOUBLE, interpolation, nodes, quadratic_basis
-from psdmc.derivation.reduce import reduced
-from psdmc.derivation.units import scaled
+from psdmc.derivation.scaled import extended, has_small_entries, orthonormal, scaled
 from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 
 ACCURACY = 1e-12

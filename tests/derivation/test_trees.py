@@ -12,9 +12,8 @@ import pytest
 from random_trees import TREES, RandomTree
 
 from psdmc.derivation import derive
-from psdmc.derivation.followers import sampled_reduction
-from psdmc.derivation.link_by_link import reduction_link_by_link
-from psdmc.derivation.units import scaled
+from psdmc.derivation.base_parameters import reduction_link_by_link, sampled_reduction
+from psdmc.derivation.scaled import scaled
 from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import jacobian

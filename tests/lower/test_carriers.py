@@ -10,7 +10,7 @@ from nearly_parallel import tilted_chain
 from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
-from psdmc.derivation.units import in_unit, parameter_units
+from psdmc.derivation.scaled import in_unit, parameter_units
 from psdmc.lower.carrier_columns import carrier_space
 from psdmc.lower.carriers import CarrierSpace
 from psdmc.lower.reframe import reframe

@@ -32,7 +32,7 @@ from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
-from psdmc.links.link_terms import PhysicalOptions
+from psdmc.links.pseudo_inertias import PhysicalOptions
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 from psdmc.robot.mechanism import Mechanism

@@ -24,8 +24,7 @@ from psdmc.calibration.logs.smoothed_rows import smoothed_rows
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.dynamics.parameters import inertia_matrix, inertia_of, second_moments
 from psdmc.errors import InputError
-from psdmc.links.link_bodies import pseudo_inertia
-from psdmc.links.link_terms import require_cvxpy
+from psdmc.links.pseudo_inertias import pseudo_inertia, require_cvxpy
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 

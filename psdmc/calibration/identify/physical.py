@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError, InternalError
-from psdmc.links.link_terms import PhysicalOptions, known_inner, link_terms, require_cvxpy
+from psdmc.links.pseudo_inertias import PhysicalOptions, known_inner, link_terms, require_cvxpy
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 

@@ -129,7 +129,7 @@ def test_a_model_that_was_not_calibrated_is_said(arm, log: Log):
 def test_without_a_solver_the_remedy_is_said(arm, log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     found = importlib.util.find_spec
     monkeypatch.setattr(
-        sys.modules["psdmc.links.link_terms"],
+        sys.modules["psdmc.links.pseudo_inertias"],
         "find_spec",
         lambda name: None if name == "clarabel" else found(name),
     )

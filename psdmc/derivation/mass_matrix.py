@@ -1,14 +1,18 @@
-"""Computes the mass matrix as polynomials in the joint variables, for each standard parameter of the links separately.
+"""Computes the mass matrix as polynomials in the joint variables, and the torque terms with accelerations and rates.
 
-The part of M_ij that one parameter of link k contributes is bilinear in two twists of that link's frame. They are the
-twists for unit rates of joints i and j, both on the path from the base to link k, i before j. The twist by joint i is a
-polynomial of degree one in q (or sin q, cos q) of each joint after i. The product has degree one in the variables of
-joints up to j, and degree two in those of joints after j. Only the latter must be sampled on a grid.
+Each standard parameter of the links is treated separately. The part of M_ij that one parameter of link k contributes
+is bilinear in two twists of that link's frame. They are the twists for unit rates of joints i and j, both on the path
+from the base to link k, i before j. The twist by joint i is a polynomial of degree one in q (or sin q, cos q) of each
+joint after i. The product has degree one in the variables of joints up to j, and degree two in those of joints after j.
+Only the latter must be sampled on a grid.
+
+Centrifugal and Coriolis terms follow from the coefficients of the mass matrix: tau_i = sum over j, k of (dM_ij/dq_k -
+1/2 dM_jk/dq_i) qd_j qd_k. This is Christoffel's formula before it is made symmetric.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,8 +25,7 @@ from psdmc.derivation.interpolate import (
     linear_sizes,
     quadratic_sizes,
 )
-from psdmc.derivation.monomials import Monomials
-from psdmc.derivation.terms import Terms, joined
+from psdmc.derivation.monomials import Integers, Monomials, Terms, joined, selected, summed
 from psdmc.dynamics.frames import BASE, Frame, joint_angle, joint_offset
 from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
@@ -213,3 +216,66 @@ def mass_features(first: Array, second: Array) -> Array:
 
 def _crossed(a: Array, b: Array) -> Vector:
     return cross((a[0], a[1], a[2]), (b[0], b[1], b[2]))
+
+
+def derivative(terms: Terms, monomials: Monomials, joint: int) -> Terms:
+    """Return the derivative of mass matrix terms by the position q of one joint.
+
+    A term has a product of functions of q (numbered by its code) and a factor.
+    """
+    digits = monomials.digit(terms.monomial, joint)
+    weight = monomials.weight(joint)
+    parts: list[Terms] = []
+    for digit, images in enumerate(monomials.types[joint].basis.derivatives):
+        chosen = selected(terms, digits == digit) if images else terms
+        for image, factor in images:
+            moved: Integers = chosen.monomial + (image - digit) * weight
+            parts.append(Terms(chosen.row, moved, chosen.column, factor * chosen.value))
+    return joined(parts)
+
+
+def velocity_terms(
+    mass_matrix: Mapping[tuple[int, int], Terms],
+    monomials: Monomials,
+    carried: Sequence[Sequence[int]],
+    tolerance: float,
+) -> Terms:
+    """Return the torque terms with all products of joint rates, from the terms of the mass matrix.
+
+    In the result, the row is the joint, and the monomial includes the rates (its key).
+
+    carried    for each joint, the joints that it moves; its row of the mass matrix depends on no others
+    tolerance  largest magnitude of a coefficient that counts as zero
+    """
+    parts: list[Terms] = []
+    for (a, b), terms in mass_matrix.items():
+        for d in carried[a]:
+            slope = derivative(terms, monomials, d)
+            parts.append(_placed(slope, monomials, a, b, d, 1.0))
+            if a != b:
+                parts.append(_placed(slope, monomials, b, a, d, 1.0))
+            parts.append(_placed(slope, monomials, d, a, b, -0.5 if a == b else -1.0))
+    return summed(joined(parts), tolerance)
+
+
+def _placed(slope: Terms, monomials: Monomials, row: int, j: int, k: int, factor: float) -> Terms:
+    """A slope as a factor of qd_j qd_k in the torque of joint `row`."""
+    key = monomials.velocity_rate(j, k) * monomials.codes
+    return Terms(np.full_like(slope.row, row), slope.monomial + key, slope.column, factor * slope.value)
+
+
+def acceleration_terms(mass_matrix: Mapping[tuple[int, int], Terms], monomials: Monomials) -> Terms:
+    """Torque terms of M qdd."""
+    parts: list[Terms] = []
+    for (a, b), terms in mass_matrix.items():
+        for row, j in ((a, b), (b, a))[: 1 if a == b else 2]:
+            key = monomials.acceleration_rate(j) * monomials.codes
+            parts.append(Terms(np.full_like(terms.row, row), terms.monomial + key, terms.column, terms.value))
+    return joined(parts)
+
+
+def slope_count(terms: Terms, monomials: Monomials, joint: int) -> int:
+    """Number of terms that `derivative` makes."""
+    images = [len(images) for images in monomials.types[joint].basis.derivatives]
+    counts = np.bincount(monomials.digit(terms.monomial, joint), minlength=len(images))
+    return int(counts[: len(images)] @ np.array(images))
