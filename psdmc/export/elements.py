@@ -1,15 +1,17 @@
-"""Functions that make the XML elements of a URDF file, such as <inertial> and <limit>."""
+"""Makes the XML elements of a URDF file, such as <inertial> and <limit>, and a whole file without shapes.
+
+A program that reads a number from the text gets exactly equal floats.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from psdmc.export.bodies import WORLD, Body, Written
-from psdmc.export.friction import JointFriction
-from psdmc.export.numbers import exact, roll_pitch_yaw_of
+from psdmc.export.bodies import WORLD, Body, JointFriction, Written
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.mechanism import Limits, NamedFrame, Placement
+from psdmc.robot.mechanism import BASE, Array, Limits, NamedFrame, Placement
 
 MUJOCO = {
     "balanceinertia": "false",
@@ -20,6 +22,24 @@ MUJOCO = {
 }
 """What MuJoCo must be told in a URDF so that links without <inertial> get no mass from their shapes; other readers pass
 over it."""
+
+QUARTER = 1e-9
+"""Cosine of the pitch below which roll and yaw turn about the same axis."""
+
+
+def exact(values: Iterable[float]) -> str:
+    """Return numbers as text with as many digits as are needed to read equal floats. Minus zero is written as zero."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def roll_pitch_yaw_of(rotation: Array) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw (rad) of Rz(yaw) Ry(pitch) Rx(roll). If the pitch is a right angle, roll is 0."""
+    across = math.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = math.atan2(-rotation[2, 0], across)
+    if across < QUARTER:
+        return (0.0, pitch, math.atan2(-rotation[0, 1], rotation[1, 1]))
+    roll = math.atan2(rotation[2, 1], rotation[2, 2])
+    return (roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0]))
 
 
 def inertial_element(body: Body) -> Element | None:
@@ -84,18 +104,13 @@ def fixed_link(robot: Element, frame: NamedFrame, parent: str) -> None:
 def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> None:
     """Add a fixed joint to the robot. The joint's name is the child link's name with `_fixed` appended. Underscores are
     added if another joint has this name."""
-    joint = SubElement(robot, "joint", name=free_joint_name(robot, f"{child}_fixed"), type="fixed")
+    name, used = f"{child}_fixed", {joint.get("name") for joint in robot.findall("joint")}
+    while name in used:
+        name += "_"
+    joint = SubElement(robot, "joint", name=name, type="fixed")
     joint.append(origin_element(place))
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)
-
-
-def free_joint_name(robot: Element, name: str) -> str:
-    """Return the name, with underscores appended until no other joint of the robot has it."""
-    used = {joint.get("name") for joint in robot.findall("joint")}
-    while name in used:
-        name += "_"
-    return name
 
 
 def put_on_world(robot: Element, what: Written) -> None:
@@ -113,3 +128,41 @@ def as_text(robot: Element) -> str:
     """Return the text of the URDF file, with all names escaped."""
     indent(robot)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + tostring(robot, encoding="unicode") + "\n"
+
+
+def urdf_of(what: Written) -> Element:
+    """Return the element <robot> of a URDF, which contains all links, joints and named frames of the robot."""
+    robot = Element("robot", name=what.name, version="1.0")
+    SubElement(SubElement(robot, "mujoco"), "compiler", MUJOCO)
+    SubElement(robot, "link", name=what.base)
+    for body in what.bodies:
+        link = SubElement(robot, "link", name=body.name)
+        inertial = inertial_element(body)
+        if inertial is not None:
+            link.append(inertial)
+        robot.append(joint_element(body, what))
+    for frame in what.frames:
+        fixed_link(robot, frame, what.bodies[frame.joint].name)
+    put_on_world(robot, what)
+    return robot
+
+
+def joint_element(body: Body, what: Written) -> Element:
+    """Return the element <joint> of the joint that moves a body."""
+    joint = Element("joint", name=body.joint.name, type=joint_word(body))
+    joint.append(origin_element(body.origin))
+    SubElement(joint, "parent", link=what.base if body.parent == BASE else what.bodies[body.parent].name)
+    SubElement(joint, "child", link=body.name)
+    SubElement(joint, "axis", xyz=exact(body.axis))
+    joint.append(limit_element(body.joint.limits))
+    if body.follows is not None and body.follows.leader is not None:
+        SubElement(
+            joint,
+            "mimic",
+            joint=what.bodies[body.follows.leader].joint.name,
+            multiplier=exact([body.follows.ratio]),
+            offset=exact([body.follows.offset]),
+        )
+    if body.friction is not None:
+        joint.append(dynamics_element(body.friction))
+    return joint

@@ -4,35 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from psdmc.atomic import check_place, refuse_foreign_file, write_together, write_whole
 from psdmc.errors import InputError, InternalError
-from psdmc.export.bodies import Body, Written, written
-from psdmc.export.elements import (
-    MUJOCO,
-    as_text,
-    dynamics_element,
-    fixed_link,
-    inertial_element,
-    joint_word,
-    limit_element,
-    origin_element,
-    put_on_world,
-)
-from psdmc.export.friction import calibrated_friction_notes, joint_friction
+from psdmc.export.bodies import Written, calibrated_friction_notes, joint_friction, written
+from psdmc.export.elements import as_text, exact, urdf_of
 from psdmc.export.from_source import urdf_with
 from psdmc.export.mjcf import MARK, mjcf_of
-from psdmc.export.numbers import exact
 from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_back
 from psdmc.links.physical_links import PhysicalLinks, physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, DRIVE
+from psdmc.robot.mechanism import DRIVE
 from psdmc.robot.xml_text import parse_xml
 
 MJCF_SUFFIX = ".xml"
@@ -99,7 +86,8 @@ def export_urdf(
     what, text, notes = _urdf(model, links)
     progress("reading it back")
     readings = read_urdf_back(model, text, drives, what.gravity)
-    _require_agreement(readings[0])
+    if not readings[0].error <= LIMIT:
+        raise InternalError(f"a written URDF's torques are {readings[0].error:.2g} away from theta_b's")
     other = as_text(mjcf_of(what)) if wanted else None
     mjcf_reading = None if other is None else read_mjcf_back(model, other)
     if other is None:
@@ -153,11 +141,6 @@ def _urdf(model: DynamicsModel, links: PhysicalLinks) -> tuple[Written, str, tup
     return what, as_text(root), (*notes, *calibrated_friction_notes(joint_friction(model)))
 
 
-def _require_agreement(reading: Reading) -> None:
-    if not reading.error <= LIMIT:
-        raise InternalError(f"a written URDF's torques are {reading.error:.2g} away from theta_b's")
-
-
 def _drive_notes(model: DynamicsModel, drives: np.ndarray, mjcf: Path | None) -> list[str]:
     if not drives.any():
         return []
@@ -180,41 +163,3 @@ def _gravity_notes(what: Written) -> list[str]:
             f"gravity is {exact(what.gravity)} m/s^2, which a URDF cannot hold: readers take {exact(STANDARD)}; set it there"
         )
     return notes
-
-
-def urdf_of(what: Written) -> Element:
-    """Return the element <robot> of a URDF, which contains all links, joints and named frames of the robot."""
-    robot = Element("robot", name=what.name, version="1.0")
-    SubElement(SubElement(robot, "mujoco"), "compiler", MUJOCO)
-    SubElement(robot, "link", name=what.base)
-    for body in what.bodies:
-        link = SubElement(robot, "link", name=body.name)
-        inertial = inertial_element(body)
-        if inertial is not None:
-            link.append(inertial)
-        robot.append(joint_element(body, what))
-    for frame in what.frames:
-        fixed_link(robot, frame, what.bodies[frame.joint].name)
-    put_on_world(robot, what)
-    return robot
-
-
-def joint_element(body: Body, what: Written) -> Element:
-    """Return the element <joint> of the joint that moves a body."""
-    joint = Element("joint", name=body.joint.name, type=joint_word(body))
-    joint.append(origin_element(body.origin))
-    SubElement(joint, "parent", link=what.base if body.parent == BASE else what.bodies[body.parent].name)
-    SubElement(joint, "child", link=body.name)
-    SubElement(joint, "axis", xyz=exact(body.axis))
-    joint.append(limit_element(body.joint.limits))
-    if body.follows is not None and body.follows.leader is not None:
-        SubElement(
-            joint,
-            "mimic",
-            joint=what.bodies[body.follows.leader].joint.name,
-            multiplier=exact([body.follows.ratio]),
-            offset=exact([body.follows.offset]),
-        )
-    if body.friction is not None:
-        joint.append(dynamics_element(body.friction))
-    return joint

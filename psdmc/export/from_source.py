@@ -12,12 +12,12 @@ from psdmc.export.bodies import Body, Written
 from psdmc.export.elements import (
     MUJOCO,
     dynamics_element,
+    exact,
     fixed_link,
     inertial_element,
     origin_element,
     put_on_world,
 )
-from psdmc.export.numbers import exact
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.limits import shown
 from psdmc.robot.lock import locked

@@ -8,9 +8,9 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from psdmc.export.bodies import Body, Written
-from psdmc.export.numbers import exact, quaternion_of
+from psdmc.export.elements import exact
 from psdmc.robot.inertia import inertia_matrix
-from psdmc.robot.mechanism import BASE, Placement
+from psdmc.robot.mechanism import BASE, Array, Placement
 
 COMPILER = {
     "angle": "radian",
@@ -102,3 +102,27 @@ def _joint(body: Body) -> dict[str, str]:
     if friction is not None:
         found |= {"damping": exact([friction.damping]), "frictionloss": exact([friction.constant])}
     return found
+
+
+def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
+    """Return the unit quaternion (w, x, y, z) of a rotation, with w not negative.
+
+    The largest component is computed first, so that no digits are lost.
+    """
+    r = rotation
+    trace = float(np.trace(r))
+    diagonal = [trace, float(r[0, 0]), float(r[1, 1]), float(r[2, 2])]
+    k = int(np.argmax(diagonal))
+    if k == 0:
+        w = 1.0 + trace
+        found = np.array([w, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    else:
+        i = k - 1
+        j, m = (i + 1) % 3, (i + 2) % 3
+        found = np.zeros(4)
+        found[0] = r[m, j] - r[j, m]
+        found[1 + i] = 1.0 + 2.0 * r[i, i] - trace
+        found[1 + j] = r[j, i] + r[i, j]
+        found[1 + m] = r[m, i] + r[i, m]
+    w, x, y, z = (found / np.linalg.norm(found)).tolist()
+    return (w, x, y, z) if w >= 0.0 else (-w, -x, -y, -z)
