@@ -36,8 +36,8 @@ from psdmc.model.store import file_bytes
 from psdmc.program.signature import QD, Q
 from psdmc.robot.load import load_robot
 from psdmc.sampling import Motion, Sampled, Sampling, parts
-from psdmc.sampling.limits import WithinLimits
 from psdmc.sampling.plan import Plan
+from psdmc.sampling.states import WithinLimits
 
 parquet = pytest.importorskip("pyarrow.parquet")
 

@@ -29,8 +29,7 @@ from psdmc.model.store import file_bytes
 from psdmc.progress import Progress, Step, silent
 from psdmc.reading import read_file
 from psdmc.robot.limits import shown
-from psdmc.sampling.plan import KEY, Plan
-from psdmc.sampling.settings import Sampling
+from psdmc.sampling.plan import KEY, Plan, Sampling
 
 MANIFEST = "sample.json"
 MOST_MANIFEST = 1 << 24
