@@ -86,11 +86,11 @@ def exit_status_of(action: Callable[[], int | None]) -> int:
     except KeyboardInterrupt:
         return _said("interrupted", None, INTERRUPTED_STATUS)
     except BrokenPipeError:
-        _drop_output()
+        drop_output()
         return CLOSED_STATUS
     except OSError as error:
         if error.filename is None:
-            _drop_output()
+            drop_output()
         where = error.filename or "standard output"
         return _said(f"{where}: {error.strerror or error}", "free some space", ToolchainError.exit_status)
 
@@ -106,7 +106,7 @@ def _said(message: str, hint: str | None, status: int) -> int:
     return status
 
 
-def _drop_output() -> None:
+def drop_output() -> None:
     """Discard what is still in standard output's buffer: Python would otherwise report it when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)

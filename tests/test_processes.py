@@ -90,7 +90,7 @@ import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
 from psdmc.processes import in_processes
-from psdmc.cli.interrupt import Interrupted, as_error
+from psdmc.cli.boundary import Interrupted, as_error
 from test_processes import hang
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from psdmc.cli.interrupt import at_once
+from psdmc.cli.boundary import at_once, run
 from psdmc.errors import discard_output_if_closed, exit_status_of
 from psdmc.version import psdmc_version
 
@@ -18,8 +18,6 @@ def main(arguments: list[str] | None = None) -> None:
     if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
         sys.exit(exit_status_of(_print_version))
     with at_once():
-        from psdmc.cli.boundary import run
-
         run(arguments)
 
 

@@ -1,9 +1,15 @@
-"""Read options that take a list: separated by commas, given several times, and for numbers also as several words."""
+"""Reads and checks values of the command line: options that take a list, and paths to which a command writes.
+
+A list's entries are separated by commas, or the option is given several times; numbers may also be several words.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
+from psdmc.atomic import check_place
 from psdmc.errors import InputError
 
 SEVERAL_WORDS: Mapping[str, int] = {"--gravity": 3, "--tool": 6}
@@ -88,3 +94,38 @@ def parsed_torque_constants(given: list[str] | None) -> dict[str, float] | None:
             raise InputError(f"--torque-constants: {what}", "write JOINT=NUMBER,JOINT=NUMBER")
         found[name] = constant
     return found or None
+
+
+def check_output(output: Path | None, *inputs: Path) -> None:
+    """Raise InputError if psdmc cannot write a file at this path, or if the path is one of the inputs."""
+    if output is None:
+        return
+    for source in inputs:
+        if _is_same(output, source):
+            raise InputError(
+                f"{output}: would overwrite {source}, which is read", "give another name for the output"
+            )
+    check_place(output)
+
+
+def check_report(report: Path | None, *others: Path) -> None:
+    """Raise InputError if a report or its JSON file cannot be written. The folder of the report may be missing."""
+    if report is None:
+        return
+    if not report.name:
+        raise InputError(f"--report is {str(report)!r}, a folder", "call the page FILE.html")
+    numbers = report.with_suffix(".json")
+    if _is_same(report, numbers):
+        raise InputError(
+            f"{report}: psdmc writes the report's numbers to this file", "call the page FILE.html"
+        )
+    for path in (report, numbers):
+        if path.parent.exists():
+            check_output(path, *others)
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return os.path.abspath(one) == os.path.abspath(other)

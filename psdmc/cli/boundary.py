@@ -1,39 +1,56 @@
-"""Turn errors of the command line into one line, a hint and an exit status. Only --debug shows a traceback."""
+"""Turns errors and Ctrl-C of the command line into one line, a hint and an exit status. Only --debug shows a traceback.
+
+`psdmc --version` loads this module, so functions import what else they need. While other modules load, Ctrl-C ends
+psdmc at once; at any other time it raises Interrupted.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import os
+import signal
 import sys
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
 
-from psdmc.cli import interrupt
-from psdmc.cli.commands import app
-from psdmc.cli.lists import with_numbers_joined
-from psdmc.cli.output import one_line
-from psdmc.errors import CLOSED_STATUS, INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
+from psdmc.errors import (
+    CLOSED_STATUS,
+    INTERRUPTED_STATUS,
+    InternalError,
+    PsdmcError,
+    ToolchainError,
+    drop_output,
+)
 
 INTERNAL_STATUS = 70
+
+IMPORT_SYSTEM = "<frozen importlib."
+"""What the file names of the import system's own code begin with."""
 
 
 def run(arguments: list[str] | None = None) -> None:
     """Run the command line."""
+    from psdmc.cli.arguments import with_numbers_joined
+    from psdmc.cli.commands import app
+
     words = sys.argv[1:] if arguments is None else arguments
     # Names that the terminal's encoding lacks are printed as escapes.
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        with interrupt.as_error():
-            _run(words)
+        with as_error():
+            _flushed(app, with_numbers_joined(words))
     except PsdmcError as error:
         _fail(words, error.message, error.hint, error.exit_status)
     except InternalError as error:
         _fail(words, f"internal: {error}", "this is a bug in psdmc: please report it", INTERNAL_STATUS)
-    except (KeyboardInterrupt, interrupt.Interrupted):
+    except (KeyboardInterrupt, Interrupted):
         _fail(words, "interrupted", None, INTERRUPTED_STATUS)
     except BrokenPipeError:
-        _silence(sys.stdout)
+        drop_output()
         sys.exit(CLOSED_STATUS)
     except MemoryError:
         hint = "close other programs; or leave E and P out: derive --no-expand"
@@ -42,10 +59,10 @@ def run(arguments: list[str] | None = None) -> None:
         _fail(words, _described(error), None, ToolchainError.exit_status)
 
 
-def _run(words: list[str]) -> None:
+def _flushed(app: Callable[..., None], words: list[str]) -> None:
     """Run the command and flush its output: a full disk behind standard output raises here."""
     try:
-        app(with_numbers_joined(words), prog_name="psdmc")
+        app(words, prog_name="psdmc")
     except SystemExit as left:
         with contextlib.suppress(BrokenPipeError) if left.code else contextlib.nullcontext():
             sys.stdout.flush()
@@ -55,13 +72,15 @@ def _run(words: list[str]) -> None:
 def _described(error: OSError) -> str:
     """The message of an OSError that no stage has described."""
     if error.filename is None:
-        _silence(sys.stdout)
+        drop_output()
         return f"standard output: {error.strerror or error}"
     return f"{error.filename}: {error.strerror}"
 
 
 def _fail(words: list[str], message: str, hint: str | None, status: int) -> None:
     """Print and exit; called inside an `except`, so that --debug can show the traceback."""
+    from psdmc.cli.console import one_line
+
     if "--debug" in words:
         raise
     said = [f"error: {one_line(message)}", *([f"hint: {one_line(hint)}"] if hint else [])]
@@ -71,9 +90,53 @@ def _fail(words: list[str], message: str, hint: str | None, status: int) -> None
     sys.exit(status)
 
 
-def _silence(stream: object) -> None:
-    """Discard what is still in a stream's buffer: Python would otherwise report it when it ends."""
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        target = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(target, stream.fileno())  # type: ignore[attr-defined]
-        os.close(target)
+class Interrupted(BaseException):
+    """The exception that Ctrl-C raises. It is no KeyboardInterrupt, because libraries catch that and continue."""
+
+
+def at_once() -> contextlib.AbstractContextManager[None]:
+    """While this context is open, Ctrl-C ends the process at once: loading modules may swallow exceptions."""
+    return _handled(_leave)
+
+
+def as_error() -> contextlib.AbstractContextManager[None]:
+    """While this context is open, Ctrl-C raises Interrupted, or ends the process at once if a module is being loaded."""
+    return _handled(_raise_or_leave)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    os.write(2, b"error: interrupted\n")
+    os._exit(INTERRUPTED_STATUS)
+
+
+def _raise_or_leave(number: int, frame: FrameType | None) -> None:
+    if _loads_a_module(frame):
+        _leave(number, frame)
+    raise Interrupted
+
+
+def _loads_a_module(frame: FrameType | None) -> bool:
+    """Whether an import is under way: a compiled module replaces any exception by an ImportError of its own."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(IMPORT_SYSTEM):
+            return True
+        frame = frame.f_back
+    return False
+
+
+@contextlib.contextmanager
+def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Replace Python's own handler or that of `at_once`; a caller's handler, or a shell's choice to ignore, stays."""
+    before = signal.getsignal(signal.SIGINT)
+    is_ours = (
+        before in (signal.default_int_handler, _leave)
+        and threading.current_thread() is threading.main_thread()
+    )
+    if not is_ours:
+        yield
+        return
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

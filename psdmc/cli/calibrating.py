@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.lists import assignments, names, numbers, parsed_torque_constants
-from psdmc.cli.output import check_output, check_report, one_line, say_next
-from psdmc.cli.progress import steps
+from psdmc.cli.arguments import (
+    assignments,
+    check_output,
+    check_report,
+    names,
+    numbers,
+    parsed_torque_constants,
+)
+from psdmc.cli.console import one_line, say_next, steps
 from psdmc.errors import InputError
 
 if TYPE_CHECKING:

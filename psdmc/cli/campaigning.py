@@ -17,9 +17,8 @@ from psdmc.calibration.motions.excite_options import (
     ExciteOptions,
     chosen_objective,
 )
-from psdmc.cli.lists import assignments, names
-from psdmc.cli.output import quoted, say_next_line
-from psdmc.cli.progress import steps
+from psdmc.cli.arguments import assignments, names
+from psdmc.cli.console import quoted, say_next_line, steps
 from psdmc.errors import InputError
 
 USUAL_LOAD = "3.5,0.08,0,0.06"

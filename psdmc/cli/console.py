@@ -1,16 +1,19 @@
-"""Show a command's step and the time it will take: a changing line on a terminal, else one line per stage."""
+"""Shows on standard error at which step a command is, how long the step will take, and which command comes next.
+
+A step is a changing line on a terminal. Elsewhere psdmc prints one line for each stage that takes long.
+"""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from psdmc.cli.output import one_line
 from psdmc.progress import Progress, Step
 
 PATIENCE = 2.0
@@ -158,3 +161,26 @@ def _on_a_terminal() -> Iterator[Progress]:
             progress.update(task, description=estimate.text, left=text)
 
         yield tell
+
+
+def say_next(*words: object) -> None:
+    """Print `next: psdmc WORDS`, quoted for a shell, to standard error, because standard output has only results."""
+    say_next_line(shlex.join(["psdmc", *map(str, words)]))
+
+
+def quoted(word: object) -> str:
+    """A word as a shell takes it."""
+    return shlex.quote(str(word))
+
+
+def say_next_line(line: str) -> None:
+    """Print `next: LINE` to standard error, after the results. Print nothing if the results cannot be written."""
+    sys.stdout.flush()
+    with suppress(OSError):  # whoever closed it does not want to know
+        if sys.stderr is not None:
+            print(f"next: {one_line(line)}", file=sys.stderr)
+
+
+def one_line(text: str) -> str:
+    """Return untrusted text without control characters, which are escaped, so that it fits on one line of a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

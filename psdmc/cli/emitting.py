@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from psdmc.cli.lists import names
-from psdmc.cli.output import check_output, quoted, say_next, say_next_line
+from psdmc.cli.arguments import check_output, names
+from psdmc.cli.console import quoted, say_next, say_next_line, steps
 from psdmc.cli.pipeline import CHECK_FAILED_STATUS, ModelFile
-from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 from psdmc.target.native import NATIVE
 from psdmc.target.presets import PRESETS
@@ -164,7 +163,7 @@ def emit(
     from psdmc.backends.c.adapters import remarks
     from psdmc.backends.protocol import back_end
     from psdmc.backends.write import require_own_folder
-    from psdmc.cli.output import one_line
+    from psdmc.cli.console import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
@@ -227,7 +226,7 @@ def emit(
 def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
     """Say in which files a package differs from what the options that it records give; exit status 5 if it does."""
     from psdmc import compiler
-    from psdmc.cli.output import one_line
+    from psdmc.cli.console import one_line
 
     typed = {key for key in context.params if str(context.get_parameter_source(key)).endswith("COMMANDLINE")}
     given = {key: context.params[key] for key in sorted(typed - {"model", "output", "check"})}

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.lists import assignments, names, numbers
-from psdmc.cli.output import check_output, quoted, say_next, say_next_line
-from psdmc.cli.progress import steps
+from psdmc.cli.arguments import assignments, check_output, names, numbers
+from psdmc.cli.console import quoted, say_next, say_next_line, steps
 from psdmc.errors import InputError
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.target.presets import PRESETS

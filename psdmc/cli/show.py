@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Sequence
 from typing import Any
 
-from psdmc.cli.output import one_line
+from psdmc.cli.console import one_line
 from psdmc.cli.tables import TERMS, Table, print_line, print_note, print_table
 from psdmc.errors import InputError
 from psdmc.lower.admitted import admitted

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from psdmc.cli.output import one_line
+from psdmc.cli.console import one_line
 from psdmc.cli.tables import Table, print_line, print_table
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.output import check_output, one_line, say_next
+from psdmc.cli.arguments import check_output
+from psdmc.cli.console import one_line, say_next, steps
 from psdmc.cli.pipeline import (
     Packages,
     RootBody,
@@ -18,7 +19,6 @@ from psdmc.cli.pipeline import (
     say_what_a_model_is_for,
     xacro_arguments,
 )
-from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 from psdmc.robot.file_kinds import ROBOT_SUFFIXES
 

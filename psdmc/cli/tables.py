@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from rich.cells import cell_len
 
-from psdmc.cli.output import one_line
+from psdmc.cli.console import one_line
 from psdmc.robot.mechanism import WARNING
 
 PLAIN_WIDTH = 80

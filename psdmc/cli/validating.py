@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from psdmc.cli.arguments import check_report, parsed_torque_constants
 from psdmc.cli.calibrating import JointMap, Topic, naming_of
-from psdmc.cli.lists import parsed_torque_constants
-from psdmc.cli.output import check_report, say_next
-from psdmc.cli.progress import steps
+from psdmc.cli.console import say_next, steps
 
 if TYPE_CHECKING:
     from psdmc.calibration.compared import Comparison

@@ -8,7 +8,7 @@ import pytest
 from bundled import robot_path
 from command_line import status
 
-from psdmc.cli.lists import assignments, names, with_numbers_joined
+from psdmc.cli.arguments import assignments, names, with_numbers_joined
 from psdmc.model.load import load
 
 TREE = """<robot name="t"><link name="base"/>

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from bundled import bundled_model, robot_path
 
-from psdmc.cli.progress import PATIENCE, Estimate, Lines, in_words
+from psdmc.cli.console import PATIENCE, Estimate, Lines, in_words
 from psdmc.lower.kernels import lower
 from psdmc.progress import Step, within
 
@@ -122,7 +122,7 @@ def test_lowering_says_how_far_it_is() -> None:
 
 
 IMPATIENT = """
-import sys, psdmc.cli.progress as progress
+import sys, psdmc.cli.console as progress
 progress.PATIENCE, progress.TICK = 0.0, 0.0001
 from psdmc.cli import main
 main(sys.argv[1:])

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from command_line import status, typed
 
-from psdmc.cli.doctor import NEEDED, OPTIONAL, findings, missing
+from psdmc.cli.starting import NEEDED, OPTIONAL, findings, missing
 from psdmc.model.load import load
 
 

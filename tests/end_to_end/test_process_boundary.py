@@ -48,7 +48,7 @@ def test_ctrl_c_while_modules_load_is_one_line(command: list[str], tmp_path: Pat
         words = [sys.executable, "-X", "importtime", "-m", "psdmc", *command]
         with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
             said = ""
-            while "psdmc.cli.interrupt" not in said:
+            while "psdmc.cli.boundary" not in said:
                 said = process.stderr.readline()
             process.stderr.readline()
             time.sleep(0.02 + delay)
@@ -67,7 +67,7 @@ def test_ctrl_c_while_a_command_loads_a_module_is_one_line(tmp_path: Path):
     (tmp_path / "swallowing.py").write_text(
         "import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException:\n    raise ImportError\n"
     )
-    code = "from psdmc.cli.interrupt import as_error\nwith as_error():\n    import swallowing"
+    code = "from psdmc.cli.boundary import as_error\nwith as_error():\n    import swallowing"
     ended = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     assert (ended.returncode, ended.stderr) == (130, INTERRUPTED)
 
@@ -105,7 +105,7 @@ def test_ctrl_c_is_ignored_where_the_shell_says_so(tmp_path: Path):
     """As under nohup, or behind `&` in a script."""
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        "from psdmc.cli.interrupt import as_error\n"
+        "from psdmc.cli.boundary import as_error\n"
         "with as_error(): signal.raise_signal(signal.SIGINT); print('on')"
     )
     assert (
