@@ -26,7 +26,7 @@ import psdmc
 from psdmc.atomic import write_whole
 from psdmc.backends.cuda.names import symbol_of
 from psdmc.backends.cuda.package import BLOCK
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.bench.cases import LEGGED, robot_data
 from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import InputError, exit_status_of

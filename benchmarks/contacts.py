@@ -25,8 +25,7 @@ import numpy as np
 
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.package_files import library_files
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.bench.build import built, cxx, native_flags
 from psdmc.bench.case import robot_as_numbers
 from psdmc.bench.cases import LEGGED, robot_data

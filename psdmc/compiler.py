@@ -20,9 +20,15 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from psdmc.backends.c.adapters import chosen
 from psdmc.backends.manifest import MANIFEST
+from psdmc.backends.package_folder import (
+    Changes,
+    Differences,
+    differences,
+    recorded_options,
+    require_own_folder,
+    write_package,
+)
 from psdmc.backends.protocol import back_end
-from psdmc.backends.recorded import Differences, differences, recorded_options
-from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.compile_request import CompileRequest
 from psdmc.emission import EmitRequest, cuda_robot, emission, emit_options, functions_of, listed
 from psdmc.errors import InputError

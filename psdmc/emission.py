@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Literal
 
 from psdmc.backends.c.adapters import with_needed
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.backends.protocol import Emission
-from psdmc.backends.reference_load import reference_load
-from psdmc.backends.reference_states import reference_states
+from psdmc.backends.reference_states import reference_load, reference_states
 from psdmc.errors import InputError
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.garbage import collecting_rarely

@@ -9,8 +9,7 @@ from lowered import lowered
 from random_trees import RandomTree
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics

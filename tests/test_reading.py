@@ -165,7 +165,7 @@ OWN = {
     "calibration/simulate_campaign.py": "psdmc's own sources",
     "derivation/memory.py": "the kernel's figures",
     "backends/render.py": "psdmc's own templates",
-    "backends/c/names.py": "psdmc's own words",
+    "backends/c/render.py": "psdmc's own words",
     "report/bench_page.py": "psdmc's own templates",
     "robot/new_file.py": "psdmc's own template",
     "toolchain/cache_room.py": "the user's own cache, by its size",

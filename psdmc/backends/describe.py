@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import accumulate
 
-from psdmc.backends.info import JointInfo, PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.program.signature import Signature
 from psdmc.robot.mechanism import BASE_FRAME, POINT, ROW_NAMES
 from psdmc.target.native import NATIVE

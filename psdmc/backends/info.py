@@ -1,4 +1,5 @@
-"""The robot's metadata in the generated package: everything except the arithmetic."""
+"""The robot's metadata in the generated package, and the options that a user can choose: everything except the
+arithmetic."""
 
 from __future__ import annotations
 
@@ -7,18 +8,45 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psdmc.backends.bodies import BodiesMap, bodies_map
 from psdmc.friction.joints import Friction
+from psdmc.model.bodies import refuse_outside
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
-from psdmc.robot.mechanism import BASE_FRAME, POINT, Mechanism
+from psdmc.robot.inertia import six_of
+from psdmc.robot.mechanism import BASE_FRAME, BODY_PARAMETERS, PARAMETERS_PER_LINK, POINT, Array, Mechanism
 from psdmc.robot.unit_lengths import units_of
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Real, Target, Trig
+from psdmc.target.vectors import LANE_BLOCK_BYTES
 from psdmc.version import psdmc_version
+
+
+@dataclass(frozen=True, slots=True)
+class EmitOptions:
+    """The options with which a package is generated.
+
+    real    precision of the whole package
+    trig    code of sine and cosine. 'inline': code without branches for SIMD vectors, and the C library for very large
+            angles; 'freestanding': no C library, very large angles give NaN; 'libm': the C library only
+    target  the target machine; some targets have their own defaults of `real` and `trig`
+    """
+
+    real: Real = "float64"
+    trig: Trig = "inline"
+    target: Target = NATIVE
+
+    @property
+    def lanes(self) -> int:
+        """Return how many states a block of the batch layout [block][entry][lane] holds, equal for all machines."""
+        return LANE_BLOCK_BYTES // self.real_bytes
+
+    @property
+    def real_bytes(self) -> int:
+        return 8 if self.real == "float64" else 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +113,7 @@ class PackageInfo:
     frames: tuple[str, ...] = ()
     contacts: tuple[tuple[str, int], ...] = ()
     loops: tuple[tuple[str, tuple[int, ...]], ...] = ()
-    payload: tuple[NDArray[np.float64], ...] = ()
+    payload: tuple[Array, ...] = ()
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
     friction: Friction | None = None
@@ -214,8 +242,65 @@ def _followers(chain: Mechanism) -> Iterator[str]:
             yield f"{joint.name} follows {' and '.join(names)}: q = {''.join(terms)}{coordinate.offset:g}"
 
 
-def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:
+def _load_maps(model: DynamicsModel) -> tuple[Array, ...]:
     chain = model.mechanism
     is_tip_alone = [frame.name for frame in chain.frames] == [chain.tip_name]
     frames = (chain.tip_frame,) if is_tip_alone else (chain.tip_frame, *chain.frames)
     return tuple(load_map(chain, model.B, frame) for frame in frames)
+
+
+# Base parameters from the masses and inertias of all bodies
+
+
+EXAMPLE_MASS = 1.25
+EXAMPLE_COM = np.array([0.0625, -0.03125, 0.125])
+EXAMPLE_INERTIA = np.array([[0.03, 0.003, -0.002], [0.003, 0.04, 0.001], [-0.002, 0.001, 0.035]])
+"""kg, m, kg m^2 about the centre of mass of the self-test's first body; the next ones are heavier and longer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodiesMap:
+    """The linear map theta_b = constant + columns @ p. theta_b are the l base parameters. p (10 n,) are the ten
+    standard parameters (mass, first moments, inertia) of each of the n bodies.
+
+    links     n names of bodies, untrusted text
+    columns   (l, 10 n) factors of p
+    constant  (l,) the part of theta_b that comes from drive inertias (motors and gears)
+    masses    (n,) kg, of the example robot in the self-test
+    coms      (n, 3) m, centres of mass of the example robot
+    inertias  (n, 6) kg m^2, of the example robot
+    theta_b   (l,) expected result for the example robot
+    """
+
+    links: tuple[str, ...]
+    columns: Array
+    constant: Array
+    masses: Array
+    coms: Array
+    inertias: Array
+    theta_b: Array
+
+
+def bodies_map(model: DynamicsModel) -> BodiesMap:
+    """Return the linear map from the parameters of all bodies to theta_b (the base parameters) for one model.
+
+    Raises InputError if the model was derived under an assumption that excludes some bodies, such as a link without
+    mass. Also raises InputError if a drive inertia is unknown.
+    """
+    n = model.n
+    each = [np.tile(row, n) for row in np.eye(PARAMETERS_PER_LINK)[:BODY_PARAMETERS]]
+    refuse_outside(model.mechanism, each, f"{model.mechanism.name}: theta_from_bodies takes bodies whose")
+    sizes = 1.0 + np.arange(n) / 8.0
+    masses, coms = EXAMPLE_MASS * sizes, np.outer(sizes, EXAMPLE_COM)
+    inertias = sizes[:, None, None] ** 2 * EXAMPLE_INERTIA
+    B = model.B.reshape(model.l, n, PARAMETERS_PER_LINK)
+    still = np.zeros((n, 3))
+    return BodiesMap(
+        links=model.link_names,
+        columns=B[:, :, :BODY_PARAMETERS].reshape(model.l, -1),
+        constant=model.theta_for(np.zeros(n), still, np.zeros((n, 3, 3))),
+        masses=masses,
+        coms=coms,
+        inertias=np.array([six_of(matrix) for matrix in inertias]),
+        theta_b=model.theta_for(masses, coms, inertias),
+    )

@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
-from psdmc.backends.info import PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
 from psdmc.program.kernel import Kernel

@@ -1,7 +1,7 @@
 """A few states of a robot, and the values of every generated function there, computed by reference code in NumPy.
 
 The self-test of a generated package compares its results with these values on the user's machine. The reference code is
-separate from the generated code.
+separate from the generated code. All languages use the same names, inputs and tolerances, and the same example load.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.reference_load import ReferenceLoad
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import for_every_gravity
 from psdmc.model.near_closed import near_closed
+from psdmc.model.payload import body_parameters, load_parameters
 from psdmc.model.random_states import on_joints, random_parameters
 from psdmc.program.gravity_input import GRAVITY
-from psdmc.program.signature import Q_GUESS, TAU, Q, Sizes
+from psdmc.program.signature import Q_GUESS, TAU, Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
@@ -39,7 +39,7 @@ CANDIDATES = 32
 condition number."""
 
 SEED = 2021
-LOAD = 0.25
+SHARE = 0.25
 """Share of another physical robot's parameters that the check of run-time parameters adds to the robot's own."""
 
 STEPS = 8.0
@@ -59,7 +59,8 @@ class ReferenceStates:
     expected  arrays (k, size) by the name of the output; matrices are stored row by row
     theta_b   (l,) base parameters for the function variants that take them as an input. They differ from those of the
               robot, so that the test finds a function that ignores the input
-    load      what a load adds to theta_b, if the package has functions that add loads
+    load      (1 + number of named frames, l) what the example load adds to theta_b: at the tip, then at each named frame.
+              None if the package has no functions that add loads
 
     If M(q) is not positive definite at the states, forward dynamics has no entry.
     """
@@ -67,7 +68,7 @@ class ReferenceStates:
     given: Mapping[str, Array]
     expected: Mapping[str, Array]
     theta_b: Array
-    load: ReferenceLoad | None = None
+    load: Array | None = None
 
     def __post_init__(self) -> None:
         if not self.given:
@@ -193,7 +194,7 @@ def _values(
 
 def _other_parameters(model: DynamicsModel) -> Array:
     other: Array = times(model.B, random_parameters(model.mechanism))
-    return other if model.theta_b is None else model.theta_b + LOAD * other
+    return other if model.theta_b is None else model.theta_b + SHARE * other
 
 
 def _conditions(robot: RobotOnArrays, q: Array) -> Array:
@@ -201,3 +202,57 @@ def _conditions(robot: RobotOnArrays, q: Array) -> Array:
     values = np.linalg.eigvalsh(robot.mass_matrix(q))
     with np.errstate(divide="ignore"):
         return np.where(values[:, 0] > 0.0, np.abs(values[:, -1] / values[:, 0]), np.inf)
+
+
+# The example load
+
+
+LOAD_MASS = 1.25
+LOAD_COM = (0.05, -0.03, 0.11)
+LOAD_INERTIA = np.array([[0.02, 0.003, -0.002], [0.003, 0.03, 0.001], [-0.002, 0.001, 0.025]])
+"""kg, m, kg m^2 about the centre of mass: a body that no symmetry makes easier."""
+
+
+def reference_load(model: DynamicsModel) -> Array:
+    """Return what the self-test's example load adds to theta_b (ReferenceStates.load)."""
+    chain = model.mechanism
+    places = [(None, chain.tip_body), *((frame.name, frame.joint) for frame in chain.frames)]
+    rows = [
+        times(
+            model.B[:, body_parameters(body)],
+            load_parameters(chain, LOAD_MASS, LOAD_COM, LOAD_INERTIA, frame),
+        )
+        for frame, body in places
+    ]
+    return np.array(rows)
+
+
+# Names and tolerances
+
+
+TOLERANCES: Mapping[str, str] = {"float64": "1e-10", "float32": "1e-3"}
+FORWARD_TOLERANCES: Mapping[str, str] = {"float64": "1e-7", "float32": "1e-1"}
+"""Relative to a joint's largest value: large enough for badly conditioned mass matrices, small enough to detect wrong
+code."""
+
+
+def tolerance(function: Signature, real: str) -> str:
+    """Return the tolerance of all outputs of a function."""
+    return (FORWARD_TOLERANCES if function.factorises else TOLERANCES)[real]
+
+
+def compared_by_row(output: Quantity) -> bool:
+    """Return whether the self-test compares each row of an output relative to the largest value of that row. Otherwise,
+    all entries are compared relative to the largest entry of the output."""
+    return bool(output.axes) and output.axes[0] in ("6", "nv")
+
+
+def given_name(vector: str, variant: str) -> str:
+    """Return the name under which the reference states hold an input of a function.
+
+    Only the torques tau have several names, because they depend on the base parameters: tau for compiled-in parameters,
+    tau_theta for the input theta_b, and tau_theta_rows for one theta_b per state.
+
+    variant  ending of the function variant: '', '_theta' or THETA_ROWS
+    """
+    return f"{vector}{variant}" if vector == TAU.name else vector

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from psdmc.backends.c.names import identifier
-from psdmc.backends.c.render import render
+from psdmc.backends.c.render import identifier, render
 from psdmc.calibration.identify.state_friction import PARAMETERS, StateLawView
 from psdmc.calibration.logs.log import Array
 from psdmc.errors import InputError

@@ -161,8 +161,8 @@ def emit(
         return
     from psdmc import compiler
     from psdmc.backends.c.adapters import remarks
+    from psdmc.backends.package_folder import require_own_folder
     from psdmc.backends.protocol import back_end
-    from psdmc.backends.write import require_own_folder
     from psdmc.cli.console import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only

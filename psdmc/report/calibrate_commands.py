@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
-from psdmc.backends.c.names import identifier
+from psdmc.backends.c.render import identifier
 from psdmc.backends.manifest import content_of
 from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate

@@ -21,8 +21,7 @@ from random_trees import RandomTree
 from unoptimised import compiled
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES, SIGNATURES

@@ -18,8 +18,7 @@ from slow_cases import slow_but_for
 from unoptimised import compiled as library
 
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.provenance import provenance
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel

@@ -16,8 +16,7 @@ from robots_at_hand import Subject, drawn, subject
 from unoptimised import compiled
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import DEFAULT, OF_TREES, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret

@@ -17,8 +17,7 @@ from unoptimised import compiled
 
 import psdmc
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES

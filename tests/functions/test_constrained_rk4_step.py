@@ -17,8 +17,7 @@ from wide_robots import is_pinocchios
 
 import psdmc
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower

@@ -12,8 +12,7 @@ from slow_cases import slow_but_for
 from unoptimised import compiled
 
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower

@@ -19,8 +19,7 @@ from wide_robots import WideRobot, wide_robot
 
 import psdmc
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES

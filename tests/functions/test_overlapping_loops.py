@@ -10,8 +10,7 @@ from loop_trees import LoopTree, loop_tree
 from unoptimised import compiled
 
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower, wanted
 from psdmc.model.near_closed import near_closed

@@ -18,8 +18,7 @@ from unoptimised import compiled, without_optimisation
 
 import psdmc
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.compiler import emit
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError

@@ -10,7 +10,7 @@ import numpy as np
 
 from psdmc import emission
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.cli.show import print_model
 from psdmc.model.load import load
 from psdmc.model.store import file_bytes

@@ -11,7 +11,7 @@ from mutate_package import OUTSIDE
 from outcome import BrokenRule
 
 from psdmc.backends.manifest import JOURNAL, MANIFEST, edited_files
-from psdmc.backends.write import write_package
+from psdmc.backends.package_folder import write_package
 
 EARLIER = {"Makefile": "old:\n", "src/b.c": "/* old b.c */\n", "src/stale.c": "/* stale */\n"}
 NEW = {
@@ -46,7 +46,7 @@ def package(data: bytes, folder: Path, deep: bool) -> None:
             file = folder / name
             if not file.is_file() or file.read_text(encoding="utf-8") != text:
                 said = f"{name} is no longer what it was"
-                raise BrokenRule("TouchedOthers", f"psdmc/backends/write.py:{name}", said)
+                raise BrokenRule("TouchedOthers", f"psdmc/backends/package_folder.py:{name}", said)
 
 
 def _write(folder: Path) -> None:

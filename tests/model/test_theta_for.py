@@ -19,8 +19,7 @@ from slow_cases import slow_but_for
 
 import psdmc
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel

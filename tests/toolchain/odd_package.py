@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import JointInfo, PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.model.equations import BaseParameter
 from psdmc.program.factorisation import Structure, SymmetricMatrix

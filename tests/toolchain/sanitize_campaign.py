@@ -25,8 +25,7 @@ from bundled import bundled_model  # noqa: E402
 from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look  # noqa: E402
 
 from psdmc.backends.c.package import PackageView, package_view  # noqa: E402
-from psdmc.backends.info import package_info  # noqa: E402
-from psdmc.backends.options import EmitOptions  # noqa: E402
+from psdmc.backends.info import EmitOptions, package_info  # noqa: E402
 from psdmc.compiler import derive  # noqa: E402
 from psdmc.lower.kernels import lower, wanted  # noqa: E402
 from psdmc.model.dynamics_model import DynamicsModel  # noqa: E402

@@ -12,7 +12,7 @@ from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 
 KERNELS = arm_kernels()
 AS_LONG_AS_AN_INPUT = [

@@ -15,7 +15,7 @@ from direct import write_sources
 from slow_cases import slow_but_for
 from traced import arm_package
 
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.target.presets import preset
 
 ON_ZEN = "-D__znver3__"

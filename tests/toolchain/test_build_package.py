@@ -17,9 +17,9 @@ from unoptimised import wrapper
 
 import psdmc
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
+from psdmc.backends.package_folder import write_package
 from psdmc.backends.reference_states import ReferenceStates
-from psdmc.backends.write import write_package
 from psdmc.errors import InputError, ToolchainError
 from psdmc.toolchain.build_package import UNFINISHED, build_package
 

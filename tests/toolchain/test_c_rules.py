@@ -15,8 +15,7 @@ from slow_cases import slow_but_for
 from traced import arm_package
 
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import OF_TREES
 from psdmc.lower.kernels import lower, wanted
 from psdmc.program.kernel import Kernel

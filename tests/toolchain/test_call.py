@@ -9,7 +9,7 @@ from other_threads import counted_during
 from traced import SIZES, L, N, arm_kernels, arm_package, arm_references
 from unoptimised import compiled
 
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.errors import InputError
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library

@@ -8,7 +8,7 @@ from direct import Direct, all_expected, error, shared_library, states
 from slow_cases import slow_but_for
 from traced import L, N, arm_kernels, arm_package
 
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 
 CASES = [("-march=native", "float64"), ("-Dtest_arm_NO_VECTORS", "float64"), ("-march=native", "float32")]
 KERNELS = {name: kernel for name, kernel in arm_kernels().items() if not kernel.theta}

@@ -10,7 +10,7 @@ from direct import Direct, error, expected, shared_library, states
 from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm_kernels, arm_package
 
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.program.kernel import Kernel
 
 KERNELS = arm_kernels()

@@ -16,8 +16,7 @@ from limbed import package_of
 from slow_cases import slow_but_for
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import OF_TREES
 from psdmc.functions.impulse import RESTITUTION
 from psdmc.functions.operational_space_inertia import MU

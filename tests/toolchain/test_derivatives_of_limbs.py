@@ -16,8 +16,7 @@ from random_trees import RandomTree
 from slow_cases import slow_but_for
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.model.random_states import states_of

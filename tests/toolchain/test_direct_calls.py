@@ -18,7 +18,7 @@ from traced import N, arm_kernels, arm_package, arm_references
 from unoptimised import compiled, without_optimisation
 
 import psdmc
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.errors import InputError
 from psdmc.toolchain import direct_calls as module
 from psdmc.toolchain.call import CompiledRobot

@@ -13,8 +13,7 @@ from bundled import bundled_model, bundled_robot
 from direct import Direct, shared_library, write_sources
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.calibration.api import calibrate
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log

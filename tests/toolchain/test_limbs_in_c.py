@@ -15,8 +15,7 @@ from limbed import FUNCTIONS, forced, kernels, limbed, package_of, shape
 from slow_cases import slow_but_for
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower

@@ -9,8 +9,7 @@ import pytest
 from direct import Direct, expected, shared_library, states
 
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import JointInfo, PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.functions import SIGNATURES
 from psdmc.model.equations import BaseParameter
 from psdmc.program.kernel import Kernel

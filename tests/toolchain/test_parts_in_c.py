@@ -11,7 +11,7 @@ from slow_cases import slow_but_for
 from traced import L, N, arm, arm_kernels, arm_package
 
 from psdmc.backends.c.package_files import library_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 
 KERNELS = arm_kernels()
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]

@@ -13,8 +13,7 @@ from bundled import bundled_model, bundled_robot, robot_path
 from direct import Direct, shared_library, write_sources
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.compiler import derive, emit_c
 from psdmc.errors import InputError
 from psdmc.lower.kernels import lower

@@ -13,7 +13,7 @@ from test_odd_sizes import INFO
 
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import library_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.program.kernel import Kernel
 from psdmc.program.products import Product, written_out
 from psdmc.program.program import Slot

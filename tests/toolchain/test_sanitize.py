@@ -12,7 +12,7 @@ from slow_cases import slow_but_for
 from traced import arm_package
 
 from psdmc.backends.c.package import PackageView
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 
 NAMES = ["inverse_dynamics", "forward_dynamics", "jacobian"]
 """Torques with parameters, pivots, a matrix written straight into rows."""

@@ -15,9 +15,9 @@ from unoptimised import wrapper
 
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
+from psdmc.backends.package_folder import write_package
 from psdmc.backends.reference_states import ReferenceStates
-from psdmc.backends.write import write_package
 from psdmc.errors import InputError, InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Quantity

@@ -20,7 +20,7 @@ from traced import arm_package
 
 import psdmc
 from psdmc import emission
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.errors import InputError, ToolchainError
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel

@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import JointInfo, PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from psdmc.backends.c.adapters import with_own_kernels
 from psdmc.backends.c.estimator import estimator_view
-from psdmc.backends.c.names import identifier
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.render import identifier
 from psdmc.backends.protocol import BackEnd, Emission
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.bodies import BodiesMap
-from psdmc.backends.c.prototypes import Prototype, bodies_prototype, payload_prototypes
-from psdmc.backends.c.reals import CReal
-from psdmc.backends.c.tables import number
+from psdmc.backends.c.expressions import CReal, number
+from psdmc.backends.c.kernel_view import Prototype
+from psdmc.backends.info import BodiesMap
 
 Array = NDArray[np.float64]
 
@@ -26,7 +25,8 @@ class BodiesView:
 
     @property
     def prototype(self) -> Prototype:
-        return bodies_prototype(self.robot, self.real)
+        given = (f"const {self.real} *{name}" for name in ("masses", "coms", "inertias"))
+        return Prototype("void", f"{self.robot}_theta_from_bodies", (*given, f"{self.real} *theta_b"))
 
     @property
     def count(self) -> int:
@@ -92,7 +92,13 @@ class PayloadView:
 
     @property
     def prototypes(self) -> tuple[Prototype, Prototype]:
-        return payload_prototypes(self.robot, self.real)
+        """Return the signatures of the functions for a load at the tip, and for one at a frame with a given number."""
+        given = (f"{self.real} mass", f"const {self.real} *com", f"const {self.real} *inertia")
+        load = (*given, f"{self.real} *theta_b")
+        return (
+            Prototype("void", f"{self.robot}_add_payload", load),
+            Prototype("int", f"{self.robot}_add_payload_at", ("size_t frame", *load)),
+        )
 
     @property
     def rows(self) -> tuple[tuple[str, ...], ...]:

@@ -10,22 +10,25 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import groupby
 
-from psdmc.backends.c.c_expr import UNIFORM_VECTORS, Expr, Names, combine, is_call, literal
+from psdmc.backends.c.expressions import UNIFORM_VECTORS, Expr, Names, combine, is_call, literal
 from psdmc.backends.c.lines import (
     BETWEEN,
+    GROUP,
     Angle,
     Body,
     Cleared,
+    Entry,
     GroupStore,
     Line,
     Load,
+    Multiplication,
     Section,
     Step,
     Store,
+    StoreGroups,
+    multiplication,
     spread,
 )
-from psdmc.backends.c.products import Entry, Multiplication, multiplication
-from psdmc.backends.c.store_groups import GROUP, StoreGroups
 from psdmc.program.angles import TRIGONOMETRIC, angle_groups, cone
 from psdmc.program.operations import Unit
 from psdmc.program.products import Product

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.prototypes import Prototype
+from psdmc.backends.c.kernel_view import FunctionView, KernelView, Prototype
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from textwrap import wrap
 
-from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.kernel_view import FunctionView
 from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
-from psdmc.backends.info import PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Target

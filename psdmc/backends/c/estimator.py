@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.expressions import CReal, c_real
+from psdmc.backends.c.kernel_view import FunctionView, Prototype
 from psdmc.backends.c.make_kernel_view import make_kernel_view
-from psdmc.backends.c.prototypes import Prototype
-from psdmc.backends.c.reals import CReal, c_real
-from psdmc.backends.info import PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.program.kernel import Kernel
 
 WIDEST = 16

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.backends.c.operations import CallView
-from psdmc.backends.c.prototypes import Prototype, friction_prototype
-from psdmc.backends.c.reals import rounded_out
+from psdmc.backends.c.expressions import CallView, number, rounded_out
+from psdmc.backends.c.kernel_view import Prototype
 from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
-from psdmc.backends.c.tables import number
 from psdmc.friction.joints import Friction
 from psdmc.friction.law import Array
 
@@ -28,7 +26,9 @@ class FrictionView:
 
     @property
     def prototype(self) -> Prototype:
-        return friction_prototype(self.robot, self.real, self.friction.by_position)
+        given = ("q", "qd") if self.by_position else ("qd",)
+        arguments = (*(f"const {self.real} *{name}" for name in given), f"{self.real} *tau_f")
+        return Prototype("void", f"{self.robot}_friction", arguments)
 
     @property
     def by_position(self) -> bool:

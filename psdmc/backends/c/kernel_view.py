@@ -4,15 +4,28 @@ of signatures and calls."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from psdmc.backends.c.limbs import LimbsView
-from psdmc.backends.c.lines import Body
-from psdmc.backends.c.prototypes import Prototype
+from psdmc.backends.c.lines import Body, Multiplication
 from psdmc.backends.c.regions import RegionsView
 from psdmc.program.products import LARGE
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS
+
+
+@dataclass(frozen=True, slots=True)
+class Prototype:
+    """A C function's type: `returns symbol(arguments)`."""
+
+    returns: str
+    symbol: str
+    arguments: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        return f"{self.returns} {self.symbol}({', '.join(self.arguments)})"
+
 
 LOOPED = 10
 """Pivots from which on one state's are looked at in a loop: each one alone costs 85 bytes of code."""
@@ -225,3 +238,52 @@ class KernelView:
         written straight into the output array need no block."""
         outputs = (output for output in self.outputs if not output.direct)
         return (*self.inputs, *outputs, *((self.positive,) if self.positive else ()))
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionView:
+    """One generated function with its kernels (its variants without and with theta_b as an input). The variant without
+    comes first.
+
+    shape  in words, the shape of each output and of each input that is no vector with one entry per joint
+    """
+
+    name: str
+    meaning: str
+    shape: str
+    signature: Signature
+    kernels: tuple[KernelView, ...]
+
+    @property
+    def has_pivots(self) -> bool:
+        return any(kernel.pivot_order or (kernel.regions and kernel.positive) for kernel in self.kernels)
+
+    @property
+    def is_regions(self) -> bool:
+        """Return whether the C code is loops and calls of other functions, and not straight-line code."""
+        return any(kernel.regions for kernel in self.kernels)
+
+    @property
+    def products(self) -> tuple[Multiplication, ...]:
+        """Return the products of all kernels."""
+        return tuple(p for kernel in self.kernels for p in kernel.single_body.products)
+
+    @property
+    def limbs(self) -> tuple[int, ...]:
+        """Return the numbers of equal limbs that the function computes in SIMD lanes, in ascending order. An example is
+        4 for the legs of a quadruped."""
+        return tuple(
+            sorted({count for kernel in self.kernels if kernel.limbs for count in kernel.limbs.counts})
+        )
+
+    @property
+    def units(self) -> tuple[FunctionView, ...]:
+        """Return one object for each C file of the function. There is one file for the whole function, or one per
+        kernel (variant) if the code is so long that it is divided into parts."""
+        if not any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels):
+            return (self,)
+        return tuple(replace(self, name=kernel.name, kernels=(kernel,)) for kernel in self.kernels)
+
+    @property
+    def needs_parameters(self) -> bool:
+        return self.signature.theta

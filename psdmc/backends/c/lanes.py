@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from psdmc.backends.c.store_groups import GROUP
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.c.lines import GROUP
+from psdmc.backends.info import EmitOptions
 from psdmc.target.vectors import VectorUnit
 
 

@@ -7,11 +7,11 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from psdmc.backends.c.body import make_body
-from psdmc.backends.c.c_expr import literal
+from psdmc.backends.c.expressions import literal
 from psdmc.backends.c.lanes import TransposeStage, transpose_stage
 from psdmc.backends.c.limb_rows import FOUR, StoreView, store_views
 from psdmc.backends.c.lines import Body
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.program.cost import Cost
 from psdmc.program.limb_cost import whole_cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage

@@ -7,16 +7,31 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from psdmc.backends.c.body import calls_of, make_body, sections_of, unread, without_products
-from psdmc.backends.c.c_expr import is_call, uniform_of
-from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
+from psdmc.backends.c.expressions import c_real, is_call, uniform_of
+from psdmc.backends.c.kernel_view import (
+    FunctionView,
+    KernelView,
+    OutputView,
+    Prototype,
+    VectorView,
+)
 from psdmc.backends.c.limbs import LimbsView, limbs_view
-from psdmc.backends.c.lines import KEPT, KEPT_REALS, Body, GroupStore, Part, Store, Zeros
-from psdmc.backends.c.products import Entry, Multiplication, multiplication
-from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
-from psdmc.backends.c.reals import c_real
+from psdmc.backends.c.lines import (
+    GROUP,
+    KEPT,
+    KEPT_REALS,
+    Body,
+    Entry,
+    GroupStore,
+    Multiplication,
+    Part,
+    Store,
+    Zeros,
+    multiplication,
+)
 from psdmc.backends.c.regions import regions_view
-from psdmc.backends.c.store_groups import GROUP
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
+from psdmc.backends.protocol import functions_of
 from psdmc.errors import InternalError
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
@@ -24,6 +39,7 @@ from psdmc.program.parts import in_parts
 from psdmc.program.products import LARGE, Product
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Quantity, Signature, Sizes
+from psdmc.robot.mechanism import BASE_FRAME
 
 
 def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
@@ -79,6 +95,36 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         places=kernel.places,
         regions=regions,
     )
+
+
+def function_views(
+    kernels: Mapping[str, Kernel],
+    sizes: Sizes,
+    robot: str,
+    options: EmitOptions,
+    base_frame: str = BASE_FRAME,
+) -> tuple[FunctionView, ...]:
+    """Return the functions to which the given kernels (variants of generated functions) belong, in the order of the
+    function list. `base_frame` is the name of the base frame in the descriptions of the functions."""
+    views = []
+    for found in functions_of(kernels, base_frame):
+        function = found.signature
+        shown = tuple(make_kernel_view(kernel, sizes, robot, options) for kernel in found.kernels)
+        shape = _shape(function, sizes_of(found.kernels[0], sizes))
+        views.append(FunctionView(function.name, found.meaning, shape, function, shown))
+    return tuple(views)
+
+
+def _shape(function: Signature, sizes: Sizes) -> str:
+    numbers = [f"{q.name} is a number" for q in function.inputs if not q.axes]
+    told = [q for q in function.inputs if len(q.axes) > 1] + list(function.outputs)
+    return "; ".join([*numbers, *(f"{q.name} is {_lengths(sizes.shape(q.axes))}" for q in told)])
+
+
+def _lengths(shape: tuple[int, ...]) -> str:
+    if not shape:
+        return "1"
+    return str(shape[0]) if len(shape) == 1 else f"{' x '.join(map(str, shape))}, row-major"
 
 
 def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
@@ -171,10 +217,19 @@ def _is_direct(output: Quantity, sizes: Sizes) -> bool:
 
 
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
-    """Prototypes by form, for the forms that the target has."""
-    variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
-    made = (prototype(function, variant, robot, c_real(options)) for variant in variants)
-    return dict(zip(options.target.forms, made, strict=False))
+    """Prototypes by form, for the forms that the target has. A function that can fail returns which entry failed (one
+    state), or which row (many)."""
+    real = c_real(options)
+    inputs = [*(q.name for q in function.inputs), *(["theta_b"] if theta else [])]
+    outputs = (f"{real} *{q.name}" for q in function.outputs)
+    arrays = (*(f"const {real} *{name}" for name in inputs), *outputs)
+    suffixes = ("_theta", "_theta_batch") if theta else ("", "_batch", "_batch_soa")
+    found: dict[str, Prototype] = {}
+    for form, suffix in zip(options.target.forms, suffixes, strict=False):
+        count, status = ((), "int") if form == "single" else (("size_t count",), "size_t")
+        returns = status if function.factorises else "void"
+        found[form] = Prototype(returns, f"{robot}_{function.name}{suffix}", (*count, *arrays))
+    return found
 
 
 # Long functions in several C functions

@@ -3,8 +3,9 @@ generated functions)."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.backends.c.bodies_view import BodiesView, PayloadView
@@ -12,19 +13,17 @@ from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
 from psdmc.backends.c.describe import description
 from psdmc.backends.c.estimator import EstimatorView
+from psdmc.backends.c.expressions import LARGEST_FLOAT, CallView, CReal, c_real, call_views, rounded_out
 from psdmc.backends.c.friction import FrictionView
-from psdmc.backends.c.function_view import FunctionView, function_views
-from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.names import identifier
-from psdmc.backends.c.operations import CallView, call_views
-from psdmc.backends.c.products import Shape
-from psdmc.backends.c.reals import CReal, c_real, check_range
+from psdmc.backends.c.kernel_view import FunctionView, KernelView
+from psdmc.backends.c.lines import Shape
+from psdmc.backends.c.make_kernel_view import function_views
+from psdmc.backends.c.render import identifier
 from psdmc.backends.c.self_test import ReferenceView, SelfTestView, given_vectors, labels, reference_view
 from psdmc.backends.c.tables import Pattern, Table, patterns, tables
 from psdmc.backends.c.vectors_view import VectorsView
 from psdmc.backends.describe import uses_contacts, uses_frames
-from psdmc.backends.info import PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
@@ -327,7 +326,7 @@ def package_view(
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
-    check_range(info, kernels, c_real(options))
+    _check_range(info, kernels, c_real(options))
     if (info.friction or info.in_dynamics) and options.trig == "freestanding":
         raise InputError(
             f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
@@ -356,3 +355,35 @@ def _check_calls(info: PackageInfo, kernels: Mapping[str, Kernel], options: Emit
                     f"{info.name}: {kernel.name} needs {call.op}, which is libm's, and the package is freestanding",
                     "emit it with --trig inline, or leave the function out",
                 )
+
+
+def _check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) -> None:
+    """InputError if a base parameter, gravity or a constant in the generated code is too large for the C type `real`.
+
+    Joint limits are not checked. A limit that is too large for `real` is no limit, and is written as infinite.
+    """
+    numbers = [("gravity", value) for value in info.gravity]
+    numbers += [
+        (f"base parameter {parameter.equation!r}", parameter.value)
+        for parameter in info.parameters
+        if parameter.value is not None
+    ]
+    numbers += [
+        (f"a constant of {name}", value) for name, kernel in kernels.items() for value in _constants(kernel)
+    ]
+    for what, value in numbers:
+        if math.isinf(rounded_out(value, real)):
+            raise InputError(
+                f"{info.name}: {what} is {value:.6g}, more than float32's {LARGEST_FLOAT:.6g}",
+                "emit it with --real float64, or check the robot's units",
+            )
+
+
+def _constants(kernel: Kernel) -> Iterable[float]:
+    stages = kernel.limbs.stages if kernel.limbs else ()
+    for program in (kernel.single, kernel.batch, *(stage.program for stage in stages)):
+        for instr in program:
+            if instr.value is not None:
+                yield instr.value
+    for group in kernel.limbs.groups if kernel.limbs else ():
+        yield from (value for row in group.constants for value in row)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from psdmc.backends.c.adapters import ADAPTERS
-from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.kernel_view import FunctionView
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
 from psdmc.backends.describe import option_items

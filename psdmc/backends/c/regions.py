@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from psdmc.backends.c.body import make_body
-from psdmc.backends.c.c_expr import literal
+from psdmc.backends.c.expressions import literal
 from psdmc.backends.c.lines import Body
 from psdmc.program.operations import Op
 from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight, read_late

@@ -7,8 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from psdmc.backends.c.body import calls_of
-from psdmc.backends.c.c_expr import Expr, Names, combine, is_call, literal
-from psdmc.backends.c.operations import CALLS, CallView, call_views
+from psdmc.backends.c.expressions import CALLS, CallView, Expr, Names, call_views, combine, is_call, literal
 from psdmc.program.operations import Unit
 from psdmc.program.program import Instr, Program, Slot
 

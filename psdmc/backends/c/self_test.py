@@ -9,13 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.prototypes import Prototype
-from psdmc.backends.c.tables import number
-from psdmc.backends.options import EmitOptions
-from psdmc.backends.reference_load import COM, INERTIA, MASS, ReferenceLoad
-from psdmc.backends.reference_states import ReferenceStates
-from psdmc.backends.self_test import TOLERANCES, compared_by_row, given_name, tolerance
+from psdmc.backends.c.expressions import number
+from psdmc.backends.c.kernel_view import KernelView, Prototype
+from psdmc.backends.info import EmitOptions
+from psdmc.backends.reference_states import (
+    LOAD_COM,
+    LOAD_INERTIA,
+    LOAD_MASS,
+    TOLERANCES,
+    ReferenceStates,
+    compared_by_row,
+    given_name,
+    tolerance,
+)
 from psdmc.robot.inertia import six_of
 
 
@@ -220,15 +226,15 @@ def _table(name: str, array: NDArray[np.float64], real: str) -> ReferenceTable:
     return ReferenceTable(name, array.shape[1], texts)
 
 
-def _load_view(load: ReferenceLoad, real: str) -> LoadView:
+def _load_view(added: NDArray[np.float64], real: str) -> LoadView:
     """The load as C constants."""
 
     def listed(values: NDArray[np.float64]) -> str:
         return ", ".join(number(float(value), real) for value in values)
 
-    inertia = listed(np.asarray(six_of(INERTIA)))
+    inertia = listed(np.asarray(six_of(LOAD_INERTIA)))
     return LoadView(
-        number(MASS, real), listed(np.array(COM)), inertia, tuple(listed(row) for row in load.added)
+        number(LOAD_MASS, real), listed(np.array(LOAD_COM)), inertia, tuple(listed(row) for row in added)
     )
 
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.names import c_string
-from psdmc.backends.c.reals import rounded_out
+from psdmc.backends.c.expressions import number, rounded_out
+from psdmc.backends.c.kernel_view import FunctionView
+from psdmc.backends.c.render import c_string
 from psdmc.backends.info import PackageInfo
 
 
@@ -80,20 +80,6 @@ def _cpp_number(value: float | None, real: str) -> str:
     if math.isinf(value):
         return f"{'-' if value < 0 else ''}std::numeric_limits<Real>::infinity()"
     return number(value, real)
-
-
-def number(value: float | None, real: str) -> str:
-    """Return C text of a real constant. None (unknown) is written as NaN. A number outside the range of the C type
-    `real` is written as the infinity or zero to which it rounds.
-
-    Minus infinity is written as a product, because the compiler tcc does not accept a minus before INFINITY.
-    """
-    if value is None or math.isnan(value):
-        return f"({real})NAN"
-    value = rounded_out(value, real)
-    if math.isinf(value):
-        return f"({real})INFINITY" if value > 0 else f"({real})(-1e300 * 1e300) /* -INFINITY */"
-    return f"{float(value)!r}{'' if real == 'double' else 'f'}"
 
 
 # Sparsity patterns of matrices

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from psdmc.backends.c.expressions import c_real
 from psdmc.backends.c.lanes import VectorWidth, vector_widths
 from psdmc.backends.c.limbs import LimbVector, limb_units, limb_vectors
-from psdmc.backends.c.reals import c_real
 from psdmc.backends.c.trig import (
     ScalarTrig,
     TrigPreamble,
@@ -16,7 +16,7 @@ from psdmc.backends.c.trig import (
     trig_preamble,
     vector_trig,
 )
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from psdmc.backends.c.names import is_reserved
-from psdmc.backends.names import identifier_of
+from psdmc.backends.c.render import is_reserved
+from psdmc.backends.render import identifier_of
 from psdmc.program.theta_rows import THETA_ROWS
 
 LIBRARIES = frozenset(

@@ -12,7 +12,7 @@ from psdmc.backends.c.self_test import SelfCheck
 from psdmc.backends.cuda.names import identifier, symbol_of
 from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
 from psdmc.backends.protocol import Emission
-from psdmc.backends.self_test import given_name
+from psdmc.backends.reference_states import given_name
 from psdmc.errors import InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Sizes

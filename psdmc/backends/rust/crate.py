@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts, uses_frames
 from psdmc.backends.info import PackageInfo
 from psdmc.backends.protocol import Emission, Function
+from psdmc.backends.reference_states import compared_by_row, given_name, tolerance
 from psdmc.backends.rust.body import WRITTEN, array, number, place, statements
 from psdmc.backends.rust.names import identifier, text, variable
-from psdmc.backends.self_test import compared_by_row, given_name, tolerance
 from psdmc.errors import InputError, InternalError
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel

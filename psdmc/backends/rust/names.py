@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psdmc.backends.names import DEVICE, identifier_of, utf8
+from psdmc.backends.render import DEVICE, identifier_of, utf8
 
 _WORDS = """
 as async await break const continue crate dyn else enum extern false fn for gen if impl in let loop match mod move mut pub

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.package_files import library_files
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
 from psdmc.bench.contestant import Contestant, Unavailable, source

@@ -10,7 +10,7 @@ from typing import Any
 import cffi
 import numpy as np
 
-from psdmc.backends.c.operations import CallView
+from psdmc.backends.c.expressions import CallView
 from psdmc.backends.c.render import render
 from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
 from psdmc.calibration.logs.log import Array

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.info import JointInfo, PackageInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.functions import SIGNATURES
 from psdmc.model.equations import BaseParameter

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from psdmc.backends.c.body import Body, make_body
-from psdmc.backends.c.c_expr import DEEPEST, literal
+from psdmc.backends.c.expressions import DEEPEST, literal
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.text import parse
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psdmc.backends.c.names import RESERVED, c_comment, c_string, identifier
-from psdmc.backends.names import LONGEST
+from psdmc.backends.c.render import RESERVED, c_comment, c_string, identifier
+from psdmc.backends.render import LONGEST
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from small import (
 
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
 

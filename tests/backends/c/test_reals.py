@@ -13,11 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small import INVERSE, kernel, pendulum, pendulum_info
 
+from psdmc.backends.c.expressions import rounded_out
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.reals import rounded_out
-from psdmc.backends.info import JointInfo
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, JointInfo
 from psdmc.errors import InputError
 
 FLOAT32 = EmitOptions(real="float32")

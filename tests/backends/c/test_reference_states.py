@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
 
-from psdmc.backends.reference_states import COUNT, LOAD, ReferenceStates, reference_states
+from psdmc.backends.reference_states import COUNT, SHARE, ReferenceStates, reference_states
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import random_parameters
@@ -24,7 +24,7 @@ def _error(found: np.ndarray, expected: np.ndarray) -> float:
 
 def _others(model: DynamicsModel) -> tuple[np.ndarray, np.ndarray]:
     """Standard parameters of the run-time theta_b: the robot's and a share of others."""
-    x = model.chain.parameters.ravel() + LOAD * random_parameters(model.chain)
+    x = model.chain.parameters.ravel() + SHARE * random_parameters(model.chain)
     return x.reshape(model.n, -1), model.B @ x
 
 

@@ -11,7 +11,7 @@ from region_functions import MATRICES, multiplied
 from small import kernel, pendulum_info
 
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Program

@@ -13,8 +13,8 @@ import pytest
 from slow_cases import slow_but_for
 from small import pendulum, pendulum_info
 
-from psdmc.backends.c.names import RESERVED, identifier, is_reserved
 from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.render import RESERVED, identifier, is_reserved
 
 NEWEST_GLIBC = (2, 36)
 """The one whose headers reserved/c_and_posix.txt was made from."""

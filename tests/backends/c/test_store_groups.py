@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from psdmc.backends.c.body import make_body
-from psdmc.backends.c.store_groups import StoreGroups
+from psdmc.backends.c.lines import StoreGroups
 from psdmc.program.program import Slot
 from psdmc.program.text import parse
 

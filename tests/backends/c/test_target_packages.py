@@ -9,7 +9,7 @@ import pytest
 from small import pendulum, pendulum_references
 
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.target.native import NATIVE
 from psdmc.target.presets import CORTEX_M4F, PRESETS, SCALAR, X86_64_V3, preset
 from psdmc.target.target import Target

@@ -12,9 +12,9 @@ import pytest
 from small import pendulum, pendulum_info
 
 from psdmc.backends.c.package_files import package_files
+from psdmc.backends.info import EmitOptions
 from psdmc.backends.manifest import OWN_NAME, RENAMED, digest, edited_files
-from psdmc.backends.options import EmitOptions
-from psdmc.backends.write import write_package
+from psdmc.backends.package_folder import write_package
 from psdmc.errors import InputError, ToolchainError
 from psdmc.functions import RECIPES
 

@@ -12,7 +12,7 @@ from machine_code import DERIVATIVES, FILE, counts, kernels_in, version
 from pinocchio_robots import path_of
 
 import psdmc
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions
 from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import ToolchainError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE

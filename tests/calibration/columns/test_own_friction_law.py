@@ -15,8 +15,7 @@ from bundled import bundled_model, bundled_robot
 from direct import Direct, shared_library
 
 from psdmc.backends.c.package import package_view
-from psdmc.backends.info import package_info
-from psdmc.backends.options import EmitOptions
+from psdmc.backends.info import EmitOptions, package_info
 from psdmc.calibration.columns.columns import read_columns
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from psdmc.backends.c.adapters import casadi, fmu, mex, ros2, wheel
-from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.kernel_view import FunctionView
 from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.names import c_comment
+from psdmc.backends.c.kernel_view import FunctionView, KernelView
+from psdmc.backends.c.render import c_comment
 from psdmc.program.signature import Q, Quantity
 
 

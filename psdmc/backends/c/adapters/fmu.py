@@ -17,9 +17,8 @@ from types import MappingProxyType
 
 from psdmc.backends.c.adapters.suited import refuse_unsuited
 from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.names import c_comment
 from psdmc.backends.c.package import PackageView
-from psdmc.backends.c.render import render
+from psdmc.backends.c.render import c_comment, render
 from psdmc.program.signature import Signature
 
 DYNAMICS, DIRECTION = "forward_dynamics_theta", "forward_dynamics_jvp_theta"
