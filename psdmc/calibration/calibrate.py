@@ -27,8 +27,7 @@ from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
-from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.motors_of_loads import LoadedLogs, motors_with_load, with_loaded_logs
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
 from psdmc.calibration.verdict.judge import (

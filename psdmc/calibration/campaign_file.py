@@ -9,10 +9,9 @@ from typing import Any, Literal, cast
 
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.steps import FrictionRun, GravityRun, InertialRun, Load, MotorRun
-from psdmc.calibration.logs.foreign_bytes import is_folder
+from psdmc.calibration.logs.foreign_bytes import is_folder, listed
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_none
-from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 
 Step = Literal["motor", "gravity", "friction", "inertial", "validation"]

@@ -13,8 +13,8 @@ from psdmc.calibration.columns.columns import Columns
 from psdmc.calibration.compared import Comparison, Curve, Difference, JointDifference, OnLog
 from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
 from psdmc.calibration.identify.residuals import qualities
+from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.validation import opened_logs
 from psdmc.calibration.verdict.delivered import Delivered, delivered, linear_torque, predicted_rows

@@ -22,10 +22,9 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.steps import judged
 from psdmc.calibration.logs.filter import stretches
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.foreign_bytes import listed
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import checked
-from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.verdict.delivered import log_parts, reread
 from psdmc.calibration.verdict.record import Calibration, logs_used, with_model
 from psdmc.errors import InputError

@@ -28,9 +28,8 @@ from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.residuals import qualities
 from psdmc.calibration.identify.visibility import Visibility, visibility
 from psdmc.calibration.logs.filter import States
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import checked
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.payload_found import PayloadFound, load_numbers
 from psdmc.calibration.sources import LogNaming, log_sources
 from psdmc.calibration.verdict.delivered import beside, delivered

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from psdmc.atomic import make_folder, write_whole
 from psdmc.calibration.campaign_file import ListedRun, listed_runs
-from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, is_folder
+from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, is_folder, listed
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.motions.trajectory import read_trajectory, trajectory_joints
 from psdmc.calibration.plant import elastic, plant_file, virtual_robot
 from psdmc.calibration.plant.plant_file import plant_texts

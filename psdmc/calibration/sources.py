@@ -12,10 +12,10 @@ from psdmc.calibration.description.description import is_description, read_descr
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.formats import has_topics
+from psdmc.calibration.logs.log import AnyLog, without_start
 from psdmc.calibration.logs.log_files import open_log
-from psdmc.calibration.logs.stored_log import AnyLog, without_start
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.progress import Progress
 

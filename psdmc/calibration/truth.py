@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from psdmc.calibration.identify.state_friction import PARAMETERS
-from psdmc.calibration.logs.wording import listed
+from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.plant.virtual_robot import VirtualRobot
 from psdmc.errors import InputError
 from psdmc.model.calibrated import Calibrated

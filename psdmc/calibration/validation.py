@@ -22,9 +22,8 @@ from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_q
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.residuals import qualities
 from psdmc.calibration.identify.steps import judged
-from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.logs.wording import listed
+from psdmc.calibration.logs.foreign_bytes import listed
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
 from psdmc.calibration.verdict.changes import CHANCE, MOST_NAMED, Change, Changes, Explanation, LoadChange
 from psdmc.calibration.verdict.delivered import Delivered, PredictedRows, delivered, predicted_rows, reread

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.columns.effect import Content, Effect, Motion, Spring, Unknown, joints_of
 from psdmc.calibration.columns.kinds import KINDS
+from psdmc.calibration.logs.foreign_bytes import quoted
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
-from psdmc.calibration.logs.wording import quoted
 from psdmc.friction.law import At, Law, Term
 from psdmc.friction.own import laws_of, read_law
 from psdmc.friction.terms import KEYS, OPTIONAL

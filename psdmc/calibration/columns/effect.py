@@ -10,9 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from psdmc.calibration.columns.ways import Way
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.robot.mechanism import Mechanism
 
 

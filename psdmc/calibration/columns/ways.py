@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import frame_placement, jacobian
 from psdmc.robot.mechanism import BASE, Mechanism, Placement

@@ -18,9 +18,9 @@ from psdmc.calibration.description.table_quantities import (
     refused,
 )
 from psdmc.calibration.description.units import TICKS, UNITS, Says
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import Quantity
 from psdmc.calibration.logs.log_format import Columns
-from psdmc.calibration.logs.wording import listed, quoted
 
 What = Literal["position", "velocity", "effort", "motor_position"]
 

@@ -22,10 +22,10 @@ from psdmc.calibration.description.guess import (
     velocity_unit,
 )
 from psdmc.calibration.description.units import UNITS
+from psdmc.calibration.logs.foreign_bytes import quoted
 from psdmc.calibration.logs.formats import format_of
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
 from psdmc.calibration.logs.log_format import Columns, Opening
-from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 
 WHATS: tuple[What, ...] = ("position", "velocity", "effort", "motor_position")

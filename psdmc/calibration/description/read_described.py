@@ -23,12 +23,10 @@ from psdmc.calibration.description.table_coupling import COUPLING, CouplingEntry
 from psdmc.calibration.description.table_logs import CSV_FORM, LOGS, TIME, LogEntry, TimeEntry
 from psdmc.calibration.description.table_quantities import refused
 from psdmc.calibration.identify.motor_model import coupling_of
-from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED_ROWS
+from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED_ROWS, listed
 from psdmc.calibration.logs.formats import format_of
-from psdmc.calibration.logs.log import Array, Quantity, date_of
+from psdmc.calibration.logs.log import HELD_BYTES, AnyLog, Array, Quantity, RowStore, StoredLog, date_of
 from psdmc.calibration.logs.log_format import Columns, Opening
-from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
-from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 from psdmc.progress import Progress
 

@@ -10,8 +10,8 @@ import numpy as np
 from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.description.table_joints import require_joints
 from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, shown
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.model.calibrated import Matrix
 
 KEYS = ("joints", "matrix", "quantities")

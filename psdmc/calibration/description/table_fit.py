@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.low_pass import LARGEST_CUTOFF, SMALLEST_CUTOFF
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
-from psdmc.calibration.logs.wording import listed
 from psdmc.friction.terms import expected_words, options_of
 
 KEYS = ("cutoff", "held_out", "blocks", "friction", "sign_speed")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.description.table_quantities import Entry, entry_of
 from psdmc.calibration.description.units import UNITS
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
-from psdmc.calibration.logs.wording import listed, quoted
 
 MOST_JOINTS = 200
 KEYS = ("name", "logged_as", *UNITS)

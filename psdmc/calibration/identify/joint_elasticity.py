@@ -33,13 +33,12 @@ from psdmc.calibration.logs.filter import (
     held_out_of,
     stretches,
 )
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.foreign_bytes import listed
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import noise_like
 from psdmc.calibration.logs.smoothed_rows import smoothed_rows
-from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 from psdmc.friction.law import unit_of
 from psdmc.model.calibrated import IDENTIFIED, WEAK, NumberRow, Remark

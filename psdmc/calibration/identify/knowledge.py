@@ -12,9 +12,9 @@ import numpy as np
 from psdmc.calibration.identify.essential import EssentialOptions
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.physical import NO_BOUNDS, Bounds, whitening_of
+from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.inertia import six_of

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.logs.filter import stretches
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.smoothed_rows import smoothed_rows
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.model import recursive

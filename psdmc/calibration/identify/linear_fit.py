@@ -26,9 +26,8 @@ from psdmc.calibration.identify.linear_problem import LinearProblem, extra_scale
 from psdmc.calibration.identify.motor_model import Motors, RowsByMotors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import noise_warnings
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import checked
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.robot.mechanism import Mechanism
 
 

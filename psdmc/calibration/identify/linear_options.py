@@ -10,10 +10,10 @@ from typing import Any
 from psdmc.calibration.columns.columns import Columns, read_columns
 from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.log import HELD_BYTES
 from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.stored_log import HELD_BYTES
 from psdmc.friction.law import Term
 from psdmc.friction.terms import every_joint_s
 from psdmc.model.calibrated import Matrix

@@ -17,10 +17,9 @@ from psdmc.calibration.identify.linear_rows import KeptRows
 from psdmc.calibration.identify.motor_model import Coupling, Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.filter import States, held_out_of, stretches
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.parts import each_part
 from psdmc.calibration.logs.smoothed_rows import smoothed_rows
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.friction.law import At, Term
 from psdmc.progress import Step
 from psdmc.robot.mechanism import Mechanism

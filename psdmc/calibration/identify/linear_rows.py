@@ -9,9 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import Array, RowStore
 from psdmc.calibration.logs.parts import in_threads
-from psdmc.calibration.logs.stored_log import RowStore
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,9 +19,8 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.filter import States, stretches
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.smoothed_rows import smoothed_rows
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.dynamics.parameters import inertia_matrix, inertia_of, second_moments
 from psdmc.errors import InputError
 from psdmc.links.pseudo_inertias import pseudo_inertia, require_cvxpy

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.identify.linear_rows import Block, Rows
-from psdmc.calibration.logs.log import Array, Quantity
-from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.logs.wording import first_faults, listed, quoted
+from psdmc.calibration.logs.foreign_bytes import first_faults, listed, quoted
+from psdmc.calibration.logs.log import AnyLog, Array, Quantity
 from psdmc.errors import InputError
 from psdmc.model.calibrated import Matrix
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import FitOptions
+from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.wording import listed
 from psdmc.model.calibrated import IDENTIFIED, SHOWN, WEAK, Remark
 
 TOGETHER_WORDS = "only in combination with "

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate
 
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log import AnyLog, Array, Log, once
 from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import (
@@ -20,7 +20,6 @@ from psdmc.calibration.logs.low_pass import (
     position_noise,
     resting,
 )
-from psdmc.calibration.logs.stored_log import AnyLog, once
 from psdmc.errors import InputError
 
 

@@ -1,5 +1,5 @@
 """Opens files from other programs with a limit of their size, and converts every error of a decoder to an InputError. It
-also limits the size of tables and the names of their columns."""
+also limits the size of tables, the names of their columns, and the length of what messages repeat of a file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from psdmc.calibration.logs.wording import LONGEST_QUOTE, listed, quoted
 from psdmc.errors import InputError, PsdmcError
 
 LARGEST_FILE = 2 * 1024**3
@@ -133,3 +132,30 @@ def require_names(names: Sequence[str], name: str) -> None:
         raise InputError(
             f"{name}: control characters in the name of column(s) {listed(odd)}", "rename the column"
         )
+
+
+# What messages repeat of a file
+
+
+LONGEST_QUOTE = 60
+"""Characters of a file's text in a message."""
+MOST_NAMES = 8
+"""Names in one message."""
+MOST_FAULTS = 3
+"""Faults in one message: the first ones usually cause the others."""
+
+
+def quoted(text: str) -> str:
+    """Return a text of a file for a message: in quotes, with escaped control characters, and shortened if it is long."""
+    return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
+
+
+def listed(names: Sequence[str], most: int = MOST_NAMES, between: str = ", ") -> str:
+    """Return a list of names such as 'a, b, c and 9 more'."""
+    shown = between.join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def first_faults(faults: Sequence[str]) -> str:
+    """Return a list of faults such as 'this; that and 9 more'."""
+    return listed(faults, MOST_FAULTS, "; ")

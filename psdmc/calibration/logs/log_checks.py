@@ -9,10 +9,9 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.foreign_bytes import first_faults, listed
+from psdmc.calibration.logs.log import AnyLog, Log, StoredLog
 from psdmc.calibration.logs.log_survey import Survey, surveyed
-from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
-from psdmc.calibration.logs.wording import first_faults, listed
 from psdmc.errors import InputError
 from psdmc.model.calibrated import Remark, code_of
 from psdmc.robot.mechanism import Mechanism

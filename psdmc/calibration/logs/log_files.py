@@ -9,41 +9,43 @@ log's notes say so.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from psdmc.atomic import make_folder, whole_file
-from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, LARGEST_STORED_ROWS, opened, require_size
+from psdmc.calibration.logs.foreign_bytes import (
+    LARGEST_STORED,
+    LARGEST_STORED_ROWS,
+    listed,
+    opened,
+    quoted,
+    require_size,
+)
 from psdmc.calibration.logs.formats import format_of, table_of
-from psdmc.calibration.logs.log import Array, Log, Quantity, date_of
+from psdmc.calibration.logs.log import HELD_BYTES, AnyLog, Array, Log, Quantity, RowStore, StoredLog, date_of
 from psdmc.calibration.logs.log_format import TableFormat
-from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.progress import Progress, Step
 
-EFFORTS: tuple[tuple[str, Quantity], ...] = (
-    ("current_a", "current"),
-    ("motor_torque_nm", "motor_torque"),
-    ("motor_torque_n", "motor_torque"),
-    ("joint_torque_nm", "joint_torque"),
-    ("joint_torque_n", "joint_torque"),
-    ("effort_nm", "motor_torque"),
-    ("effort_n", "motor_torque"),
-)
 POSITIONS = ("position_rad", "position_m")
 VELOCITIES = ("velocity_rad_s", "velocity_m_s")
 MOTOR_POSITIONS = ("motor_position_rad", "motor_position_m")
 
-_EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
+WRITTEN_EFFORTS: Mapping[Quantity, tuple[str, str]] = {
     "current": ("current_a", "current_a"),
     "motor_torque": ("motor_torque_nm", "motor_torque_n"),
     "joint_torque": ("joint_torque_nm", "joint_torque_n"),
 }
-"""For turning and for sliding joints."""
+"""All of these are for turning and for sliding joints."""
+EFFORTS: tuple[tuple[str, Quantity], ...] = (
+    *((prefix, quantity) for quantity, own in WRITTEN_EFFORTS.items() for prefix in dict.fromkeys(own)),
+    ("effort_nm", "motor_torque"),
+    ("effort_n", "motor_torque"),
+)
+"""Prefixes that are read, with what their columns hold."""
 
 
 def read_log(path: str | Path) -> Log:
@@ -91,37 +93,21 @@ def _stored(path: Path, kind: TableFormat, size: int, progress: Progress, held: 
         names, pieces = kind.pieces(file, str(path))
         layout = layout_of(path.name, names)
         places = [names.index(column) for column in layout.columns]
-        store, times = RowStore(len(places), held), array("d")  # it grows in place
-        for piece in _counted(pieces, path, size, progress, file.tell):
+        store, times, count = RowStore(len(places), held), array("d"), 0  # an array grows in place
+        for piece in pieces:
+            count += len(piece)
+            if count > LARGEST_STORED_ROWS:
+                raise InputError(
+                    f"{path}: more than {LARGEST_STORED_ROWS:,} rows, expected at most that",
+                    "cut it into several",
+                )
+            share = min(file.tell() / size, 1.0)
+            progress(Step(f"reading {path.name}: {count:,} rows, {share:.0%}", share))
             times.frombytes(piece[:, names.index("time_s")].tobytes())
             store.append(np.ascontiguousarray(piece[:, places]))
     if not times:
         raise _no_rows(path)
     time = np.frombuffer(times)
-    return log_of_store(layout, time, store, date_of(float(time[0])))
-
-
-def _counted(
-    pieces: Iterator[Array], path: Path, size: int, progress: Progress, place: Callable[[], int]
-) -> Iterator[Array]:
-    count = 0
-    for piece in pieces:
-        count += len(piece)
-        if count > LARGEST_STORED_ROWS:
-            raise InputError(
-                f"{path}: more than {LARGEST_STORED_ROWS:,} rows, expected at most that",
-                "cut it into several",
-            )
-        share = min(place() / size, 1.0)
-        progress(Step(f"reading {path.name}: {count:,} rows, {share:.0%}", share))
-        yield piece
-
-
-def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> AnyLog:
-    """Return a log from rows of positions, velocities and efforts in a RowStore.
-
-    The rows of the log are in memory if those of the store are, else in a file.
-    """
     log = StoredLog(
         name=layout.name,
         joint_names=layout.joint_names,
@@ -133,7 +119,7 @@ def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> Any
         places=tuple(range(len(layout.joint_names))),
         notes=layout.notes,
         sliding=layout.sliding,
-        date=date,
+        date=date_of(float(time[0])),
         motors_at=len(layout.positions) + len(layout.velocities or ()) if layout.motors else 0,
     )
     return log if store.on_disk else log.held()
@@ -331,7 +317,7 @@ def columns_of(log: Log) -> dict[str, Array]:
         (POSITIONS, log.position),
         (VELOCITIES, log.velocity),
         (MOTOR_POSITIONS, log.motor_position),
-        (_EFFORT_COLUMNS[log.quantity], log.effort),
+        (WRITTEN_EFFORTS[log.quantity], log.effort),
     )
     for (turning, sliding), values in parts:
         for k, joint in enumerate(log.joint_names):

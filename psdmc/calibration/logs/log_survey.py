@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
-from psdmc.calibration.logs.stored_log import AnyLog, once
+from psdmc.calibration.logs.log import LARGEST_NUMBER, AnyLog, Array, Log, once
 from psdmc.model.grounds import at_level
 
 STRETCH_ROWS = 65_536

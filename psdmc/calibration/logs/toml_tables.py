@@ -8,8 +8,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, SHORTER, decoding, opened
-from psdmc.calibration.logs.wording import first_faults, listed, quoted
+from psdmc.calibration.logs.foreign_bytes import (
+    LARGEST_TOML,
+    SHORTER,
+    decoding,
+    first_faults,
+    listed,
+    opened,
+    quoted,
+)
 from psdmc.errors import InputError
 from psdmc.reading import read_rest
 

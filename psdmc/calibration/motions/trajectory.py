@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
 from psdmc.calibration.logs.log_files import column_names, read_columns, write_columns
-from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 

@@ -16,8 +16,8 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
 
 RELATIVE_ERROR = 1e-8

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, SHORTER, decoding, opened
+from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, SHORTER, decoding, listed, opened, quoted
 from psdmc.calibration.logs.toml_tables import (
     TomlTable,
     is_number,
@@ -24,7 +24,6 @@ from psdmc.calibration.logs.toml_tables import (
     shown,
     toml_content,
 )
-from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.friction.law import Term
 from psdmc.friction.laws import LAWS

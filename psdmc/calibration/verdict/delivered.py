@@ -38,11 +38,10 @@ from psdmc.calibration.logs.filter import (
     independent_rows,
     stretches,
 )
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.parts import each_part
 from psdmc.calibration.logs.smoothed_rows import smoothed_rows
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW

@@ -14,12 +14,11 @@ from psdmc.calibration.identify.motor_model import Coupling, Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.filter import States, Stretch, even_grid, independent_rows, stretches
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.log_survey import Saturated, surveyed
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
 from psdmc.calibration.logs.parts import each_part
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 
 SIGN_SPEED = 0.03

@@ -18,9 +18,9 @@ from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import CORRELATED
+from psdmc.calibration.logs.log import AnyLog
 from psdmc.calibration.logs.log_survey import Saturated
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.couplings import proposed_coupling
 from psdmc.calibration.verdict.delivered import delivered, sprung
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of

@@ -24,9 +24,8 @@ from psdmc.calibration.identify.visibility import (
     visibility_warnings,
     weak_notes,
 )
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import CheckOptions
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.errors import InternalError
 from psdmc.friction.law import Term

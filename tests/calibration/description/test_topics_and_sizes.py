@@ -15,9 +15,8 @@ from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.formats import WRITTEN
 from psdmc.calibration.logs.formats.ros2_bag import FORMAT as ROS2_BAG
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import Log, StoredLog
 from psdmc.calibration.logs.log_files import read_log, write_columns
-from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.sources import LogNaming
 from psdmc.errors import InputError
 

@@ -13,9 +13,8 @@ import psdmc
 from psdmc.calibration.calibrate import CalibrateOptions
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import AnyLog, Log
 from psdmc.calibration.logs.log_files import read_log, write_columns
-from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 

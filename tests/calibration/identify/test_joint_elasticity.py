@@ -17,9 +17,9 @@ from psdmc.calibration.identify.linear_options import ElasticityOptions, LinearO
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import FrictionRun, Robot, StepOptions
+from psdmc.calibration.logs.log import StoredLog
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.plant.spoiled import stuck
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError

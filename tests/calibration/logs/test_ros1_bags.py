@@ -12,9 +12,9 @@ import pytest
 from psdmc.calibration.logs import bag_sizes
 from psdmc.calibration.logs.bag_sizes import ROS1_MAGIC
 from psdmc.calibration.logs.formats import format_of, has_topics
+from psdmc.calibration.logs.log import StoredLog
 from psdmc.calibration.logs.log_files import open_log, read_log
 from psdmc.calibration.logs.log_format import Opening
-from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.errors import InputError
 
 rosbag1 = pytest.importorskip("rosbags.rosbag1")

@@ -15,12 +15,11 @@ from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_l
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import even_grid, filtered, independent_rows, noticed, stretches
 from psdmc.calibration.logs.formats import WRITTEN, npz, parquet, text
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import Log, RowStore, StoredLog, without_start
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.log_survey import surveyed
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
-from psdmc.calibration.logs.stored_log import RowStore, StoredLog, without_start
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 

@@ -20,9 +20,8 @@ from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_c
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import InertialRun
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import Log, StoredLog
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
-from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli import main

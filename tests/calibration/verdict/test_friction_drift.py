@@ -14,9 +14,8 @@ from worn_arm import COULOMB, VISCOUS, Worn, recorded
 from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import Log, StoredLog, without_start
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
-from psdmc.calibration.logs.stored_log import StoredLog, without_start
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.store import save

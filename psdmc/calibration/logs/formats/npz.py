@@ -13,7 +13,13 @@ from typing import IO, Any, BinaryIO
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import decoding, require_names, require_size, require_unpacked
+from psdmc.calibration.logs.foreign_bytes import (
+    decoding,
+    quoted,
+    require_names,
+    require_size,
+    require_unpacked,
+)
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_format import (
     NUMBERS,
@@ -25,7 +31,6 @@ from psdmc.calibration.logs.log_format import (
     refuse_dates,
     require_equal,
 )
-from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 
 ONE_COLUMN = "a log in npz form has one array per column: time_s, position_rad.<joint>, ..."

@@ -8,10 +8,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import decoding, require_names, require_size
+from psdmc.calibration.logs.foreign_bytes import decoding, quoted, require_names, require_size
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_format import PIECE_ROWS, Columns, Pieces, TableFormat, TextForm, refuse_dates
-from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from psdmc.calibration.logs.bag_sizes import require_ros1_sizes
 from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, LARGEST_STORED, opened
-from psdmc.calibration.logs.joint_state_bag import (
+from psdmc.calibration.logs.log_format import (
     MESSAGE_TYPE,
     BagFormat,
     any_reader_messages,

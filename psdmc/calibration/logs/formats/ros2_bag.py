@@ -17,7 +17,7 @@ from psdmc.calibration.logs.bag_sizes import (
     require_packed_messages,
 )
 from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, LARGEST_STORED, is_folder, opened
-from psdmc.calibration.logs.joint_state_bag import (
+from psdmc.calibration.logs.log_format import (
     MESSAGE_TYPE,
     BagFormat,
     any_reader_messages,

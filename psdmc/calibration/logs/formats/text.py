@@ -17,10 +17,16 @@ from typing import BinaryIO
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, decoding, require_names, require_size
+from psdmc.calibration.logs.foreign_bytes import (
+    LARGEST_FILE,
+    SHORTER,
+    decoding,
+    quoted,
+    require_names,
+    require_size,
+)
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_format import Columns, Pieces, TableFormat, TextForm
-from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 from psdmc.reading import in_words, read_rest
 

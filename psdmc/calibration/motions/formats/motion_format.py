@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.logs.wording import quoted
+from psdmc.calibration.logs.foreign_bytes import quoted
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.errors import InputError
 
