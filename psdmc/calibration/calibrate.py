@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
-from psdmc.calibration.description.table_fit import FitChoice
+from psdmc.calibration.description.description import FitChoice
 from psdmc.calibration.identify.essential import Essential, EssentialOptions, essential
 from psdmc.calibration.identify.four_steps import (
     FourSteps,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.columns.columns import Columns
-from psdmc.calibration.description.table_fit import FitChoice
+from psdmc.calibration.description.description import FitChoice
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import names_of

@@ -8,9 +8,14 @@ from pathlib import Path
 
 from psdmc.calibration.campaign_file import is_campaign
 from psdmc.calibration.description.columns_found import torque_constants
-from psdmc.calibration.description.description import is_description, read_description
+from psdmc.calibration.description.description import (
+    FIT,
+    FitChoice,
+    is_description,
+    read_description,
+    with_choice,
+)
 from psdmc.calibration.description.read_described import described_logs
-from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.formats import has_topics

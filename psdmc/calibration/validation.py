@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats
 
 from psdmc.calibration.campaign_file import tested_logs
-from psdmc.calibration.description.table_fit import FitChoice
+from psdmc.calibration.description.description import FitChoice
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_quantity
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor

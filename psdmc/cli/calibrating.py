@@ -20,7 +20,7 @@ from psdmc.cli.console import one_line, say_next, steps
 from psdmc.errors import InputError
 
 if TYPE_CHECKING:
-    from psdmc.calibration.description.table_fit import FitChoice
+    from psdmc.calibration.description.description import FitChoice
     from psdmc.calibration.sources import LogNaming
 
 Topic = Annotated[
@@ -259,7 +259,7 @@ def fit_choice(
     cutoff: float | None, split: str | None, friction: Sequence[str] | None, warm: float | None
 ) -> FitChoice:
     """Return the options of the linear fit that the command line gives. Raise InputError if a value is wrong."""
-    from psdmc.calibration.description.table_fit import FitChoice, split_of
+    from psdmc.calibration.description.description import FitChoice, split_of
     from psdmc.friction.terms import EXAMPLE, options_of
 
     exponents, offset = None, None

@@ -5,52 +5,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from psdmc.calibration.description.description import LogDescription
-from psdmc.calibration.description.table_joints import JOINTS, JointEntry
-from psdmc.calibration.description.table_quantities import (
-    EFFORT,
-    MOTOR_POSITION,
-    POSITION,
-    VELOCITY,
+from psdmc.calibration.description.joint_tables import (
+    JOINTS,
+    QUANTITIES,
+    TICKS,
+    UNITS,
     Entry,
+    JointEntry,
+    Says,
+    What,
     refused,
 )
-from psdmc.calibration.description.units import TICKS, UNITS, Says
 from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import Quantity
+from psdmc.calibration.logs.log_files import EFFORTS
 from psdmc.calibration.logs.log_format import Columns
 
-What = Literal["position", "velocity", "effort", "motor_position"]
+_UNIT_BY_ENDING = {"a": "A", "nm": "Nm", "n": "N"}
 
-USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
-    "position": {
-        "position_rad": ("rad", "motor_torque"),
-        "position_m": ("m", "motor_torque"),
-        "position": ("", "motor_torque"),
-    },
-    "velocity": {
-        "velocity_rad_s": ("rad/s", "motor_torque"),
-        "velocity_m_s": ("m/s", "motor_torque"),
-        "velocity": ("", "motor_torque"),
-    },
-    "effort": {
-        "current_a": ("A", "current"),
-        "motor_torque_nm": ("Nm", "motor_torque"),
-        "motor_torque_n": ("N", "motor_torque"),
-        "joint_torque_nm": ("Nm", "joint_torque"),
-        "joint_torque_n": ("N", "joint_torque"),
-        "effort_nm": ("Nm", "motor_torque"),
-        "effort_n": ("N", "motor_torque"),
-        "effort": ("", "motor_torque"),
-    },
-    "motor_position": {
-        "motor_position_rad": ("rad", "motor_torque"),
-        "motor_position_m": ("m", "motor_torque"),
-    },
+USUAL: Mapping[What, Mapping[str, str]] = {
+    "position": {"position_rad": "rad", "position_m": "m", "position": ""},
+    "velocity": {"velocity_rad_s": "rad/s", "velocity_m_s": "m/s", "velocity": ""},
+    "effort": {prefix: _UNIT_BY_ENDING[prefix.rpartition("_")[2]] for prefix in EFFORTS} | {"effort": ""},
+    "motor_position": {"motor_position_rad": "rad", "motor_position_m": "m"},
 }
-"""Columns that need no naming, PREFIX.<joint>: their units (none: SI), and for effort what they hold."""
+"""Units of columns that need no naming, PREFIX.<joint>; empty: SI."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,20 +77,24 @@ def joint_columns(
     said = {joint.name: joint for joint in description.part(JOINTS)}
     found = []
     for name in joint_names:
-        own = said.get(name, JointEntry(name, name, Entry(), Entry(), Entry()))
-        position = _found(own, "position", own.position.over(description.part(POSITION)), tables)
-        effort = _found(own, "effort", own.effort.over(description.part(EFFORT)), tables)
-        velocity = _found(own, "velocity", own.velocity.over(description.part(VELOCITY)), tables)
+        own = said.get(name, JointEntry(name, name, {}))
+        position = _found(own, "position", description, tables)
+        effort = _found(own, "effort", description, tables)
+        velocity = _found(own, "velocity", description, tables)
         if position is None or effort is None:
             raise _missing(own, "position" if position is None else "effort", tables)
-        second = own.motor_position.over(description.part(MOTOR_POSITION))
-        motor = _found(own, "motor_position", second, tables)
+        motor = _found(own, "motor_position", description, tables)
         found.append(JointColumns(name, position, velocity, effort, motor))
     return tuple(found)
 
 
-def _found(joint: JointEntry, what: What, entry: Entry, tables: Mapping[str, Columns]) -> Found | None:
-    where = f"joint {quoted(joint.name)}: {what}"
+def _found(
+    joint: JointEntry, what: What, description: LogDescription, tables: Mapping[str, Columns]
+) -> Found | None:
+    where, entry = (
+        f"joint {quoted(joint.name)}: {what}",
+        joint.entry(what, description.part(QUANTITIES[what])),
+    )
     unit, quantity = entry.unit or "", entry.quantity or "motor_torque"
     if entry.column is not None:
         table, place = place_of(entry.column, entry.table, tables, where)
@@ -117,15 +102,11 @@ def _found(joint: JointEntry, what: What, entry: Entry, tables: Mapping[str, Col
         usual = _usual(joint, what, tables)
         if usual is None:
             return None
-        table, place, implied, held = usual
-        unit, quantity = unit or implied, entry.quantity or held
-    return _converted(where, what, replace_unit(entry, unit), (table, place), quantity)
-
-
-def replace_unit(entry: Entry, unit: str) -> Entry:
-    """Return a copy of the entry with the unit `unit`. Fields about encoder ticks or currents that contradict this unit
-    are dropped. If `unit` is empty, the entry is returned unchanged."""
-    return Entry(unit=unit or None).over(entry)
+        table, place, prefix = usual
+        unit = unit or USUAL[what][prefix]
+        quantity = entry.quantity or EFFORTS.get(prefix, "motor_torque")
+    # fields about encoder ticks or currents that contradict the unit are dropped
+    return _converted(where, what, Entry(unit=unit or None).over(entry), (table, place), quantity)
 
 
 def _converted(where: str, what: What, entry: Entry, at: tuple[str, int], quantity: Quantity) -> Found:
@@ -153,22 +134,20 @@ def _converted(where: str, what: What, entry: Entry, at: tuple[str, int], quanti
     return Found(at[0], at[1], factor, entry.offset or 0.0, says, entry.delay or 0.0, quantity, entry)
 
 
-def _usual(
-    joint: JointEntry, what: What, tables: Mapping[str, Columns]
-) -> tuple[str, int, str, Quantity] | None:
-    """Table, place, unit and quantity of the one column that is called PREFIX.<joint>."""
+def _usual(joint: JointEntry, what: What, tables: Mapping[str, Columns]) -> tuple[str, int, str] | None:
+    """Table, place and prefix of the one column that is called PREFIX.<joint>."""
     hits = [
-        (table, columns.names.index(f"{prefix}.{joint.logged_as}"), unit, quantity, prefix)
+        (table, columns.names.index(f"{prefix}.{joint.logged_as}"), prefix)
         for table, columns in tables.items()
-        for prefix, (unit, quantity) in USUAL[what].items()
+        for prefix in USUAL[what]
         if f"{prefix}.{joint.logged_as}" in columns.names
     ]
     if len(hits) > 1:
-        both = listed([quoted(f"{hit[4]}.{joint.logged_as}") for hit in hits])
+        both = listed([quoted(f"{prefix}.{joint.logged_as}") for _, _, prefix in hits])
         raise refused(
             f"joint {quoted(joint.name)}: {what}: columns {both}, expected one, or its name in [[joint]]"
         )
-    return hits[0][:4] if hits else None
+    return hits[0] if hits else None
 
 
 def place_of(
@@ -229,56 +208,35 @@ def held_quantity(efforts: Sequence[tuple[str, Found]], coupled: bool) -> Quanti
     Currents remain currents if all joints have currents and no joint is driven by several motors. Otherwise, currents
     are converted to torques. Raises InputError if torques of two kinds would mix, or if a torque constant is missing.
     """
-    _require_motor_torques(efforts)
-    held = {found.quantity for _, found in efforts}
-    if held == {"current"} and not coupled:
-        _require_known_gears(efforts)
-        return "current"
-    torques = sorted(held - {"current"})
-    if "current" in held and "joint_torque" in held:
-        both = ", ".join(f"{quoted(name)} {found.quantity}" for name, found in efforts)
-        raise refused(f"effort: {both}: currents make motor torques, expected one quantity")
-    if len(torques) > 1:
-        both = ", ".join(f"{quoted(name)} {found.quantity}" for name, found in efforts)
-        raise refused(f"effort: joints hold {both}, expected one quantity")
-    lacking = [
-        quoted(name)
-        for name, found in efforts
-        if found.quantity == "current" and found.entry.torque_constant is None
-    ]
-    if lacking:
-        why = "motors are coupled" if coupled else "other joints hold torques"
-        raise refused(
-            f"effort: torque_constant missing for joint(s) {listed(lacking)}: {why}, expected N m/A"
-        )
-    return "joint_torque" if torques == ["joint_torque"] else "motor_torque"
-
-
-def _require_motor_torques(efforts: Sequence[tuple[str, Found]]) -> None:
-    """A current is of a motor, whose torque has friction in it."""
-    odd = [
-        quoted(name)
-        for name, found in efforts
-        if found.quantity == "current" and found.entry.quantity == "joint_torque"
-    ]
-    if odd:
+    currents = [(name, found.entry) for name, found in efforts if found.quantity == "current"]
+    odd = [quoted(name) for name, entry in currents if entry.quantity == "joint_torque"]
+    if odd:  # a current is of a motor, whose torque has friction in it
         raise refused(
             f"effort: quantity 'joint_torque' of joint(s) {listed(odd)}, whose unit is A or mA: expected "
             "'motor_torque', which it is unless said"
         )
-
-
-def _require_known_gears(efforts: Sequence[tuple[str, Found]]) -> None:
-    odd = [
-        quoted(name)
-        for name, found in efforts
-        if found.entry.gear_ratio is not None and found.entry.torque_constant is None
-    ]
-    if odd:
+    held = {found.quantity for _, found in efforts}
+    lacking = [(quoted(name), entry) for name, entry in currents if entry.torque_constant is None]
+    if held == {"current"} and not coupled:
+        odd = [name for name, entry in lacking if entry.gear_ratio is not None]
+        if odd:
+            raise refused(
+                f"effort: gear_ratio without torque_constant for joint(s) {listed(odd)}, expected both, or neither "
+                "and --torque-constants of joint and gear together"
+            )
+        return "current"
+    torques = sorted(held - {"current"})
+    both = ", ".join(f"{quoted(name)} {found.quantity}" for name, found in efforts)
+    if "current" in held and "joint_torque" in held:
+        raise refused(f"effort: {both}: currents make motor torques, expected one quantity")
+    if len(torques) > 1:
+        raise refused(f"effort: joints hold {both}, expected one quantity")
+    if lacking:
+        why = "motors are coupled" if coupled else "other joints hold torques"
         raise refused(
-            f"effort: gear_ratio without torque_constant for joint(s) {listed(odd)}, expected both, or neither "
-            "and --torque-constants of joint and gear together"
+            f"effort: torque_constant missing for joint(s) {listed([name for name, _ in lacking])}: {why}, expected N m/A"
         )
+    return "joint_torque" if torques == ["joint_torque"] else "motor_torque"
 
 
 def torque_factor(found: Found, quantity: Quantity) -> float:
@@ -291,9 +249,9 @@ def torque_factor(found: Found, quantity: Quantity) -> float:
 
 def torque_constants(description: LogDescription, joint_names: Sequence[str]) -> dict[str, float]:
     """Return the torque constants, N m/A at the joint (after the gear), that the description gives, by joint."""
-    said = {joint.name: joint.effort for joint in description.part(JOINTS)}
-    usual = description.part(EFFORT)
-    entries = {name: said[name].over(usual) if name in said else usual for name in joint_names}
+    said = {joint.name: joint for joint in description.part(JOINTS)}
+    common = description.part(QUANTITIES["effort"])
+    entries = {name: said[name].entry("effort", common) if name in said else common for name in joint_names}
     return {
         name: entry.torque_constant * (entry.gear_ratio or 1.0)
         for name, entry in entries.items()

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibration.description.columns_found import What
 from psdmc.calibration.description.guess import (
     GEARLESS,
     Guess,
@@ -21,7 +20,7 @@ from psdmc.calibration.description.guess import (
     unit_of,
     velocity_unit,
 )
-from psdmc.calibration.description.units import UNITS
+from psdmc.calibration.description.joint_tables import UNITS, What
 from psdmc.calibration.logs.foreign_bytes import quoted
 from psdmc.calibration.logs.formats import format_of
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array

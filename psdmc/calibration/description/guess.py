@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from psdmc.calibration.description.columns_found import USUAL, What
-from psdmc.calibration.description.units import UNITS
+from psdmc.calibration.description.columns_found import USUAL
+from psdmc.calibration.description.joint_tables import UNITS, What
 from psdmc.calibration.logs.log import Array
 
 WORDS: Mapping[What, tuple[str, ...]] = {
@@ -262,7 +262,7 @@ def spelled_unit(what: What, names: Sequence[str]) -> str:
     for name in names:
         prefix = name.partition(".")[0]
         if prefix in USUAL[what]:
-            return USUAL[what][prefix][0]
+            return USUAL[what][prefix]
         words = re.findall(r"[a-z]+", name.lower())
         hit = next((unit for word, unit in SPELLED[what].items() if word in words), "")
         if hit:

@@ -18,10 +18,15 @@ from psdmc.calibration.description.columns_found import (
     place_of,
     torque_factor,
 )
-from psdmc.calibration.description.description import LogDescription
-from psdmc.calibration.description.table_coupling import COUPLING, CouplingEntry
-from psdmc.calibration.description.table_logs import CSV_FORM, LOGS, TIME, LogEntry, TimeEntry
-from psdmc.calibration.description.table_quantities import refused
+from psdmc.calibration.description.description import (
+    CSV_FORM,
+    LOGS,
+    TIME,
+    LogDescription,
+    LogEntry,
+    TimeEntry,
+)
+from psdmc.calibration.description.joint_tables import COUPLING, CouplingEntry, refused
 from psdmc.calibration.identify.motor_model import coupling_of
 from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED_ROWS, listed
 from psdmc.calibration.logs.formats import format_of

@@ -40,12 +40,10 @@ WRITTEN_EFFORTS: Mapping[Quantity, tuple[str, str]] = {
     "joint_torque": ("joint_torque_nm", "joint_torque_n"),
 }
 """All of these are for turning and for sliding joints."""
-EFFORTS: tuple[tuple[str, Quantity], ...] = (
-    *((prefix, quantity) for quantity, own in WRITTEN_EFFORTS.items() for prefix in dict.fromkeys(own)),
-    ("effort_nm", "motor_torque"),
-    ("effort_n", "motor_torque"),
-)
-"""Prefixes that are read, with what their columns hold."""
+EFFORTS: Mapping[str, Quantity] = {
+    prefix: quantity for quantity, both in WRITTEN_EFFORTS.items() for prefix in both
+} | {"effort_nm": "motor_torque", "effort_n": "motor_torque"}
+"""What columns hold, by the prefix of their names: those that psdmc writes, and others that it reads."""
 
 
 def read_log(path: str | Path) -> Log:
@@ -260,7 +258,7 @@ def _efforts(
     name: str, columns: Sequence[str], joints: tuple[str, ...]
 ) -> tuple[Quantity, list[str], tuple[str, ...]]:
     present = {column.partition(".")[0] for column in columns}
-    kinds = {quantity: prefix for prefix, quantity in EFFORTS if prefix in present}
+    kinds = {quantity: prefix for prefix, quantity in EFFORTS.items() if prefix in present}
     if not kinds:
         wanted = "current_a.<joint>, motor_torque_nm.<joint> or joint_torque_nm.<joint>"
         raise InputError(f"{name}: no column of current or torque", f"expected {wanted}; {DRAFTED}")
@@ -268,7 +266,7 @@ def _efforts(
         both = " and ".join(f"{prefix} ({quantity})" for quantity, prefix in kinds.items())
         raise InputError(f"{name}: columns of {both}: only one kind can be read", "leave the others out")
     quantity = next(iter(kinds))
-    prefixes = [prefix for prefix, kind in EFFORTS if kind == quantity]
+    prefixes = [prefix for prefix, kind in EFFORTS.items() if kind == quantity]
     found: dict[str, str] = {}
     for joint in joints:
         own = [f"{prefix}.{joint}" for prefix in prefixes if f"{prefix}.{joint}" in columns]

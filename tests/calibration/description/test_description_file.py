@@ -7,9 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from psdmc.calibration.description.description import is_description, read_description
-from psdmc.calibration.description.table_fit import FIT, FitChoice
-from psdmc.calibration.description.table_logs import LOGS, LogEntry
+from psdmc.calibration.description.description import (
+    FIT,
+    LOGS,
+    FitChoice,
+    LogEntry,
+    is_description,
+    read_description,
+)
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.errors import InputError

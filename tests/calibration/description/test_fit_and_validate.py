@@ -53,6 +53,6 @@ def test_a_log_for_validation_is_held_out_whole_and_the_other_fitted_whole(folde
 
 def psdmc_options(cutoff: float):
     from psdmc.calibration.calibrate import CalibrateOptions
-    from psdmc.calibration.description.table_fit import FitChoice
+    from psdmc.calibration.description.description import FitChoice
 
     return CalibrateOptions(choice=FitChoice(cutoff=cutoff))
