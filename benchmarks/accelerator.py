@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 import psdmc
-from psdmc.atomic import write_whole
 from psdmc.backends.cuda.names import symbol_of
 from psdmc.backends.cuda.package import BLOCK
 from psdmc.backends.info import EmitOptions
 from psdmc.bench.cases import LEGGED, robot_data
 from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import InputError, exit_status_of
+from psdmc.files import write_whole
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel

@@ -95,7 +95,7 @@ OUTSIDE = {
     "compiler": {"numpy"},
     "mujoco": {"numpy"},
     "sampling": {"numpy", "scipy", "pyarrow", "distributed"},
-    "cluster": {"distributed"},
+    "workers": {"distributed"},
     "cli": {"typer", "rich", "numpy"},
 }
 
@@ -126,12 +126,10 @@ ROOMS = {
 SHARED = {
     "errors",
     "version",
-    "atomic",
-    "cluster",
-    "reading",
+    "files",
     "garbage",
-    "processes",
     "progress",
+    "workers",
     "real_arrays",
     "reproducible",
 }

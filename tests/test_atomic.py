@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from full_disk import files_of_at_most
 
-from psdmc.atomic import check_place, remove_leftovers, whole_file, write_together, write_whole
 from psdmc.errors import InputError, ToolchainError
+from psdmc.files import check_place, remove_leftovers, whole_file, write_together, write_whole
 
 TOO_LITTLE = 10_000
 
@@ -124,7 +124,7 @@ def test_an_error_of_the_writer_leaves_the_old_file(tmp_path: Path):
 
 KILLED = """
 import os, signal, sys
-from psdmc.atomic import whole_file
+from psdmc.files import whole_file
 with whole_file(sys.argv[1]) as own:
     own.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -154,10 +154,10 @@ def test_a_living_writers_file_and_foreign_ones_stay(tmp_path: Path):
 
 def test_a_temporary_file_taken_for_a_leftover_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Somebody tidies between the file's making and its locking."""
-    import psdmc.atomic as atomic
+    from psdmc import files
 
     first = [True]
-    lock = atomic.lock
+    lock = files.lock
 
     def late(handle: int, wait: bool = True) -> bool:
         if wait and first:
@@ -165,7 +165,7 @@ def test_a_temporary_file_taken_for_a_leftover_is_made_again(tmp_path: Path, mon
             remove_leftovers(tmp_path)
         return lock(handle, wait)
 
-    monkeypatch.setattr(atomic, "lock", late)
+    monkeypatch.setattr(files, "lock", late)
     write_whole(tmp_path / "file", "x")
     assert (tmp_path / "file").read_text() == "x"
     assert names(tmp_path) == ["file"]

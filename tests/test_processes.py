@@ -14,7 +14,7 @@ import pytest
 
 from psdmc import processes
 from psdmc.errors import ToolchainError
-from psdmc.processes import in_a_new_process, in_processes
+from psdmc.workers import in_a_new_process, in_processes
 
 
 def process_of(job: int) -> tuple[int, int]:
@@ -89,7 +89,7 @@ HANGING = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from psdmc.processes import in_processes
+from psdmc.workers import in_processes
 from psdmc.cli.boundary import Interrupted, as_error
 from test_processes import hang
 

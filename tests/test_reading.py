@@ -19,7 +19,7 @@ from command_line import typed
 import psdmc
 from psdmc.calibration.logs.formats.text import PIECE_BYTES, whole_lines
 from psdmc.errors import InputError
-from psdmc.reading import in_words, read_file, read_rest
+from psdmc.files import in_words, read_file, read_rest
 
 PACKAGE = Path(psdmc.__file__).parent
 

@@ -27,7 +27,7 @@ from scipy.stats import qmc
 from unoptimised import without_optimisation
 
 import psdmc
-from psdmc import cluster, sampling
+from psdmc import sampling, workers
 from psdmc.calibration.logs.log_files import write_columns
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError, ToolchainError
@@ -582,6 +582,6 @@ def test_a_scheduler_that_does_not_answer_is_named(
     arm: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "CONNECT", "0.1s")
+    monkeypatch.setattr(workers, "CONNECT", "0.1s")
     with pytest.raises(ToolchainError, match=r"--scheduler tcp://127\.0\.0\.1:9: does not answer: "):
         sampling.sample(arm, tmp_path / "new", WHAT, scheduler="tcp://127.0.0.1:9")

@@ -15,8 +15,8 @@ from typing import Any
 
 from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.errors import InputError
+from psdmc.files import read_file
 from psdmc.model.parameter_table import BaseParameters
-from psdmc.reading import read_file
 
 SCHEMA = 1
 GENERATOR = "psdmc"

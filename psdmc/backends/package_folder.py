@@ -19,14 +19,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from psdmc.atomic import (
-    missing_folders,
-    refuse_foreign_folder,
-    remove_if_empty,
-    remove_leftovers,
-    system_errors_at,
-    write_together,
-)
 from psdmc.backends.c.adapters import ADAPTERS
 from psdmc.backends.manifest import (
     GENERATOR,
@@ -43,6 +35,14 @@ from psdmc.backends.manifest import (
 )
 from psdmc.backends.protocol import BACK_ENDS
 from psdmc.errors import InputError
+from psdmc.files import (
+    missing_folders,
+    refuse_foreign_folder,
+    remove_if_empty,
+    remove_leftovers,
+    system_errors_at,
+    write_together,
+)
 from psdmc.target.native import NATIVE
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.atomic import write_whole
 from psdmc.bench.case import Case, generic_chain
 from psdmc.bench.cases import bundled_chain, derive_fresh, first_joints, standard_cases
 from psdmc.bench.defaults import ROUNDS
@@ -19,6 +18,7 @@ from psdmc.bench.results import as_text
 from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import Settings, run
 from psdmc.errors import exit_status_of
+from psdmc.files import write_whole
 from psdmc.progress import on_standard_error
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement, serial_parents

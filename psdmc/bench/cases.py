@@ -17,11 +17,11 @@ from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.processes import in_a_new_process
 from psdmc.reproducible import length
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism, Placement
+from psdmc.workers import in_a_new_process
 
 SEED = 4
 """Seed of generic inertias and geometry; printed with every result."""

@@ -14,15 +14,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from psdmc.atomic import make_folder, write_whole
 from psdmc.bench.build import counted_flags
 from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import Case
 from psdmc.bench.cases import standard_cases
 from psdmc.bench.rivals import psdmc_c
 from psdmc.errors import InputError, ToolchainError, exit_status_of
+from psdmc.files import make_folder, read_file, write_whole
 from psdmc.program.cost import cost
-from psdmc.reading import read_file
 from psdmc.toolchain.compiler_command import find_compiler
 
 BASELINE = Path("benchmarks") / "baseline.json"

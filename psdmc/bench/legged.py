@@ -11,13 +11,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from psdmc.atomic import write_whole
 from psdmc.bench.case import Case
 from psdmc.bench.cases import LEGGED, legged_cases
 from psdmc.bench.defaults import ROUNDS
 from psdmc.bench.results import BenchResult, CaseResult
 from psdmc.bench.run import Settings, run
 from psdmc.errors import exit_status_of
+from psdmc.files import write_whole
 from psdmc.progress import on_standard_error
 
 OURS, PINOCCHIO, CASADI = RIVALS = "psdmc factored", "Pinocchio header-only", "CasADi"

@@ -22,10 +22,10 @@ from psdmc.bench.states import COUNT, States, output_sizes
 from psdmc.bench.threads import measure_threads
 from psdmc.errors import ToolchainError
 from psdmc.functions import RECIPES
-from psdmc.processes import in_processes
 from psdmc.progress import Progress, silent, within
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.mechanism import Array
+from psdmc.workers import in_processes
 
 SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.atomic import make_folder, refuse_foreign_folder, write_whole
 from psdmc.calibration.campaign_file import FILE, STEPS, listed_runs
 from psdmc.calibration.campaign_plan import CampaignOptions as CampaignOptions
 from psdmc.calibration.campaign_plan import Plan as Plan
@@ -24,6 +23,7 @@ from psdmc.calibration.motions.excite import MEASURES, Excitation
 from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
 from psdmc.errors import InputError
+from psdmc.files import make_folder, refuse_foreign_folder, write_whole
 from psdmc.robot.limits import shown
 
 UNFINISHED = ".psdmc-unfinished"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from psdmc.atomic import write_whole
 from psdmc.calibration.campaign_file import is_campaign
 from psdmc.calibration.description.draft import drafted
 from psdmc.calibration.logs.log_files import column_names
 from psdmc.errors import InputError
+from psdmc.files import write_whole
 from psdmc.model.load import load
 
 MODEL_ARRAYS = {"manifest", "B"}

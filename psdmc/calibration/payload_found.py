@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.atomic import write_whole
 from psdmc.calibration.campaign_file import LARGEST_ARM, LARGEST_MASS, SMALLEST_MASS
 from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import read_toml
 from psdmc.errors import InputError
+from psdmc.files import write_whole
 from psdmc.model.calibrated import Verdict
 from psdmc.robot.inertia import INERTIA_NAMES, inertia_matrix, six_of
 

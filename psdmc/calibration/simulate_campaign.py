@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psdmc.atomic import make_folder, write_whole
 from psdmc.calibration.campaign_file import ListedRun, listed_runs
 from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, is_folder, listed
 from psdmc.calibration.logs.log_files import write_log
@@ -17,9 +16,9 @@ from psdmc.calibration.plant import elastic, plant_file, virtual_robot
 from psdmc.calibration.plant.plant_file import plant_texts
 from psdmc.calibration.plant.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
 from psdmc.errors import InputError
-from psdmc.processes import in_processes
+from psdmc.files import make_folder, read_file, write_whole
 from psdmc.progress import Step
-from psdmc.reading import read_file
+from psdmc.workers import in_processes
 
 INDEX = "simulated.json"
 LARGEST_INDEX = 1 << 20

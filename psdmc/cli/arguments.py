@@ -9,8 +9,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from psdmc.atomic import check_place
 from psdmc.errors import InputError
+from psdmc.files import check_place
 
 SEVERAL_WORDS: Mapping[str, int] = {"--gravity": 3, "--tool": 6}
 """Options of as many numbers, which may stand side by side: `--gravity 0 0 -9.81`."""

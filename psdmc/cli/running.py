@@ -141,10 +141,10 @@ def bench(
     ] = False,
 ) -> None:
     """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
-    from psdmc.atomic import write_whole
     from psdmc.bench.case import Case
     from psdmc.bench.results import as_text
     from psdmc.bench.run import Settings, run
+    from psdmc.files import write_whole
     from psdmc.model.load import load
     from psdmc.report.bench_page import write_page
 

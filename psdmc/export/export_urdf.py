@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.atomic import check_place, refuse_foreign_file, write_together, write_whole
 from psdmc.errors import InputError, InternalError
 from psdmc.export.bodies import Written, calibrated_friction_notes, joint_friction, written
 from psdmc.export.elements import as_text, exact, urdf_of
 from psdmc.export.from_source import urdf_with
 from psdmc.export.mjcf import MARK, mjcf_of
 from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_back
+from psdmc.files import check_place, refuse_foreign_file, write_together, write_whole
 from psdmc.links.physical_links import PhysicalLinks, physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from psdmc.errors import InputError
+from psdmc.files import read_file
 from psdmc.friction.law import At, Law, Scalar, Value
 from psdmc.friction.laws import LAWS
 from psdmc.program.program import Program, Slot
 from psdmc.program.text import parse, show
 from psdmc.program.trace import Tracer
-from psdmc.reading import read_file
 
 HINT = "docs/how-to/springs-and-friction.md shows a friction law"
 LARGEST_FILE = 1 << 20

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.errors import InputError
+from psdmc.files import read_file
 from psdmc.model import json_values
 from psdmc.model.calibrated import Calibrated
 from psdmc.model.calibrated_json import from_json
@@ -28,7 +29,6 @@ from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
-from psdmc.reading import read_file
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.zeros import leading_rows

@@ -22,8 +22,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.atomic import write_whole
 from psdmc.errors import InputError
+from psdmc.files import write_whole
 from psdmc.model.calibrated_json import as_json
 from psdmc.model.chain_json import MOST_JOINTS, chain_to_json, is_plain_chain
 from psdmc.model.expansion import BLOCKS, Entries, Expansion

@@ -11,11 +11,10 @@ from pathlib import Path
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from psdmc.atomic import write_whole
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import SCALED
 from psdmc.errors import InputError, exit_status_of
-from psdmc.reading import read_file
+from psdmc.files import read_file, write_whole
 from psdmc.report.bench_view import (
     FUNCTION_TITLES,
     OURS,
@@ -49,7 +48,7 @@ class RobotSection:
 
 
 def write_page(result: BenchResult, path: Path, command: str = COMMAND) -> None:
-    """The page at `path`; errors as psdmc.atomic.write_whole."""
+    """The page at `path`; errors as psdmc.files.write_whole."""
     write_whole(path, page(result, command))
 
 

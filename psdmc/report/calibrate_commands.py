@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
 from psdmc.backends.c.render import identifier
 from psdmc.backends.manifest import content_of
 from psdmc.calibration.actuators import actuator_files, calibrated_actuators
@@ -31,6 +30,7 @@ from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.errors import InputError
+from psdmc.files import refuse_foreign_folder, write_together, write_whole
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
 from psdmc.model.store import save

@@ -6,9 +6,9 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
 from psdmc.calibration.motions.excite import Excitation
+from psdmc.files import refuse_foreign_file, write_together
 from psdmc.model.calibrated import PROPOSED_COUPLING, WEAK, Calibrated, Verdict, code_of
 from psdmc.model.calibrated_json import document
 from psdmc.report.calibrate_plots import excitation_panels, step_panels

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.atomic import refuse_foreign_folder, write_together
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.validation import opened_logs
 from psdmc.calibration.verdict.delivered import delivered, delivered_quality
 from psdmc.errors import InputError
+from psdmc.files import refuse_foreign_folder, write_together
 from psdmc.friction.joints import rows_of
 from psdmc.friction.law import Array, At, Row, total
 from psdmc.friction.terms import OPTIONAL

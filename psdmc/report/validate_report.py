@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
 from psdmc.calibration.compared import Comparison, Curve
 from psdmc.calibration.validation import JointError, Validation
 from psdmc.calibration.verdict.changes import Change
+from psdmc.files import refuse_foreign_file, write_together
 from psdmc.report.calibrate_plots import MEASURED, PANEL, PREDICTED, RESIDUAL, alone, step_panels
 from psdmc.report.calibrate_report import FigureView
 from psdmc.report.calibrate_tables import number, r_squared, table

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.atomic import refuse_foreign_file, write_whole
 from psdmc.backends.c.render import environment
 from psdmc.calibration.campaign_file import is_campaign, listed_runs
 from psdmc.calibration.description.description import is_description
@@ -24,6 +23,7 @@ from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.slices import neutral
 from psdmc.errors import InputError
+from psdmc.files import refuse_foreign_file, write_whole
 from psdmc.links.physical_links import physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent

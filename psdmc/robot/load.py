@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.reading import in_words, read_file
+from psdmc.files import in_words, read_file
 from psdmc.reproducible import times
 from psdmc.robot import limits
 from psdmc.robot.closed_loops import Tables, closed_loops, loop_tables

@@ -17,7 +17,7 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from psdmc.errors import InputError
-from psdmc.reading import read_file
+from psdmc.files import read_file
 from psdmc.robot.limits import MAX_BYTES, MAX_COPIES, shown
 
 REPEATING = ("replicate", "composite", "flexcomp")

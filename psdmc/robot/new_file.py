@@ -7,8 +7,8 @@ import os
 from importlib import resources
 from pathlib import Path
 
-from psdmc.atomic import write_whole
 from psdmc.errors import InputError
+from psdmc.files import write_whole
 
 TEMPLATE = "template.toml"
 

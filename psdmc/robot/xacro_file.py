@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from psdmc.errors import InputError
-from psdmc.reading import read_file
+from psdmc.files import read_file
 from psdmc.robot.limits import MAX_BYTES, listed, shown
 
 REASON = 300

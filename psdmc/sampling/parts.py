@@ -20,16 +20,15 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at, write_whole
-from psdmc.cluster import at_once, connected
 from psdmc.errors import InputError, ToolchainError
+from psdmc.files import make_folder, read_file, refuse_foreign_folder, system_errors_at, write_whole
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load_bytes
 from psdmc.model.store import file_bytes
 from psdmc.progress import Progress, Step, silent
-from psdmc.reading import read_file
 from psdmc.robot.limits import shown
 from psdmc.sampling.plan import KEY, Plan, Sampling
+from psdmc.workers import at_once, connected
 
 MANIFEST = "sample.json"
 MOST_MANIFEST = 1 << 24

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at
 from psdmc.backends.manifest import edited_files
 from psdmc.errors import InputError, ToolchainError
+from psdmc.files import make_folder, refuse_foreign_folder, system_errors_at
 from psdmc.progress import Progress, Step, silent
 from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
 

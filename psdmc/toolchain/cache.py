@@ -19,8 +19,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from psdmc.atomic import can_lock, lock, unlock
 from psdmc.errors import ToolchainError
+from psdmc.files import can_lock, lock, unlock
 from psdmc.toolchain.cache_room import (
     cache_limit,
     hold,

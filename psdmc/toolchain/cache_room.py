@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from psdmc.atomic import lock
 from psdmc.errors import InputError, ToolchainError
+from psdmc.files import lock
 
 IN_USE = 600.0
 """Seconds after its last use during which an entry is kept whatever the limit: a process may be about to open it."""

@@ -22,10 +22,10 @@ from command_line import files_in
 from killable import run
 from slow_cases import slow_but_for
 
-from psdmc.atomic import whole_file
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_columns, write_log
 from psdmc.compiler import compile as compile_model
+from psdmc.files import whole_file
 from psdmc.model.load import load
 
 FEW = {"derive": 1, "emit-c": 1, "build": 1, "calibrate": 2, "excite": 1}

@@ -13,7 +13,7 @@ from psdmc.calibration.identify.residuals import CORRELATED, quality
 from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, Robot, StepOptions
 from psdmc.calibration.logs.log import Array
 from psdmc.model.calibrated import JointQuality, Remark, Sample, StepQuality
-from psdmc.processes import in_processes
+from psdmc.workers import in_processes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.atomic import make_folder, whole_file
 from psdmc.calibration.logs.foreign_bytes import (
     LARGEST_STORED,
     LARGEST_STORED_ROWS,
@@ -28,6 +27,7 @@ from psdmc.calibration.logs.formats import format_of, table_of
 from psdmc.calibration.logs.log import HELD_BYTES, AnyLog, Array, Log, Quantity, RowStore, StoredLog, date_of
 from psdmc.calibration.logs.log_format import TableFormat
 from psdmc.errors import InputError
+from psdmc.files import make_folder, whole_file
 from psdmc.progress import Progress, Step
 
 POSITIONS = ("position_rad", "position_m")

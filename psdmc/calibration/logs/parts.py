@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
-from psdmc.cluster import Lost, at_once, connected, result_of, submitted
+from psdmc.workers import Lost, at_once, connected, result_of, submitted
 
 AT_ONCE = 2
 """Parts in this process: NumPy and compiled functions let other threads run, and each part needs memory."""
@@ -72,7 +72,7 @@ _workers: ContextVar[Workers | None] = ContextVar("workers", default=None)
 def on_cluster(scheduler: str | None, said: Callable[[str], None]) -> Iterator[Workers | None]:
     """Within the block, the workers of a Dask scheduler compute the parts of logs; None: this process does.
 
-    scheduler  address, such as tcp://host:8786; see psdmc.cluster.connected for its errors
+    scheduler  address, such as tcp://host:8786; see psdmc.workers.connected for its errors
     said       function that is called with a sentence if the cluster is lost
     """
     if scheduler is None:

@@ -18,7 +18,7 @@ from psdmc.calibration.logs.foreign_bytes import (
     quoted,
 )
 from psdmc.errors import InputError
-from psdmc.reading import read_rest
+from psdmc.files import read_rest
 
 LONGEST_LINE = 500
 """Characters of a line: the standard library's reader takes time that grows with the square of a dotted key's parts."""

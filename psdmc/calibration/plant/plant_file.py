@@ -25,11 +25,11 @@ from psdmc.calibration.logs.toml_tables import (
     toml_content,
 )
 from psdmc.errors import InputError
+from psdmc.files import read_rest
 from psdmc.friction.law import Term
 from psdmc.friction.laws import LAWS
 from psdmc.friction.own import laws_of, read_law
 from psdmc.friction.terms import WITH_STATE, named
-from psdmc.reading import read_rest
 from psdmc.robot.dh import read_dh
 from psdmc.robot.tree import default_tip
 from psdmc.robot.urdf import read_urdf

@@ -334,7 +334,7 @@ def test_a_full_disk_leaves_the_old_package(tmp_path: Path, monkeypatch: pytest.
         if len(calls) > 5:
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("psdmc.atomic.os.fsync", full)
+    monkeypatch.setattr("psdmc.files.os.fsync", full)
     with pytest.raises(ToolchainError, match="No space left") as caught:
         write_package(tmp_path, OTHER)
     assert "\n" not in caught.value.message
@@ -376,7 +376,7 @@ def test_an_interrupted_write_leaves_the_old_file_whole(
     def interrupted(source: str, target: object) -> None:
         raise OSError(28, "No space left on device", str(target))
 
-    monkeypatch.setattr("psdmc.atomic.os.replace", interrupted)
+    monkeypatch.setattr("psdmc.files.os.replace", interrupted)
     with pytest.raises(ToolchainError, match="No space left"):
         write_package(tmp_path, other)
     assert {path: (tmp_path / path).read_text() for path in FILES} == FILES

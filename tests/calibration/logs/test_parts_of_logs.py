@@ -73,7 +73,7 @@ def test_parts_in_this_process_are_not_all_in_memory():
 
 def test_a_scheduler_that_does_not_answer_is_named(arm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("psdmc.cluster.CONNECT", "0.1s")
+    monkeypatch.setattr("psdmc.workers.CONNECT", "0.1s")
     write_log(smooth_log(arm), tmp_path / "run.npz")
     with pytest.raises(ToolchainError, match=r"--scheduler tcp://127\.0\.0\.1:9: does not answer: "):
         calibrate_command(

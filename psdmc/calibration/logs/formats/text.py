@@ -28,7 +28,7 @@ from psdmc.calibration.logs.foreign_bytes import (
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_format import Columns, Pieces, TableFormat, TextForm
 from psdmc.errors import InputError
-from psdmc.reading import in_words, read_rest
+from psdmc.files import in_words, read_rest
 
 SEPARATORS = (",", ";", "\t", SPACE := " ")
 """The last stands for any number of spaces."""
