@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import linear_problem
+from psdmc.calibration.identify.linear_problem import LinearOptions, linear_problem
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.motions.allowed import Allowed

@@ -47,7 +47,7 @@ def calibrate(
     Raises InputError if a file is missing or if psdmc cannot use a log.
     """
     from psdmc.calibration.calibrate import calibrate as run
-    from psdmc.calibration.payload_found import given_load
+    from psdmc.calibration.known_load import given_load
 
     with_load = [loaded] if isinstance(loaded, str | Path) else list(loaded)
     known = None if load is None else given_load(load)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
 from psdmc.calibration.description.description import FitChoice
-from psdmc.calibration.identify.essential import Essential, EssentialOptions, essential
 from psdmc.calibration.identify.four_steps import (
     FourSteps,
     Runs,
@@ -19,14 +18,15 @@ from psdmc.calibration.identify.four_steps import (
 from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.joint_elasticity import elastic_joints, joint_elasticity
 from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_covariance, with_prior
-from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.log_information import ALONE, MAIN_SHARE, LogInformation, log_information
 from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
+from psdmc.calibration.identify.visibility import Essential, EssentialOptions, essential
+from psdmc.calibration.known_load import KnownLoad
 from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.motors_of_loads import LoadedLogs, motors_with_load, with_loaded_logs
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibration.campaign_file import Step
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions, Load
 from psdmc.calibration.logs.formats import WRITTEN

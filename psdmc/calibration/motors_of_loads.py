@@ -10,17 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import Estimate, Prior, torque_sizes
-from psdmc.calibration.identify.known_load import REMEDIES, KnownLoad, unreached
-from psdmc.calibration.identify.least_squares import estimate_rows
+from psdmc.calibration.identify.least_squares import Block, estimate_rows, residual_of
 from psdmc.calibration.identify.linear_fit import linear_prior
-from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
-from psdmc.calibration.identify.linear_rows import Block, residual_of
+from psdmc.calibration.identify.linear_problem import LinearOptions, LinearProblem, linear_problem
 from psdmc.calibration.identify.motor import MotorResult, negative_warnings
 from psdmc.calibration.identify.motor_model import Motors, one_quantity, require_constants
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.steps import judged
+from psdmc.calibration.known_load import REMEDIES, KnownLoad, unreached
 from psdmc.calibration.logs.filter import stretches
 from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.log import AnyLog, Array

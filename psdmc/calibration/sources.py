@@ -16,7 +16,7 @@ from psdmc.calibration.description.description import (
     with_choice,
 )
 from psdmc.calibration.description.read_described import described_logs
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.formats import has_topics
 from psdmc.calibration.logs.log import AnyLog, without_start

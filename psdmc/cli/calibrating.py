@@ -156,7 +156,7 @@ def calibrate(
     logs = given[1:]
     choice = fit_choice(cutoff, split, friction, warm)
     from psdmc.calibration.calibrate import CalibrateOptions
-    from psdmc.calibration.identify.essential import EssentialOptions
+    from psdmc.calibration.identify.visibility import EssentialOptions
     from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
     from psdmc.cli.show_checks import (
         print_accuracy,
@@ -234,7 +234,7 @@ DRAFT = Path("log.toml")
 
 def describe_logs(given: Sequence[Path], output: Path | None, topic: str | None) -> None:
     """Write a draft of a log description; the first path may be a model. Never overwrite a file."""
-    from psdmc.calibration.describe import describe_command
+    from psdmc.report.calibrate_commands import describe_command
 
     output = output or DRAFT
     check_output(output, *given)

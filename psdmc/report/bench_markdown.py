@@ -10,8 +10,7 @@ from pathlib import Path
 
 from psdmc.bench.results import BenchResult, CaseResult
 from psdmc.errors import exit_status_of
-from psdmc.report.bench_page import read_result
-from psdmc.report.bench_view import OURS, PINOCCHIO
+from psdmc.report.bench_page import OURS, PINOCCHIO, read_result
 
 DYNAMICS = (
     ("inverse_dynamics", "state", "inverse dynamics"),

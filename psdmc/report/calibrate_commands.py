@@ -9,7 +9,6 @@ from typing import Any
 
 from psdmc.backends.c.render import identifier
 from psdmc.backends.manifest import content_of
-from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import (
     CampaignOptions,
@@ -19,12 +18,16 @@ from psdmc.calibration.campaign import (
     require_free,
     write_campaign,
 )
+from psdmc.calibration.campaign_file import is_campaign
+from psdmc.calibration.description.draft import drafted
 from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.state_friction import actuator_files, calibrated_actuators
+from psdmc.calibration.known_load import given_load
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_files import column_names
 from psdmc.calibration.logs.parts import LOST, on_cluster
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.trajectory import write_trajectory
-from psdmc.calibration.payload_found import given_load
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of
@@ -180,3 +183,46 @@ def regressor_of(model: DynamicsModel, progress: Progress = silent) -> Regressor
     """The model's regressor, compiled for this machine."""
     progress("compiling the regressor")
     return compile_model(model, functions=["regressor"])
+
+
+MODEL_ARRAYS = {"manifest", "B"}
+"""Arrays that model files have and logs do not."""
+
+
+def describe_command(
+    given: Sequence[str | Path], output: str | Path, topic: str = ""
+) -> tuple[Path | None, tuple[str, ...]]:
+    """Write the draft of a log description to `output`. Returns the model file, or None if none was given, and the
+    joint quantities for which no column was found.
+
+    given   paths of logs; the first one may be a model file, whose joints are then described
+
+    Raises InputError if a log cannot be read, or if a file with the name of the output exists.
+    """
+    paths, output = [Path(path) for path in given], Path(output)
+    model = paths.pop(0) if is_model_file(paths[0]) else None
+    if not paths:
+        raise InputError(
+            f"{model}: a model, and no log to describe", "psdmc calibrate --describe MODEL.npz LOG"
+        )
+    for path in paths:
+        if is_campaign(path):
+            raise InputError(
+                f"{path}: no log, but a campaign or a description", "give a log: a table or a bag"
+            )
+    if output.exists() or output.is_symlink():
+        raise InputError(f"{output}: exists already, and is left as it is", "give another name: -o FILE.toml")
+    names = None if model is None else load(model).joint_names
+    draft = drafted(paths, output, names, topic)
+    write_whole(output, draft.text)
+    return model, draft.missing
+
+
+def is_model_file(path: Path) -> bool:
+    """Return whether a file is an .npz file with the arrays of a model."""
+    if path.suffix.lower() != ".npz" or not path.is_file():
+        return False
+    try:
+        return set(column_names(path)) >= MODEL_ARRAYS
+    except InputError:
+        return False

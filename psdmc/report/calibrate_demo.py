@@ -16,14 +16,13 @@ from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import CampaignOptions, excitation_json, plan_campaign, write_campaign
 from psdmc.calibration.plant.virtual_robot import load_virtual_robot
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
-from psdmc.calibration.truth import Comparison, compare
 from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive
 from psdmc.files import write_whole
 from psdmc.model.store import save
 from psdmc.report.calibrate_report import write_report
-from psdmc.report.truth_tables import truth_view
+from psdmc.report.truth import Comparison, compare, truth_view
 
 EXAMPLES = Path("examples")
 ROBOT = EXAMPLES / "robots" / "denso_wall.toml"

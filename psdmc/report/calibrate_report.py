@@ -24,7 +24,7 @@ from psdmc.report.calibrate_tables import (
     step_table,
     verdict_table,
 )
-from psdmc.report.truth_tables import TruthView
+from psdmc.report.truth import TruthView
 
 CAPTIONS = {
     "Motor": "Torque of the known load, and what the calibrated motors say of the current that it adds (figure 2).",

@@ -15,7 +15,7 @@ import numpy as np
 from psdmc.backends.c.render import environment
 from psdmc.calibration.campaign_file import is_campaign, listed_runs
 from psdmc.calibration.description.description import is_description
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.sources import plain_sources
 from psdmc.derivation.provenance import provenance

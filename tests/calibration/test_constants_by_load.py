@@ -15,9 +15,9 @@ from loaded_kr6 import motor_torques, sines
 
 import psdmc
 from psdmc.calibration.calibrate import CalibrateOptions
-from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.least_squares import FitOptions
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
+from psdmc.calibration.known_load import KnownLoad
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import open_log, write_log
 from psdmc.calibration.motors_of_loads import LoadedLogs, loaded_quality

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from psdmc.calibration.truth import Comparison
 from psdmc.report.calibrate_demo import run_demo
+from psdmc.report.truth import Comparison
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(os.environ.get("PSDMC_DEMO") != "whole", reason="make test-demo takes it")

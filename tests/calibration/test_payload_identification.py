@@ -13,9 +13,9 @@ from bundled import bundled_model
 from loaded_kr6 import motor_torques, sines
 
 import psdmc
+from psdmc.calibration.known_load import PayloadFound, read_load
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.calibration.payload_found import PayloadFound, read_load
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.campaign_plan import ROWS_PER_CUTOFF
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log

@@ -197,12 +197,12 @@ def test_the_sum_is_the_formula_of_earlier_packages():
 
 NAMES = re.compile(r"coulomb|viscous|stribeck|lugre|asymmetr|load_friction", re.IGNORECASE)
 MAY_NAME_LAWS = {
-    "calibration/identify/friction_fit.py": "the paper's own search for the values of the law with bristles",
+    "calibration/identify/friction.py": "the paper's own search for the values of the law with bristles",
     "calibration/identify/steps.py": "public options of that search",
     "calibration/identify/four_steps.py": "public options of that search",
     "report/calibrate_demo.py": "public options of that search",
     "report/published_denso.py": "the numbers that the paper printed",
-    "report/truth_tables.py": "the page that compares with the paper",
+    "report/truth.py": "the page that compares with the paper",
     "cli/calibrating.py": "help of --friction, which must not load laws",
 }
 

@@ -13,7 +13,7 @@ from psdmc.calibration.description.description import is_description, read_descr
 from psdmc.calibration.description.draft import drafted
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.identify.knowledge import knowledge_of
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log_files import write_columns
 

@@ -39,7 +39,7 @@ from psdmc.model.calibrated import (
 from psdmc.model.grounds import Ground
 from psdmc.report.bench_page import write_page
 from psdmc.report.calibrate_report import write_report
-from psdmc.report.truth_tables import truth_view
+from psdmc.report.truth import truth_view
 from psdmc.report.view import viewed, write_view
 from psdmc.robot.load import load_robot
 

@@ -13,7 +13,7 @@ from made_up_denso import OFF, STD, denso, made_up_record, plant
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.report import published_denso as published
 from psdmc.report.calibrate_report import report_html
-from psdmc.report.truth_tables import TruthView, truth_view
+from psdmc.report.truth import TruthView, truth_view
 
 LENGTHS = {"a1": 0.075, "a2": -0.27, "a3": -0.09, "d4": 0.295}
 

@@ -21,7 +21,7 @@ from psdmc.calibration.description.joint_tables import (
     column_of,
     require_joints,
 )
-from psdmc.calibration.identify.linear_options import ElasticityOptions, LinearOptions
+from psdmc.calibration.identify.linear_problem import ElasticityOptions, LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.foreign_bytes import listed
 from psdmc.calibration.logs.log import USES, Use

@@ -15,7 +15,7 @@ from typing import Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Quantity
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, shown

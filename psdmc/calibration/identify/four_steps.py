@@ -12,8 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.friction import FrictionResult, calibrate_friction, prepared_runs
-from psdmc.calibration.identify.friction_fit import JointFriction, step_sizes, to_seven, unknowns_of
+from psdmc.calibration.identify.friction import (
+    FrictionResult,
+    JointFriction,
+    calibrate_friction,
+    prepared_runs,
+    step_sizes,
+    to_seven,
+    unknowns_of,
+)
 from psdmc.calibration.identify.gravity import GravityResult, calibrate_gravity, gravity_split
 from psdmc.calibration.identify.inertial import InertialResult, calibrate_inertial
 from psdmc.calibration.identify.motor import MotorResult, calibrate_motors

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from psdmc.calibration.identify.estimate import Estimate
+from psdmc.calibration.identify.least_squares import Block, Rows, collected, residual_of, with_rows
 from psdmc.calibration.identify.linear_problem import LinearProblem
-from psdmc.calibration.identify.linear_rows import Block, Rows, collected, residual_of, with_rows
 from psdmc.calibration.identify.log_information import UNSEEN, fitted_logs, white_coordinates
 from psdmc.calibration.identify.residuals import widening
 from psdmc.calibration.logs.log import Array

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import Consider, Estimate, Prior, base_parameter_scale, torque_sizes
-from psdmc.calibration.identify.friction import FrictionResult
-from psdmc.calibration.identify.friction_fit import JointFriction
+from psdmc.calibration.identify.friction import FrictionResult, JointFriction
 from psdmc.calibration.identify.gravity import GravityResult, gravity_split
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.motor_model import Motors

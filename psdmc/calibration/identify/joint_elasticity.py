@@ -21,8 +21,7 @@ from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
 from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.inertial import friction_slopes
 from psdmc.calibration.identify.least_squares import estimate
-from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_columns, motion_of
+from psdmc.calibration.identify.linear_problem import LinearOptions, friction_columns, motion_of
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.state_friction import friction_torque

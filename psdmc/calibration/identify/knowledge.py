@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.identify.essential import EssentialOptions
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.physical import NO_BOUNDS, Bounds, whitening_of
+from psdmc.calibration.identify.visibility import EssentialOptions
 from psdmc.calibration.logs.foreign_bytes import listed, quoted
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown

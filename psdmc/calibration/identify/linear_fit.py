@@ -21,8 +21,12 @@ from psdmc.calibration.identify.estimate import (
     torque_sizes,
 )
 from psdmc.calibration.identify.least_squares import estimate_rows
-from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import LinearProblem, extra_scale, linear_problem
+from psdmc.calibration.identify.linear_problem import (
+    LinearOptions,
+    LinearProblem,
+    extra_scale,
+    linear_problem,
+)
 from psdmc.calibration.identify.motor_model import Motors, RowsByMotors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import noise_warnings

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from psdmc.calibration.identify.estimate import Estimate
+from psdmc.calibration.identify.least_squares import Rows, collected, residual_of
 from psdmc.calibration.identify.linear_problem import LinearProblem
-from psdmc.calibration.identify.linear_rows import Rows, collected, residual_of
 from psdmc.calibration.identify.residuals import spread, widening
 from psdmc.calibration.logs.log import Array
 

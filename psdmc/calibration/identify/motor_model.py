@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.identify.linear_rows import Block, Rows
+from psdmc.calibration.identify.least_squares import Block, Rows
 from psdmc.calibration.logs.foreign_bytes import first_faults, listed, quoted
 from psdmc.calibration.logs.log import AnyLog, Array, Quantity
 from psdmc.errors import InputError

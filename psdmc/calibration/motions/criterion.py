@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.identify.gravity import gravity_split
-from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_columns
+from psdmc.calibration.identify.linear_problem import LinearOptions, friction_columns
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite_options import Objective

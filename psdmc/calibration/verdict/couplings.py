@@ -21,8 +21,8 @@ import numpy as np
 from psdmc.calibration.identify.motor_model import Coupling
 from psdmc.calibration.identify.residuals import quality, widening
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.effort_checks import RANK_TOLERANCE
 from psdmc.calibration.verdict.evidence import SIGN_SPEED, Evidence
-from psdmc.calibration.verdict.gains import RANK_TOLERANCE
 from psdmc.calibration.verdict.log_errors import Fit, Sums
 
 ROWS = 1500

@@ -19,12 +19,10 @@ from numpy.typing import NDArray
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.columns.columns import Columns, read_columns
 from psdmc.calibration.identify.four_steps import Runs
-from psdmc.calibration.identify.friction import FrictionResult, judge_friction, prepared_runs
-from psdmc.calibration.identify.friction_fit import JointFriction
+from psdmc.calibration.identify.friction import FrictionResult, JointFriction, judge_friction, prepared_runs
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import Late, judge_inertial
-from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_columns, motion_of, names_of
+from psdmc.calibration.identify.linear_problem import LinearOptions, friction_columns, motion_of, names_of
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import ChainRegressor

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.verdict.delay import delays_of
+from psdmc.calibration.verdict.effort_checks import SETTLED, delays_of, friction_powers, joint_gains
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.calibration.verdict.gains import SETTLED, friction_powers, joint_gains
 from psdmc.calibration.verdict.log_errors import EffortScale, effort_scale
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.calibration.verdict.suspects import ABOUT

@@ -19,8 +19,8 @@ from scipy import stats
 from scipy.linalg import lapack
 
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.effort_checks import CLUSTERS, RANK_TOLERANCE, clustered
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.calibration.verdict.gains import CLUSTERS, RANK_TOLERANCE, clustered
 from psdmc.errors import InputError
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel

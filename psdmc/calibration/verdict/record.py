@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.four_steps import FourSteps, Runs
 from psdmc.calibration.identify.linear_fit import LinearResult
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.motor import MotorResult
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.steps import CalibrationOptions, StepOptions

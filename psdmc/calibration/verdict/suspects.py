@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment, nnls
 
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.effort_checks import RANK_TOLERANCE, Gain, basis
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.calibration.verdict.gains import RANK_TOLERANCE, Gain, basis
 from psdmc.model.grounds import SCALES, Ground, exchanges
 from psdmc.robot.mechanism import DRIVE
 

@@ -15,7 +15,7 @@ from psdmc.calibration.description.description import (
     is_description,
     read_description,
 )
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.errors import InputError
 

@@ -11,11 +11,11 @@ from scipy import stats
 
 import psdmc
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
-from psdmc.calibration.identify.essential import EssentialOptions, essential
 from psdmc.calibration.identify.estimate import Estimate, FitOptions, Prior
 from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.physical import nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.identify.visibility import EssentialOptions, essential
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration

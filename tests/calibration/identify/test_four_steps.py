@@ -18,10 +18,10 @@ from psdmc.calibration.identify.steps import CalibrationOptions, GravityRun, Loa
 from psdmc.calibration.motions.sweeps import SweepOptions, gravity_sweep
 from psdmc.calibration.plant.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
-from psdmc.calibration.truth import compare
 from psdmc.errors import InputError
 from psdmc.model.load import load
 from psdmc.model.store import save
+from psdmc.report.truth import compare
 
 
 @pytest.mark.slow

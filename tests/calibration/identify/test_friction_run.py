@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.calibration.identify import friction_fit
-from psdmc.calibration.identify.friction_fit import MOST_KEPT, JointRun
+from psdmc.calibration.identify import friction
+from psdmc.calibration.identify.friction import MOST_KEPT, JointRun
 from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.identify.steps import FrictionOptions
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
@@ -36,7 +36,7 @@ def test_friction_is_simulated_once_for_equal_parameters(run: JointRun, monkeypa
         simulated.append(given)
         return friction_torque(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(friction_fit, "friction_torque", counted)
+    monkeypatch.setattr(friction, "friction_torque", counted)
 
     first, second = run.torque(unknowns()), run.torque(unknowns(inertia=0.8, offset=-0.3))
     assert len(simulated) == 1
@@ -69,12 +69,12 @@ def test_a_delayed_inertia_is_not_taken_for_friction():
     still = np.zeros(len(time))
     data = JointRun(time, PERIOD, *motion(time), still, low_pass(torque), low_pass, every, every, every)
 
-    found = friction_fit._fast(data, FrictionOptions())
+    found = friction._fast(data, FrictionOptions())
 
     assert found[0] == pytest.approx(coulomb, rel=0.5)  # the filter smooths reversals
     assert found[3] == pytest.approx(inertia, rel=0.01)
     assert found[5] == pytest.approx(delay, rel=0.15)
-    assert abs(friction_fit._fast(data, FrictionOptions(estimate_delay=False))[0] - coulomb) > coulomb
+    assert abs(friction._fast(data, FrictionOptions(estimate_delay=False))[0] - coulomb) > coulomb
 
 
 @pytest.mark.parametrize("which", range(7))

@@ -10,10 +10,9 @@ import pytest
 from elastic_pendulum import ABOUT_JOINT, ROTOR, SWING, Log, friction, log_by_scipy, write_plant
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
-from psdmc.calibration.identify.friction import FrictionResult
-from psdmc.calibration.identify.friction_fit import JointFriction, prepared
+from psdmc.calibration.identify.friction import FrictionResult, JointFriction, prepared
 from psdmc.calibration.identify.joint_elasticity import Elasticity, joint_elasticity
-from psdmc.calibration.identify.linear_options import ElasticityOptions, LinearOptions
+from psdmc.calibration.identify.linear_problem import ElasticityOptions, LinearOptions
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import FrictionRun, Robot, StepOptions

@@ -14,7 +14,7 @@ from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.estimate import FitOptions, Prior
 from psdmc.calibration.identify.knowledge import Confidence, knowledge_of, theta_covariance, with_prior
 from psdmc.calibration.identify.least_squares import estimate
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log

@@ -12,7 +12,7 @@ from random_chains import Oracle
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify import predictor
 from psdmc.calibration.identify.linear_fit import calibrate_linear
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.physical import nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.filter import SplitOptions

@@ -12,7 +12,7 @@ from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.estimate import Estimate, FitOptions
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
 from psdmc.calibration.identify.linear_fit import calibrate_linear
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.steps import FrictionRun, GravityRun, InertialRun
 from psdmc.calibration.logs.log import Log

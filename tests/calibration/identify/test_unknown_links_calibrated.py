@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log

@@ -13,7 +13,7 @@ import pytest
 from calibration.conftest import smooth_log
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs import parts
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.parts import LOST, Workers, each_part, on_cluster

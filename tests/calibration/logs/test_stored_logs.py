@@ -12,7 +12,7 @@ import pytest
 from calibration.conftest import smooth_log
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.filter import even_grid, filtered, independent_rows, noticed, stretches
 from psdmc.calibration.logs.formats import WRITTEN, npz, parquet, text
 from psdmc.calibration.logs.log import Log, RowStore, StoredLog, without_start

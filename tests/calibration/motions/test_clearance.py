@@ -11,7 +11,7 @@ import pytest
 from arms import LENGTH, pinocchio_of, urdf
 
 from psdmc.calibration.campaign_plan import CampaignOptions, allowed_of, plan_campaign
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.allowed import GivenLimits, bounded
 from psdmc.calibration.motions.clearance import APART, clearance_of, floor_points, mesh_file, spread

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from arms import urdf
 
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.allowed import GivenLimits, TorqueLimits, bounded
 from psdmc.calibration.motions.criterion import FitColumns, all_columns, inertial_columns

@@ -10,7 +10,7 @@ import pytest
 from arms import urdf
 
 from psdmc.calibration.campaign_plan import allowed_of
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions import search
 from psdmc.calibration.motions.allowed import GivenLimits, bounded

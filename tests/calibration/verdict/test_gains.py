@@ -10,8 +10,8 @@ import pytest
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import noise_only, scaled, turned
+from psdmc.calibration.verdict.effort_checks import Gain, friction_powers, joint_gains
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
-from psdmc.calibration.verdict.gains import Gain, friction_powers, joint_gains
 from psdmc.calibration.verdict.suspects import unit_suspect
 
 

@@ -13,7 +13,7 @@ from worn_arm import COULOMB, VISCOUS, Worn, recorded
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
-from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.log_information import LogInformation, log_information
 from psdmc.calibration.logs.log_files import read_log, write_log
 from psdmc.calibration.plant.virtual_robot import Payload
