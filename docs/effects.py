@@ -21,11 +21,11 @@ from unittest.mock import patch
 
 from psdmc.bench.cases import standard_chains
 from psdmc.derivation.derive import derive_model
-from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, joint_frame_map
+from psdmc.dynamics.spatial import body_from_parameters
 from psdmc.functions import RECIPES
 from psdmc.lower.expanded import lowering as expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry

@@ -14,11 +14,11 @@ from helical import HELICAL, PITCH
 from random_chains import _body, _rotation, _tidy
 from slow_cases import slow_but_for
 
-from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.choices import Choices
+from psdmc.dynamics.coordinates import first_rates
 from psdmc.dynamics.frames import BASE, Frame, frame_at
 from psdmc.dynamics.parameters import moved
-from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.spatial import Body, body_from_parameters
 from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement
 

@@ -1,7 +1,7 @@
 """Finds base parameters by elimination: the independent columns of a robot's torques, and combinations of the others.
 
 A column stands for a standard parameter, such as a mass. Small robots are sampled: rows of the regressor at random
-states, in double precision. For long chains and nearly parallel axes, dynamics/torque_rows.py computes rows of which
+states, in double precision. For long chains and nearly parallel axes, dynamics/regressor.py computes rows of which
 all torques are combinations, joint by joint in extended precision, and decides which effects exceed rounding.
 
 The torque of a mimic joint is added to its leader's. Some parameters of the robot without mimicry then appear only in
@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.scaled import Long, Scaled, extended, has_small_entries, is_of_many_scales
-from psdmc.dynamics.following import any_follows
+from psdmc.dynamics.coordinates import any_follows, first_rates, neutral, normalized
 from psdmc.dynamics.frames import BASE
-from psdmc.dynamics.regressor import regressor
-from psdmc.dynamics.slices import first_rates, neutral, normalized
-from psdmc.dynamics.torque_rows import echelon_rows, torque_rows
+from psdmc.dynamics.regressor import echelon_rows, regressor, torque_rows
 from psdmc.reproducible import lengths, times, triangle_solved
 from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array

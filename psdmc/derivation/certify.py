@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.derivation.scaled import orthonormal
-from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of, moving_map
 from psdmc.dynamics.regressor import regressor
+from psdmc.dynamics.spatial import body_from_parameters
 from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of

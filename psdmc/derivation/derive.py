@@ -23,7 +23,7 @@ from psdmc.derivation.expand import (
 from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, types_along_ways
 from psdmc.derivation.monomials import merged
 from psdmc.derivation.scaled import Scaled, length_unit, parameter_units, scaled
-from psdmc.dynamics.torque_rows import EFFECT
+from psdmc.dynamics.regressor import EFFECT
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import under_general_gravity

@@ -42,7 +42,7 @@ from psdmc.derivation.scaled import (
     parameter_units,
     torque_units,
 )
-from psdmc.dynamics.following import any_follows
+from psdmc.dynamics.coordinates import any_follows
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import carried_by, path_to
 from psdmc.dynamics.regressor import Placed, carried, twist_in

@@ -31,7 +31,7 @@ from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
 from psdmc.dynamics.regressor import Placed, Twist, carried, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
-from psdmc.dynamics.twist import axis_twist
+from psdmc.dynamics.spatial import axis_twist
 from psdmc.robot.joints import JointType
 from psdmc.robot.joints.basis import Basis
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.dynamics.coordinates import first_rates, neutral, normalized
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
-from psdmc.dynamics.slices import first_rates, neutral, normalized
 from psdmc.model.random_states import RANGES
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.mechanism import Array, Mechanism

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.body import Body, handed_body, in_previous, joined, shifted, turned
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.following import both_summed, on_coordinates
+from psdmc.dynamics.coordinates import both_summed, first_rates, on_coordinates, positions
 from psdmc.dynamics.frames import (
     BASE,
     Frame,
@@ -20,8 +19,7 @@ from psdmc.dynamics.frames import (
     to_previous,
 )
 from psdmc.dynamics.scalar import Scalar, Vector, add, cross
-from psdmc.dynamics.slices import first_rates, positions
-from psdmc.dynamics.twist import efforts, momentum
+from psdmc.dynamics.spatial import Body, efforts, handed_body, in_previous, joined, momentum, shifted, turned
 
 
 @on_coordinates(both_summed)

@@ -29,11 +29,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.following import both_summed, on_coordinates, summed
+from psdmc.dynamics.coordinates import both_summed, first_rates, on_coordinates, positions, rates, summed
 from psdmc.dynamics.frames import BASE, Frame, about_z, inward, joint_angle, leaves
-from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
+from psdmc.dynamics.joint_steps import (
+    Axis,
+    Row,
+    Step,
+    Wrench,
+    accelerating,
+    axis_along,
+    axis_and_step,
+    bending,
+    by_own_axes,
+    composite_along,
+    from_z,
+    unit_twists,
+)
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
     Composite,
@@ -48,18 +60,8 @@ from psdmc.dynamics.moving_composite import (
     relieved,
 )
 from psdmc.dynamics.newton_euler import NO_WRENCHES
-from psdmc.dynamics.own_axes import (
-    accelerating,
-    axis_along,
-    bending,
-    by_own_axes,
-    composite_along,
-    from_z,
-    unit_twists,
-)
 from psdmc.dynamics.scalar import Scalar, Vector, add, cross, dot, scale, transform
-from psdmc.dynamics.slices import first_rates, positions, rates
-from psdmc.dynamics.twist import combined, effort, efforts
+from psdmc.dynamics.spatial import Body, combined, effort, efforts, spun, turned
 from psdmc.robot.joints import JointType
 
 Rows = tuple[tuple[Scalar, ...], ...]

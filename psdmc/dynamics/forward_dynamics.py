@@ -16,9 +16,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.following import any_follows
+from psdmc.dynamics.coordinates import any_follows, first_rates, flat, positions, rates
 from psdmc.dynamics.frames import (
     BASE,
     Frame,
@@ -27,14 +26,14 @@ from psdmc.dynamics.frames import (
     from_previous,
     handed_on,
     handed_vector,
+    joint_turn,
     outward,
 )
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transpose
-from psdmc.dynamics.slices import first_rates, flat, rates
 from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, solve
-from psdmc.dynamics.twist import combined, efforts, own_rates
+from psdmc.dynamics.spatial import Body, combined, efforts, own_rates
 
 Accelerations = tuple[list[Scalar], tuple[Scalar, ...]]
 """nv accelerations, and the nv pivots of the mass matrix."""
@@ -216,6 +215,33 @@ def _combined(
 
 def _halves(values: Sequence[Scalar]) -> tuple[Vector, Vector]:
     return (values[0], values[1], values[2]), (values[3], values[4], values[5])
+
+
+KNOWN_BY_Q, KNOWN_BY_QD = 6, 3
+"""Columns of a floating base, which comes first, that are known without dynamics."""
+
+
+def known_derivatives(
+    frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], up: Vector
+) -> tuple[Matrix, Matrix]:
+    """Return the derivatives (3 x 3 each) of a floating base's linear acceleration by its orientation and linear
+    velocity.
+
+    The position, orientation and linear velocity v of a floating base enter the equations of motion through one vector
+    only. Along the axes of the base, this vector is a = dv/dt + w x v + R^T up. Here w is the angular velocity, R the
+    orientation, and up minus gravity. If position, orientation and v change and the torques do not, then a and all other
+    accelerations stay the same. dv/dt therefore changes by minus the change of w x v + R^T up.
+    """
+    root = frames[0]
+    turned = outward(joint_turn(root, positions(frames, q)[0]), from_previous(root, up))
+    own = rates(frames, qd)[0]
+    return _minus_cross(turned), _minus_cross(own[3:])
+
+
+def _minus_cross(v: Sequence[Scalar]) -> Matrix:
+    """The matrix of - v x."""
+    x, y, z = v
+    return ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
 
 
 # Articulated inertias: the wrench per acceleration of a body whose further joints move freely, as symmetric 6 x 6 matrices

@@ -27,6 +27,7 @@ from psdmc.dynamics.scalar import (
     transpose,
 )
 from psdmc.robot.joints import JointType
+from psdmc.robot.joints.joint_type import SLIDES, TURNS
 from psdmc.robot.mechanism import BASE as BASE
 from psdmc.robot.mechanism import Mechanism, Placement
 
@@ -211,6 +212,12 @@ def leaves(frames: Sequence[Frame]) -> tuple[bool, ...]:
     """For each frame, whether no other frame has it as its parent."""
     parents = {frame.parent for frame in frames}
     return tuple(i not in parents for i in range(len(frames)))
+
+
+def has_floating_base(frames: Sequence[Frame]) -> bool:
+    """Return whether a floating joint carries the whole robot, with linear and angular rates along the axes of its
+    body."""
+    return frames[0].joint.twists == (*SLIDES, *TURNS) and all(frame.parent != BASE for frame in frames[1:])
 
 
 def base_acceleration(chain: Mechanism) -> Vector:

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body, handed_body, in_previous, joined, shifted, spun, turned
 from psdmc.dynamics.frames import Frame, Rotation, Turn, handed_vector, to_previous
-from psdmc.dynamics.motion import LinkMotion
+from psdmc.dynamics.motion import LinkMotion, Rates, spin_of
 from psdmc.dynamics.newton_euler import wrench
 from psdmc.dynamics.scalar import (
     ZERO,
@@ -30,8 +29,17 @@ from psdmc.dynamics.scalar import (
     transform,
     transpose,
 )
-from psdmc.dynamics.spin import Rates, spin_of
-from psdmc.dynamics.twist import combined, own_rates
+from psdmc.dynamics.spatial import (
+    Body,
+    combined,
+    handed_body,
+    in_previous,
+    joined,
+    own_rates,
+    shifted,
+    spun,
+    turned,
+)
 from psdmc.robot.joints import JointType
 
 

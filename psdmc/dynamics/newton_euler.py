@@ -6,14 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
-from psdmc.dynamics.body import Body, turned
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.following import on_coordinates, summed
+from psdmc.dynamics.coordinates import flat, on_coordinates, positions, rates, summed
 from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, handed_vector, inward, joint_angle, to_previous
 from psdmc.dynamics.motion import Forward, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
-from psdmc.dynamics.slices import flat, positions, rates
-from psdmc.dynamics.twist import efforts
+from psdmc.dynamics.spatial import Body, efforts, turned
 
 Wrench = tuple[Vector, Vector]
 """Force (N) and moment about a frame's origin (N m), along its axes."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.body import Body, body_from_parameters
+from psdmc.dynamics.spatial import Body, body_from_parameters
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, Placement
 

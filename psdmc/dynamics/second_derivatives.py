@@ -24,8 +24,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
+from psdmc.dynamics.coordinates import both_summed, first_rates, on_coordinates, rates
 from psdmc.dynamics.derivatives import (
     Rows,
     Swept,
@@ -36,9 +36,8 @@ from psdmc.dynamics.derivatives import (
     torque_rows,
     wrenches_of_motions,
 )
-from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, from_previous, leaves, outward
-from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench
+from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, accelerating, by_own_axes
 from psdmc.dynamics.moving_composite import (
     Composite,
     Momenta,
@@ -49,10 +48,8 @@ from psdmc.dynamics.moving_composite import (
     moved_to,
     second_rows,
 )
-from psdmc.dynamics.own_axes import accelerating, by_own_axes
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, scale, transform
-from psdmc.dynamics.slices import first_rates, rates
-from psdmc.dynamics.twist import combined, own_rates
+from psdmc.dynamics.spatial import Body, combined, own_rates
 from psdmc.robot.joints import JointType
 
 Motion = tuple[Vector, Vector]

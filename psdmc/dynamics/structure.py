@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import base_acceleration, frames_of
@@ -21,6 +20,7 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.second_derivatives import SecondDerivatives, inverse_dynamics_second_derivatives
 from psdmc.dynamics.solve import Rows, factorize, inner_product, inverse
+from psdmc.dynamics.spatial import Body, body_from_parameters
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
 
 Places = tuple[tuple[int, int], ...]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.energy import first_moment
+from psdmc.dynamics.momentum_and_energy import first_moment
 from psdmc.dynamics.scalar import add, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.centroidal import about_centre
-from psdmc.dynamics.momentum import total_momentum
+from psdmc.dynamics.momentum_and_energy import about_centre, total_momentum
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.centroidal import momentum_rate_slopes
+from psdmc.dynamics.momentum_and_energy import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_matrix
 from psdmc.functions.centroidal_momentum import INPUTS, MOMENTUM

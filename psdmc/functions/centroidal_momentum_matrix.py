@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.body import Body
-from psdmc.dynamics.energy import first_moment
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.momentum import momentum_matrix
+from psdmc.dynamics.momentum_and_energy import first_moment, momentum_matrix
 from psdmc.dynamics.scalar import Matrix, Scalar, cross, scale, transform
+from psdmc.dynamics.spatial import Body
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference

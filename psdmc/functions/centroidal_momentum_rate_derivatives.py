@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.centroidal import momentum_rate_slopes
+from psdmc.dynamics.momentum_and_energy import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions.centroidal_momentum_rate import INPUTS, RATE
 from psdmc.program.signature import Signature, derivative_of

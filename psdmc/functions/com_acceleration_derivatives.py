@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psdmc.dynamics.centroidal import momentum_rate_slopes
+from psdmc.dynamics.momentum_and_energy import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_rate_derivatives
 from psdmc.functions.com_acceleration import ACCELERATION, INPUTS

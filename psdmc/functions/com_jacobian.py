@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.momentum import momentum_matrix
+from psdmc.dynamics.momentum_and_energy import momentum_matrix
 from psdmc.dynamics.scalar import scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries

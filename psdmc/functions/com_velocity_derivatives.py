@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psdmc.dynamics.centroidal import momentum_rate_slopes
+from psdmc.dynamics.momentum_and_energy import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_derivatives
 from psdmc.functions.com_velocity import INPUTS, VELOCITY

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from psdmc.dynamics import closed_loops, contacts
-from psdmc.dynamics.arrow import Arrow, any_limbs
+from psdmc.dynamics import closed_loops, constraints
+from psdmc.dynamics.arrow import Arrow, Trunk, any_limbs, eliminated_with_forces
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_drift, contact_jacobian, loop_drift, loop_error, loop_jacobian
@@ -82,7 +81,7 @@ def trace(g: Ingredients) -> Outputs:
 def _in_limbs(g: Ingredients) -> Outputs:
     """Eliminate limb by limb. Signs are negative also where this loses digits."""
     q, trunk = g.inputs["q"], Trunk(g.frames, g.inputs["q"], g.base_axes)
-    rows = contacts.contact_jacobian(g.frames, g.named, trunk.q, g.root)
+    rows = constraints.contact_jacobian(g.frames, g.named, trunk.q, g.root)
     mass = mass_matrix(g.frames, g.bodies, g.drives, q, g.choices)
     mask, arrow, margins, wanted = of_limbs(g, mass, rows, trunk)
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
@@ -109,7 +108,7 @@ def of_limbs(
     on, shift, one = mask.rows
     arrow, margins = eliminated_with_forces(g.frames, mass, rows, on, shift, one)
     q, errors = (g.inputs["q"], error) if trunk is None else (trunk.q, trunk.rows_along(error))
-    drifts = contacts.contact_drift(g.frames, g.named, q, qd, g.root)
+    drifts = constraints.contact_drift(g.frames, g.named, q, qd, g.root)
     wanted = [
         -each * (own + kd * inner_product(row, qd) + kp * off)
         for each, own, row, off in zip(on, drifts, rows, errors, strict=True)
@@ -123,8 +122,8 @@ def solved(g: Ingredients) -> Solved:
     (kp,), (kd,) = (g.inputs[each.name] for each in (KP, KD))
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     bias = torques(g, qd, g.still, g.base_acceleration)
-    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
-    drifts = contacts.contact_drift(g.frames, g.named, q, qd, g.root)
+    rows = constraints.contact_jacobian(g.frames, g.named, q, g.root)
+    drifts = constraints.contact_drift(g.frames, g.named, q, qd, g.root)
     errors = list(g.inputs[ERROR.name])
     if g.loops:
         rows += closed_loops.loop_jacobian(g.frames, g.loops, q, g.root)

@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from psdmc.dynamics.arrow import any_limbs
-from psdmc.dynamics.constraints import Constraints
-from psdmc.dynamics.contacts import changed, contact_slopes, response
-from psdmc.dynamics.contacts import contact_jacobian as contact_jacobian_of
+from psdmc.dynamics.arrow import any_limbs, pushed_slopes_of_limbs
+from psdmc.dynamics.constraints import Constraints, changed, contact_slopes, response
+from psdmc.dynamics.constraints import contact_jacobian as contact_jacobian_of
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
 from psdmc.dynamics.solve import inner_product, inverse
 from psdmc.functions import (
     constrained_forward_dynamics,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.closed_loops import loop_drift, loop_error
-from psdmc.dynamics.constraints import Constraints
-from psdmc.dynamics.contacts import contact_accelerations
+from psdmc.dynamics.constraints import Constraints, contact_accelerations
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.functions import constrained_forward_dynamics, constrained_forward_dynamics_derivatives

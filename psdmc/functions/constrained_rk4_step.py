@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from psdmc.dynamics.constraints import Constraints
-from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.dynamics.constraints import Constraints, contact_jacobian
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import coordinate_rates, restored
 from psdmc.dynamics.scalar import Scalar

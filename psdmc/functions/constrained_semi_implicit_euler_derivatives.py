@@ -9,8 +9,7 @@ import numpy as np
 
 from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.manifold import integrated
-from psdmc.dynamics.tangent_steps import step_slopes
+from psdmc.dynamics.manifold import integrated, step_slopes
 from psdmc.functions import constrained_forward_dynamics_derivatives, constrained_semi_implicit_euler
 from psdmc.functions.constrained_forward_dynamics import ERROR
 from psdmc.functions.semi_implicit_euler_derivatives import state_and_jacobians

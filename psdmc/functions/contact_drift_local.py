@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.named_frames import local_accelerations
+from psdmc.dynamics.kinematics import local_accelerations
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import contact_drift
 from psdmc.program.signature import QD, Q, Signature

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.dynamics.constraints import Constraints
-from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.free_root import has_free_root
+from psdmc.dynamics.frames import Frame, has_floating_base
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.functions import contact_jacobian, loop_jacobian
@@ -98,7 +97,7 @@ def _forces(frames: Sequence[Frame], without: Sequence[Scalar], jacobian: Rows, 
         factor = 0.0 if j < LINEAR and has_base else metre
         return [x * factor if turns else x for turns, x in zip(angular, column, strict=True)], without[j]
 
-    has_base = has_free_root(frames)
+    has_base = has_floating_base(frames)
     of_base = [equation(j) for j in range(BASE_ROWS)] if has_base else []
     if passive:
         cut = len(active) - sum(len(loop.rows) for loop in mask.loops)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.contacts import contact_jacobian
+from psdmc.dynamics.constraints import contact_jacobian
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from psdmc.dynamics import contacts
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.constraints import Constraints
+from psdmc.dynamics.constraints import Constraints, of_active
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.functions import delassus
@@ -32,7 +31,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def _values(factors: Factors, jacobian: Sequence[Sequence[Scalar]], mask: Held) -> Outputs:
-    matrix = contacts.of_active(projected(factors, jacobian), *mask.rows)
+    matrix = of_active(projected(factors, jacobian), *mask.rows)
     own = factorize(matrix)
     found = mask.compliance(own)
     signs = mask.independent(matrix, own, [row[k] for k, row in enumerate(found)])

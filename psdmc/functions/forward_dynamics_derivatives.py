@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from psdmc.dynamics.arrow import Matrix, any_limbs, eliminated
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
-from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
+from psdmc.dynamics.forward_dynamics import KNOWN_BY_Q, KNOWN_BY_QD, known_derivatives
+from psdmc.dynamics.frames import has_floating_base
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
@@ -63,7 +64,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     accelerations = arrow.solved(load, at_rest.by_qd, [0.5 * rate for rate in g.inputs["qd"]])
     moving = _torque_derivatives(g, accelerations)
     blocks: list[Matrix] = [moving.by_q, at_rest.by_qd]
-    if has_free_root(g.frames):
+    if has_floating_base(g.frames):
         known = known_derivatives(g.frames, g.inputs["q"], g.inputs["qd"], g.base_acceleration)
         thin = [
             _with_block(arrow.thin(_without_columns(matrix, count)), block, count - 3)

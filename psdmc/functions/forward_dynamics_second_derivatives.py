@@ -17,9 +17,9 @@ from itertools import groupby
 
 import numpy as np
 
+from psdmc.dynamics.coordinates import joints_of_rates, leading
 from psdmc.dynamics.frames import Frame, with_carriers
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import joints_of_rates, leading
 from psdmc.functions import forward_dynamics_derivatives as accelerations
 from psdmc.functions import inverse_dynamics_second_derivatives as torques
 from psdmc.program.regions import (

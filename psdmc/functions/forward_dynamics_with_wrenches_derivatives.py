@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from psdmc.dynamics.body import Body
+from psdmc.dynamics.coordinates import first_rates, leading
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.named_frames import local_jacobians
+from psdmc.dynamics.kinematics import local_jacobians
 from psdmc.dynamics.scalar import ZERO
-from psdmc.dynamics.slices import first_rates, leading
 from psdmc.dynamics.solve import inner_product
+from psdmc.dynamics.spatial import Body
 from psdmc.functions import (
     forward_dynamics_derivatives,
     forward_dynamics_with_wrenches,

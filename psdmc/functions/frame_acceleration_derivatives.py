@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.named_frames import frame_acceleration_slopes
+from psdmc.dynamics.kinematics import frame_acceleration_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions.frame_acceleration import ACCELERATION, INPUTS
 from psdmc.program.signature import Signature, derivative_of

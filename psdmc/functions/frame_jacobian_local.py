@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psdmc.dynamics.named_frames import local_jacobians
+from psdmc.dynamics.kinematics import local_jacobians
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both

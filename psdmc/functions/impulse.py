@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics import closed_loops, contacts
-from psdmc.dynamics.arrow import Arrow, any_limbs
+from psdmc.dynamics import closed_loops, constraints
+from psdmc.dynamics.arrow import Arrow, Trunk, any_limbs, eliminated_with_forces
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.limb_contacts import Trunk, eliminated_with_forces
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_jacobian, loop_jacobian
@@ -66,7 +65,7 @@ TOUCHING = replace(CONTACTS, failure=f"restitution is not from 0 to 1\n{CONTACTS
 def trace(g: Ingredients) -> Outputs:
     if any_limbs(g.frames):
         trunk = Trunk(g.frames, g.inputs["q"], g.base_axes)
-        rows = contacts.contact_jacobian(g.frames, g.named, trunk.q, g.root)
+        rows = constraints.contact_jacobian(g.frames, g.named, trunk.q, g.root)
         mass = mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices)
         change, impulses, pivots, _ = of_limbs(g, mass, rows)
         after = [rate + each for rate, each in zip(g.inputs[BEFORE.name], change, strict=True)]
@@ -108,7 +107,7 @@ def solved(g: Ingredients) -> Solved:
     q, before = g.inputs["q"], g.inputs[BEFORE.name]
     (restitution,) = g.inputs[RESTITUTION.name]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
-    rows = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    rows = constraints.contact_jacobian(g.frames, g.named, q, g.root)
     wanted = [-(1.0 + restitution) * inner_product(row, before) for row in rows]
     if g.loops:
         own = closed_loops.loop_jacobian(g.frames, g.loops, q, g.root)

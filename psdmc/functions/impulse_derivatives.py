@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.dynamics import contacts
-from psdmc.dynamics.arrow import any_limbs
-from psdmc.dynamics.constraints import Constraints
-from psdmc.dynamics.contacts import changed, contact_slopes, response
+from psdmc.dynamics import constraints
+from psdmc.dynamics.arrow import any_limbs, pushed_slopes_of_limbs
+from psdmc.dynamics.constraints import Constraints, changed, contact_slopes, response
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.limb_contacts import pushed_slopes_of_limbs
 from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.dynamics.solve import inverse
 from psdmc.functions import (
@@ -98,7 +96,7 @@ def _in_limbs(g: Ingredients) -> Outputs:
     """Compute the derivatives by thin factors, limb by limb (constrained_forward_dynamics_derivatives)."""
     q, before, nv = g.inputs["q"], g.inputs[BEFORE.name], len(g.still)
     (restitution,) = g.inputs[RESTITUTION.name]
-    jacobian = contacts.contact_jacobian(g.frames, g.named, q, g.root)
+    jacobian = constraints.contact_jacobian(g.frames, g.named, q, g.root)
     mass = _torque_derivatives(g, g.still).by_qdd
     change, impulses, pivots, arrow = impulse.of_limbs(g, mass, jacobian)
     turn = pushed_slopes_of_limbs(g.frames, g.named, q, impulses, g.root)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.named_frames import frame_drifts
+from psdmc.dynamics.kinematics import frame_drifts
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.placed import PlacedRobot, on_both

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.energy import kinetic_energy
+from psdmc.dynamics.momentum_and_energy import kinetic_energy
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psdmc.dynamics.slices import neutral
+from psdmc.dynamics.coordinates import neutral
 from psdmc.program.signature import Q, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference

@@ -10,7 +10,7 @@ import numpy as np
 
 from psdmc import reproducible
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.named_frames import frame_jacobians
+from psdmc.dynamics.kinematics import frame_jacobians
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.program.factorisation import Structure, SymmetricMatrix

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.dynamics.coordinates import leading
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import coordinate_rates, rates_bent, restored, tangent
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import leading
 from psdmc.functions import forward_dynamics_derivatives as accelerations
 from psdmc.functions import rk4_step
 from psdmc.program.regions import (

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from psdmc.dynamics.coordinates import first_rates, leading
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.manifold import integrated
-from psdmc.dynamics.slices import first_rates, leading
+from psdmc.dynamics.manifold import integrated, step_slopes
 from psdmc.dynamics.solve import inner_product
-from psdmc.dynamics.tangent_steps import step_slopes
 from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.regions import Call, Column, For, Reader, Region, Regions, Slice, straight
 from psdmc.program.signature import Signature

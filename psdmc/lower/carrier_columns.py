@@ -10,10 +10,8 @@ import math
 
 import numpy as np
 
-from psdmc.dynamics.following import any_follows
-from psdmc.dynamics.regressor import regressor
-from psdmc.dynamics.slices import first_rates, neutral, normalized
-from psdmc.dynamics.torque_rows import torque_rows
+from psdmc.dynamics.coordinates import any_follows, first_rates, neutral, normalized
+from psdmc.dynamics.regressor import regressor, torque_rows
 from psdmc.lower.carriers import EFFECT, Careful, CarrierSpace, lightest
 from psdmc.lower.link_parameters import LENGTH_ORDER, PSEUDO_NAMES, WEIGHTS, link_map, pseudo_map
 from psdmc.lower.reframe import Reframed

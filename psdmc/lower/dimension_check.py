@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.frames import Follows, Frame
 from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.dynamics.spatial import Body
 from psdmc.errors import InputError
 from psdmc.lower.factored import RobotConstants, stored_entries
 from psdmc.lower.reframe import Reframed, placed_loops

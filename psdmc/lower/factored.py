@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.frames import as_vector
 from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.dynamics.spatial import Body
 from psdmc.errors import InternalError
 from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.lower.reframe import Reframed, placed_loops

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.frames import BASE, Follows, Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
+from psdmc.dynamics.spatial import Body
 from psdmc.program.lanes import lanes
 from psdmc.robot.limbs import Limbs, limb_groups
 from psdmc.robot.mechanism import NamedFrame, Placement

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psdmc.dynamics.choices import ByChoices, Choices
-from psdmc.dynamics.following import any_follows
+from psdmc.dynamics.coordinates import any_follows
 from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.lower.accuracy import LIMIT

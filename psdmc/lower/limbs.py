@@ -10,11 +10,10 @@ from itertools import accumulate, product
 
 import numpy as np
 
-from psdmc.dynamics.contacts import contact_jacobian
-from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.free_root import has_free_root
+from psdmc.dynamics.constraints import contact_jacobian
+from psdmc.dynamics.coordinates import joints_of_rates, leading
+from psdmc.dynamics.frames import Frame, has_floating_base
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import joints_of_rates, leading
 from psdmc.dynamics.solve import SingularMatrix, factorize, inner_product
 from psdmc.errors import InternalError
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
@@ -338,7 +337,7 @@ class _Trace:
         shares = list(self._shares(found, rates, core, 0))
         if any(each.below for each in self.signature.thin):
             shares += self._shares(found, self._along("contact_rows"), core, len(rates))
-        is_free, rows = has_free_root(self.reframed.frames), tuple(rates[k][1][0] for k in core)
+        is_free, rows = has_floating_base(self.reframed.frames), tuple(rates[k][1][0] for k in core)
         is_solved = found[Slot(THIN, core[0] * len(rates) + core[0])] == 0.0
         columns = {each.name: each.axes[1] for each in self.signature.outputs if len(each.axes) > 1}
         for axis in dict.fromkeys(columns[each.name] for each in self.signature.thin):

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.spatial import Body
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Placement
 

@@ -18,7 +18,7 @@ from operator import ne
 import numpy as np
 
 from psdmc.dynamics.choices import ByChoices, Choices
-from psdmc.dynamics.following import any_follows
+from psdmc.dynamics.coordinates import any_follows
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy

@@ -15,8 +15,8 @@ from math import isqrt
 
 import numpy as np
 
+from psdmc.dynamics.coordinates import leading
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.slices import leading
 from psdmc.program.dimensions import INERTIA, LENGTH, MASS, MOMENT, NUMBER, Dimension, dimension_of, times
 from psdmc.program.signature import OF_ROWS, Quantity, Signature
 from psdmc.robot.mechanism import Array, Loop, NamedFrame

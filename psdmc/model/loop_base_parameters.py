@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 
 from psdmc.dynamics.closed_loops import ANGULAR, loop_drift, loop_error, loop_jacobian
+from psdmc.dynamics.coordinates import neutral
 from psdmc.dynamics.frames import Frame, frames_of
 from psdmc.dynamics.manifold import integrated, restored
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import neutral
 from psdmc.errors import InputError
 from psdmc.model import recursive
 from psdmc.model.random_states import RANGES

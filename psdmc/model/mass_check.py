@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.dynamics.coordinates import positions
 from psdmc.dynamics.frames import frames_of
-from psdmc.dynamics.slices import positions
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints

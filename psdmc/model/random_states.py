@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from psdmc.dynamics.coordinates import normalized
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
-from psdmc.dynamics.slices import normalized
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism
 from psdmc.robot.zeros import leading_rows

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from psdmc.dynamics.arrow import Arrow
-from psdmc.dynamics.constraints import Constraints
-from psdmc.dynamics.contacts import of_active
+from psdmc.dynamics.constraints import Constraints, of_active
+from psdmc.dynamics.coordinates import first_rates, leading
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import first_rates, leading
 from psdmc.dynamics.solve import factorize
 from psdmc.program.regions import Column, Reader, Region, Straight, straight
 from psdmc.program.signature import THIN

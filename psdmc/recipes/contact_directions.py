@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.dynamics.contacts import Constrained, solved_again
+from psdmc.dynamics.constraints import Constrained, solved_again
 from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors

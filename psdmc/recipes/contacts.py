@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.closed_loops import ANGULAR, loop_jacobian
-from psdmc.dynamics.contacts import Constrained, constrained, contact_jacobian
+from psdmc.dynamics.constraints import Constrained, constrained, contact_jacobian
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inverse, inverse_diagonal
 from psdmc.program.factorisation import Structure, SymmetricMatrix

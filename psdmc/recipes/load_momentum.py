@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.generalized_momentum import generalized_momentum, load_momentum
+from psdmc.dynamics.momentum_and_energy import generalized_momentum, load_momentum
 from psdmc.program.signature import QD, Joined, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
@@ -18,6 +17,7 @@ from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivatives
+from psdmc.dynamics.spatial import Body
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.reproducible import solved, times
 from psdmc.robot.mechanism import Array, Mechanism

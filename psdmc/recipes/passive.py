@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 from psdmc.dynamics.closed_loops import ANGULAR, loop_drift, loop_error, loop_jacobian
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.kinematics import AT_BASE
+from psdmc.dynamics.kinematics import AT_BASE, Root
 from psdmc.dynamics.manifold import integrated
-from psdmc.dynamics.named_frames import Root
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inner_product, inverse_diagonal, solve
 from psdmc.program.factorisation import Structure, SymmetricMatrix

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.kinematics import AT_BASE
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector, scale, transform
+from psdmc.dynamics.spatial import Body
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import Choices
+from psdmc.dynamics.coordinates import first_rates
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
-from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.spatial import Body
 from psdmc.dynamics.structure import Places
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.program.regions import Regions

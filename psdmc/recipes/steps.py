@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.dynamics.coordinates import first_rates
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.manifold import integrated
+from psdmc.dynamics.manifold import StepSlopes, integrated, step_slopes
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.solve import inner_product
-from psdmc.dynamics.tangent_steps import StepSlopes, step_slopes
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import columns, matrix
 from psdmc.reproducible import times

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import add, sub
 
+from psdmc.dynamics.coordinates import flat, joints_of_rates, positions
 from psdmc.dynamics.derivatives import Derivatives, Rows, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import part_of, with_carriers
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.scalar import Scalar, Vector, dot
-from psdmc.dynamics.slices import flat, joints_of_rates, positions
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.program.gravity_input import GRAVITY, pass_gravity_on, takes_gravity
 from psdmc.recipes.recipe import Given, Ingredients, Recipe, RobotOnArrays

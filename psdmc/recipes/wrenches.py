@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.dynamics.named_frames import link_wrenches, local_jacobians
+from psdmc.dynamics.kinematics import link_wrenches, local_jacobians
 from psdmc.dynamics.newton_euler import Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product

@@ -19,9 +19,9 @@ from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.sources import plain_sources
 from psdmc.derivation.provenance import provenance
+from psdmc.dynamics.coordinates import neutral
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
-from psdmc.dynamics.slices import neutral
 from psdmc.errors import InputError
 from psdmc.files import refuse_foreign_file, write_whole
 from psdmc.links.physical_links import physical_links

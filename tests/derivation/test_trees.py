@@ -14,11 +14,11 @@ from random_trees import TREES, RandomTree
 from psdmc.derivation import derive
 from psdmc.derivation.base_parameters import reduction_link_by_link, sampled_reduction
 from psdmc.derivation.scaled import scaled
-from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import moved
+from psdmc.dynamics.spatial import body_from_parameters
 from psdmc.errors import DerivationError
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe

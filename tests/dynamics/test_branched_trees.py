@@ -11,10 +11,15 @@ from random_trees import COUNT, KINDS, TREES, RandomTree, assert_near, columns, 
 
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
-from psdmc.dynamics.kinematics import carried_by, forward_kinematics, frame_placement, jacobian, path_to
-from psdmc.dynamics.momentum import total_momentum
-from psdmc.dynamics.named_frames import frame_drifts
+from psdmc.dynamics.kinematics import (
+    carried_by,
+    forward_kinematics,
+    frame_drifts,
+    frame_placement,
+    jacobian,
+    path_to,
+)
+from psdmc.dynamics.momentum_and_energy import first_moment, kinetic_energy, potential_energy, total_momentum
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, NamedFrame, Placement

@@ -12,7 +12,7 @@ from random_trees import CHOICES, COUNT, TREES, RandomTree, columns, on_trees
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.frames import Follows
-from psdmc.dynamics.momentum import momentum_matrix, total_momentum
+from psdmc.dynamics.momentum_and_energy import momentum_matrix, total_momentum
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.solve import SingularMatrix, factorize
 

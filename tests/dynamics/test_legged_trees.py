@@ -9,9 +9,9 @@ from random_trees import COUNT, RandomTree, on_trees
 from test_derivatives import KINDS, assert_blocks_near
 from test_wide_joints_in_trees import KINDS as WIDE
 
-from psdmc.dynamics.centroidal import momentum_rate_slopes
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
-from psdmc.dynamics.named_frames import frame_acceleration_slopes, frame_accelerations, local_jacobians
+from psdmc.dynamics.kinematics import frame_acceleration_slopes, frame_accelerations, local_jacobians
+from psdmc.dynamics.momentum_and_energy import momentum_rate_slopes
 from psdmc.functions import RECIPES
 from psdmc.recipes.on_arrays import entries
 from psdmc.robot.mechanism import NamedFrame, Placement

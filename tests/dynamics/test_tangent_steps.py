@@ -9,7 +9,7 @@ import pytest
 from slow_cases import slow_but_for
 
 from psdmc.dynamics.frames import frames_of
-from psdmc.dynamics.tangent_steps import _coefficients, step_slopes
+from psdmc.dynamics.manifold import _coefficients, step_slopes
 from psdmc.robot.joints import FREE, PLANAR, SPHERICAL, TRANSLATION
 
 TYPES = {

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.energy import kinetic_energy, potential_energy
 from psdmc.dynamics.frames import BASE, Frame, frame_at
+from psdmc.dynamics.momentum_and_energy import kinetic_energy, potential_energy
 from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.dynamics.spatial import body_from_parameters
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
 from psdmc.robot.mechanism import Placement
 

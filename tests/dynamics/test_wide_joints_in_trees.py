@@ -10,13 +10,11 @@ from test_derivatives import assert_blocks_near, found_in, pinocchios
 
 from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
-from psdmc.dynamics.kinematics import forward_kinematics, jacobian
-from psdmc.dynamics.momentum import total_momentum
-from psdmc.dynamics.named_frames import frame_drifts
+from psdmc.dynamics.coordinates import neutral
+from psdmc.dynamics.kinematics import forward_kinematics, frame_drifts, jacobian
+from psdmc.dynamics.momentum_and_energy import first_moment, kinetic_energy, potential_energy, total_momentum
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
-from psdmc.dynamics.slices import neutral
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, NamedFrame, Placement
 
 KINDS = ("FRRRRRRR", "FSLTRPRS", "SRFRPLTR", "RPLSRFHR", "TLRRSRRF")

@@ -13,7 +13,7 @@ from wide_robots import SMALL, wide_robot
 
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.named_frames import placed_frames
+from psdmc.dynamics.kinematics import placed_frames
 from psdmc.dynamics.scalar import dot
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES

@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 from loop_trees import loop_tree
 
-from psdmc.dynamics.closed_loops import loop_drift, loop_error, loop_jacobian
+from psdmc.dynamics.closed_loops import (
+    loop_drift,
+    loop_error,
+    loop_error_slopes,
+    loop_jacobian,
+    loop_pushes,
+    loop_slopes,
+)
 from psdmc.dynamics.frames import frames_of
-from psdmc.dynamics.loop_slopes import loop_error_slopes, loop_pushes, loop_slopes
 from psdmc.dynamics.manifold import integrated
 
 Array = np.ndarray

@@ -11,9 +11,8 @@ import pytest
 from robots_at_hand import subject
 
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.energy import kinetic_energy, potential_energy
-from psdmc.dynamics.kinematics import jacobian
-from psdmc.dynamics.named_frames import frame_jacobians, link_wrenches, placed_frames
+from psdmc.dynamics.kinematics import frame_jacobians, jacobian, link_wrenches, placed_frames
+from psdmc.dynamics.momentum_and_energy import kinetic_energy, potential_energy
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.scalar import ZERO, Scalar, dot
 from psdmc.dynamics.solve import factorize, solve

@@ -10,12 +10,12 @@ import numpy as np
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
-from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.frames import Frame, frame_at
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
+from psdmc.dynamics.spatial import Body
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.equations import BaseParameter
 from psdmc.program.interpret import interpret

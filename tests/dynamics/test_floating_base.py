@@ -7,14 +7,15 @@ import pinocchio as pin
 import pytest
 from limbed import SHAPES, limbed
 
-from psdmc.dynamics.free_root import KNOWN_BY_Q, KNOWN_BY_QD, has_free_root, known_derivatives
+from psdmc.dynamics.forward_dynamics import KNOWN_BY_Q, KNOWN_BY_QD, known_derivatives
+from psdmc.dynamics.frames import has_floating_base
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_they_are_a_block_and_zeros(seed: int) -> None:
     tree = limbed(seed, *SHAPES["four legs of a floating body"])
     q, qd, tau = (rows[0] for rows in tree.motion(1))
-    assert has_free_root(tree.frames)
+    assert has_floating_base(tree.frames)
     by_turn, by_rate = known_derivatives(tree.frames, list(q), list(qd), tree.up)
 
     pin.computeABADerivatives(tree.model, tree.data, q, qd, tau)
@@ -30,4 +31,4 @@ def test_they_are_a_block_and_zeros(seed: int) -> None:
 
 def test_a_fixed_base_and_a_ball_joint_have_none() -> None:
     for trunk in ("RR", "S"):
-        assert not has_free_root(limbed(1, trunk, [(0, "RP", 2)]).frames)
+        assert not has_floating_base(limbed(1, trunk, [(0, "RP", 2)]).frames)
