@@ -21,8 +21,9 @@ from psdmc.calibration.campaign_file import listed_runs, read_campaign
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
 from psdmc.calibration.identify.steps import GravityRun, InertialRun, Load
 from psdmc.calibration.motions.allowed import GivenLimits
-from psdmc.calibration.motions.excite import Excitation, SineSum
+from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.limited_sines import SineSum
 from psdmc.calibration.motions.sweeps import (
     SineOptions,
     SweepOptions,

@@ -156,31 +156,22 @@ def _springs(value: object, chain: Mechanism, faults: list[str]) -> tuple[Effect
     if not isinstance(value, list) or len(value) > MOST_SPRINGS:
         faults.append(f"springs: found {shown(value)}, expected [[springs]], at most {MOST_SPRINGS}")
         return ()
-    kinds, found, names = KINDS, [], list[str]()
+    found, names = list[Effect](), list[str]()
     for k, entry in enumerate(value, start=1):
-        where, own = f"spring {k}", list[str]()
-        kind = (
-            kinds.get(entry.get("kind", "")) if isinstance(entry, dict) and _is_text(entry, "kind") else None
-        )
-        keys = (
-            "kind",
-            "name",
-            *(kind.keys if kind else sorted({key for one in kinds.values() for key in one.keys})),
-        )
-        table = TomlTable(entry, where, keys, own)
+        own: list[str] = []
+        said = entry.get("kind") if isinstance(entry, dict) else None
+        kind = KINDS.get(said) if isinstance(said, str) else None
+        keys = kind.keys if kind else sorted({key for one in KINDS.values() for key in one.keys})
+        table = TomlTable(entry, f"spring {k}", ("kind", "name", *keys), own)
         if isinstance(entry, dict):
-            table.word("kind", tuple(kinds))
+            table.word("kind", tuple(KINDS))
             names.append(table.text("name"))
-        found += list(kind.read(table, chain)) if kind else []
+        found += kind.read(table, chain) if kind else ()
         faults += own
     twice = sorted({quoted(name) for name in names if name and names.count(name) > 1})
     if twice:
         faults.append(f"springs: name {', '.join(twice)} twice")
     return tuple(found)
-
-
-def _is_text(entry: Mapping[str, Any], key: str) -> bool:
-    return isinstance(entry.get(key), str)
 
 
 def _friction(

@@ -20,7 +20,7 @@ from psdmc.calibration.description.guess import (
     unit_of,
     velocity_unit,
 )
-from psdmc.calibration.description.joint_tables import UNITS, What
+from psdmc.calibration.description.joint_tables import TIME_UNITS, UNITS, What
 from psdmc.calibration.logs.foreign_bytes import quoted
 from psdmc.calibration.logs.formats import format_of
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
@@ -36,15 +36,14 @@ MOST_LISTED = 200
 MISSING = "?"
 """Stands for a column that was not found: reading such a description names the joint and the quantity."""
 
-HEAD = (
-    "# Log description, drafted by psdmc calibrate --describe. Everything below is a guess from the columns' names",
-    "# and numbers: read it, correct it, then run psdmc calibrate MODEL.npz {name} -o OUT.npz",
-    "# Every key: docs/log_description.md",
-)
-KEYS = (
-    "# per joint, instead of a column alone: { column = ..., unit = ..., sign = -1, gear_ratio = 100, offset = 0,",
-    "#   torque_constant = 0.1 (N m/A of the motor, before the gear), delay = 0.004 (s by which the column lags) }",
-)
+HEAD = """\
+# Log description, drafted by psdmc calibrate --describe. Everything below is a guess from the columns' names
+# and numbers: read it, correct it, then run psdmc calibrate MODEL.npz {name} -o OUT.npz
+# Every key: docs/log_description.md
+#"""
+KEYS = """\
+# per joint, instead of a column alone: { column = ..., unit = ..., sign = -1, gear_ratio = 100, offset = 0,
+#   torque_constant = 0.1 (N m/A of the motor, before the gear), delay = 0.004 (s by which the column lags) }"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +72,11 @@ def drafted(
                 "give the model, too: psdmc calibrate --describe MODEL.npz LOG; or write log.toml by hand",
             )
         values = _values(columns, guess)
-        lines = [line.format(name=quoted_word(output.name)) for line in HEAD]
-        lines += ["#", *_listing(columns), ""]
+        lines = [HEAD.format(name=_quoted_word(output.name)), *_listing(columns), ""]
         for k, path in enumerate(paths):
-            lines += ["[[log]]", f"file = {toml_text(_beside(path, output))}"]
-            lines += [f"topic = {toml_text(topic)}"] if topic else []
-            lines += (
-                ['use = "fit"   # or "validate": held out as a whole', ""] if k == 0 else ['use = "fit"', ""]
-            )
+            lines += ["[[log]]", f"file = {_toml_text(_beside(path, output))}"]
+            lines += [f"topic = {_toml_text(topic)}"] if topic else []
+            lines += ['use = "fit"' + ("" if k else '   # or "validate": held out as a whole'), ""]
         lines += _time(columns, guess, values) + _quantities(columns, guess, values)
         lines += _joints(columns, guess, values)
     missing = tuple(
@@ -92,14 +88,13 @@ def drafted(
     return Draft("\n".join(lines) + "\n", missing)
 
 
-def toml_text(text: str) -> str:
-    """Return a text in TOML's quotes. TOML has the escapes of JSON, and also requires one for DEL."""
+def _toml_text(text: str) -> str:
+    """A text in TOML's quotes. TOML has the escapes of JSON, and also requires one for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def quoted_word(text: str) -> str:
-    """Return the name of a file as text for a TOML comment. The name is unchanged if all its characters are printable,
-    else it is quoted and escaped."""
+def _quoted_word(text: str) -> str:
+    """The name of a file for a TOML comment: quoted and escaped if some of its characters are not printable."""
     return text if text.isprintable() else quoted(text)
 
 
@@ -113,25 +108,22 @@ def _beside(path: Path, output: Path) -> str:
 
 def _listing(columns: Columns) -> list[str]:
     if not columns.names:
-        return [f"# {quoted_word(Path(columns.name).name)}: {columns.width} columns without names"]
-    lines = [f"# columns of {quoted_word(Path(columns.name).name)}:"]
+        return [f"# {_quoted_word(Path(columns.name).name)}: {columns.width} columns without names"]
+    lines = [f"# columns of {_quoted_word(Path(columns.name).name)}:"]
     lines += [f"#   {k}  {quoted(name)}" for k, name in enumerate(columns.names[:MOST_LISTED], start=1)]
     return lines
 
 
 def _values(columns: Columns, guess: Guess) -> dict[int, Array]:
     """The first rows of the guessed columns, by place; empty where they are no numbers."""
-    places = sorted({k for joint in guess.joints.values() for k in joint.values()} | _of(guess.time))
+    of_joints = {k for joint in guess.joints.values() for k in joint.values()}
+    places = sorted(of_joints if guess.time is None else of_joints | {guess.time})
     try:
         first = next(iter(columns.rows(places, False)), np.zeros((0, len(places))))
     except InputError:
         return {}
     first = first[np.all(np.abs(first) < LARGEST_NUMBER, axis=1)]  # not a number compares as false
     return {place: first[:, k] for k, place in enumerate(places)}
-
-
-def _of(place: int | None) -> set[int]:
-    return set() if place is None else {place}
 
 
 def _time(columns: Columns, guess: Guess, values: dict[int, Array]) -> list[str]:
@@ -178,7 +170,7 @@ def _unit(what: What, columns: Columns, guess: Guess, places: Sequence[int], val
     velocity = np.column_stack([values[joint["velocity"]] for joint in both])
     said = [columns.names[joint["position"]] for joint in both] if columns.names else []
     size = UNITS["position"][unit_of("position", said, position)].size
-    time = values[guess.time] * {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[time_unit(values[guess.time])]
+    time = values[guess.time] * TIME_UNITS[time_unit(values[guess.time])].size
     return velocity_unit(time, position * size, velocity) or unit_of(what, names, own)
 
 
@@ -187,13 +179,13 @@ def _places(guess: Guess, what: What) -> list[int]:
 
 
 def _joints(columns: Columns, guess: Guess, values: dict[int, Array]) -> list[str]:
-    lines = [*KEYS]
+    lines = [KEYS]
     if guess.by_number:
         lines.append(
             "# the file has no header: numbers of columns are a guess, in the order time, position, velocity, effort"
         )
     for joint, places in guess.joints.items():
-        lines += ["[[joint]]", f"name = {toml_text(joint)}"]
+        lines += ["[[joint]]", f"name = {_toml_text(joint)}"]
         for what in WHATS:
             if what == "motor_position" and what in places:
                 lines.append(_motor(columns, guess, values, places))
@@ -224,4 +216,4 @@ def _reference(columns: Columns, place: int) -> str:
     """A column's name where it is short, printable and the only one of that name; else its number."""
     name = columns.names[place] if columns.names else ""
     plain = 0 < len(name) <= LONGEST_NAME and name.isprintable() and columns.names.count(name) == 1
-    return toml_text(name) if plain else str(place + 1)
+    return _toml_text(name) if plain else str(place + 1)

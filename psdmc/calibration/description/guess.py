@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,24 +16,8 @@ from psdmc.calibration.logs.log import Array
 WORDS: Mapping[What, tuple[str, ...]] = {
     "velocity": ("qd", "dq", "qdot", "vel", "velocity", "velocities", "speed", "omega", "rpm", "qp"),
     "effort": (
-        "tau",
-        "torque",
-        "torques",
-        "trq",
-        "tq",
-        "effort",
-        "efforts",
-        "current",
-        "currents",
-        "cur",
-        "curr",
-        "amp",
-        "ampere",
-        "iq",
-        "i",
-        "moment",
-        "force",
-        "load",
+        *("tau", "torque", "torques", "trq", "tq", "effort", "efforts", "moment", "force", "load"),
+        *("current", "currents", "cur", "curr", "amp", "ampere", "iq", "i"),
     ),
     "position": (
         *("q", "pos", "position", "positions", "angle", "angles", "theta", "enc", "encoder", "ang", "p"),
@@ -42,16 +26,7 @@ WORDS: Mapping[What, tuple[str, ...]] = {
 }
 """Words in the names of columns; velocity before position, as 'qd' begins with 'q'."""
 COMMANDED = (
-    "target",
-    "desired",
-    "des",
-    "ref",
-    "reference",
-    "cmd",
-    "command",
-    "setpoint",
-    "goal",
-    "setp",
+    *("target", "desired", "des", "ref", "reference", "cmd", "command", "setpoint", "setp", "goal"),
     "error",
 )
 """Words of what was asked for, not measured."""
@@ -65,19 +40,10 @@ GEARLESS = 0.05
 TOGETHER = 0.95
 """Correlation from which two columns are the positions of one joint's two sides."""
 TIMES = (
-    "time_s",
-    "time",
-    "t",
-    "timestamp",
-    "stamp",
-    "sec",
-    "seconds",
-    "ms",
-    "millis",
-    "date",
-    "datetime",
-    "when",
+    *("time_s", "time", "t", "timestamp", "stamp", "sec", "seconds", "ms", "millis"),
+    *("date", "datetime", "when"),
 )
+"""Words of time, the likeliest first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +53,11 @@ class Guess:
     time       column of time; None if no column resembles time
     joints     columns by joint name, in the order of the model if it is known, else of the log
     by_number  True: the names of the columns gave no hint, and the guess follows only from the number of columns
-    other      columns without a guess
     """
 
     time: int | None
     joints: Mapping[str, Mapping[What, int]]
     by_number: bool = False
-    other: tuple[int, ...] = field(default=())
 
 
 def guessed(names: Sequence[str], width: int, joint_names: Sequence[str] | None) -> Guess:
@@ -213,11 +177,7 @@ def _by_number(width: int, joint_names: Sequence[str] | None) -> Guess:
     return Guess(time, joints, by_number=True)
 
 
-LENGTHS = {
-    "deg": "deg",
-    "degree": "deg",
-    "degrees": "deg",
-    "rad": "rad",
+LENGTHS = {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad"} | {
     "rev": "rev",
     "ticks": "ticks",
     "counts": "ticks",

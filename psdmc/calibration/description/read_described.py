@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,17 +51,11 @@ def described_logs(
     found = []
     for entry in description.part(LOGS):
         progress(f"reading {entry.name}")
-        with _of(description):
+        try:
             found.append(_described(description, entry, joint_names, held))
+        except InputError as error:
+            raise InputError(f"{description.path}: {error.message}", error.hint) from error
     return tuple(found)
-
-
-@contextmanager
-def _of(description: LogDescription) -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{description.path}: {error.message}", error.hint) from error
 
 
 def _described(
@@ -76,7 +70,7 @@ def _described(
         layout = _layout(description, entry.name, joint_columns(description, joint_names, tables))
         time, store = _read(tables, description.part(TIME), layout.columns, entry.name, held)
     date = date_of(float(time[0]))
-    si = in_si(time, store, layout, description.part(COUPLING), entry)
+    si = _in_si(time, store, layout, description.part(COUPLING), entry)
     log = StoredLog(
         name=entry.name,
         joint_names=joint_names,
@@ -146,12 +140,14 @@ def _read(
     tables: Mapping[str, Columns], time: TimeEntry, columns: Sequence[Found], name: str, held: int
 ) -> tuple[Array, RowStore]:
     """Time (s), and the rows of the columns as logged."""
-    parts = {table: [k for k, found in enumerate(columns) if found.table == table] for table in tables}
     clock = None if time.rate else place_of(time.column, next(iter(tables)), tables, "time")
     if len(tables) == 1:
-        pieces = _pieces(next(iter(tables.values())), columns, clock, time.dates)
+        places = [found.place for found in columns]
+        # without a column of time, the first one is read in its place
+        places.insert(0, places[0] if clock is None else clock[1])
+        pieces = next(iter(tables.values())).rows(places, time.dates)
     else:
-        pieces = _side_by_side(tables, parts, columns, clock, time.dates)
+        pieces = _side_by_side(tables, columns, clock, time.dates)
     store, times = RowStore(len(columns), held), array("d")  # it grows in place
     count = 0
     for piece in pieces:
@@ -167,36 +163,23 @@ def _read(
     return whole, store
 
 
-def _pieces(
-    table: Columns, columns: Sequence[Found], clock: tuple[str, int] | None, dates: bool
-) -> Iterator[Array]:
-    """Rows of time (where there is none: of the first column) and the columns."""
-    places = [found.place for found in columns]
-    return table.rows([places[0] if clock is None else clock[1], *places], dates)
-
-
 def _side_by_side(
-    tables: Mapping[str, Columns],
-    parts: Mapping[str, list[int]],
-    columns: Sequence[Found],
-    clock: tuple[str, int] | None,
-    dates: bool,
+    tables: Mapping[str, Columns], columns: Sequence[Found], clock: tuple[str, int] | None, dates: bool
 ) -> Iterator[Array]:
     """Yield blocks of the kept columns of several tables, row by row. Raises InputError if they differ in length."""
     whole: dict[int, Array] = {}
     lengths = {}
     for name, table in tables.items():
-        own = [columns[k].place for k in parts[name]]
+        own = {k: found.place for k, found in enumerate(columns) if found.table == name}
         is_clock = clock is not None and clock[0] == name
         if not own and not is_clock:
             continue
-        read = np.concatenate(
-            list(table.rows([*([clock[1]] if clock and is_clock else []), *own], dates and is_clock))
-        )
+        places = [*([clock[1]] if clock and is_clock else []), *own.values()]
+        read = np.concatenate(list(table.rows(places, dates and is_clock)))
         lengths[table.name] = len(read)
         if is_clock:
             whole[-1], read = read[:, 0], read[:, 1:]
-        whole |= {k: read[:, j] for j, k in enumerate(parts[name])}
+        whole |= {k: read[:, j] for j, k in enumerate(own)}
     if len(set(lengths.values())) > 1:
         found = ", ".join(f"{name} has {count}" for name, count in lengths.items())
         raise refused(f"tables of one log differ in rows: {found}, expected a row of each for every time")
@@ -226,11 +209,10 @@ class Layout:
     has_motors: bool = False
 
 
-def in_si(
+def _in_si(
     time: Array, store: RowStore, layout: Layout, coupling: CouplingEntry, entry: LogEntry
 ) -> tuple[Array, RowStore]:
-    """Return the time and the rows of a log in SI units, without delays of columns, between the start and end in
-    `entry`.
+    """The time and the rows of a log in SI units, without delays of columns, between the start and end in `entry`.
 
     time    (N,) s
     store   the N rows as recorded
@@ -240,9 +222,11 @@ def in_si(
     """
     delays = np.array([found.delay for found in layout.columns])
     begin = time[0]
-    time, store = without_delays(time, store, delays, entry.name)
+    time, store = _without_delays(time, store, delays, entry.name)
     with np.errstate(invalid="ignore", over="ignore"):
-        first, stop = _kept(time - begin, entry)
+        since = time - begin
+        first = int(np.searchsorted(since, entry.start)) if entry.start > 0.0 else 0
+        stop = int(np.searchsorted(since, entry.end, side="right")) if np.isfinite(entry.end) else len(time)
         if first >= stop:
             lasts = f"it lasts {float(time[-1] - begin):.4g} s" if len(time) else "nothing is left of it"
             raise refused(f"{entry.name}: no rows from {entry.start:g} to {entry.end:g} s, {lasts}")
@@ -268,22 +252,15 @@ def _same(values: Array) -> Array:
     return values
 
 
-def _kept(time: Array, entry: LogEntry) -> tuple[int, int]:
-    """First row between start and end, and the one after the last; time counts from the log's first row."""
-    first = int(np.searchsorted(time, entry.start)) if entry.start > 0.0 else 0
-    stop = int(np.searchsorted(time, entry.end, side="right")) if np.isfinite(entry.end) else len(time)
-    return first, stop
-
-
 BLOCK_ROWS = 65_536
 """Rows converted at once."""
 NEIGHBOURS = 4
 """Rows on either side that interpolation between rows uses."""
 
 
-def without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tuple[Array, RowStore]:
-    """Return the time and the rows of a log without the delays of its columns. Column k of the row at time t becomes
-    the value of the column at time t + delays[k], by interpolation.
+def _without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tuple[Array, RowStore]:
+    """The time and the rows of a log without the delays of its columns. Column k of the row at time t becomes the value
+    of the column at time t + delays[k], by interpolation.
 
     time    (N,) s
     store   N rows of len(delays) columns

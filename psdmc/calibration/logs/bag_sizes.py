@@ -12,7 +12,7 @@ import struct
 import sys
 import tempfile
 from bz2 import BZ2Decompressor
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -73,17 +73,12 @@ def require_packed_messages(file: Path) -> None:
             "record the bag again by `ros2 bag record --compression-mode file`, or without compression",
         )
     left = allowed = _allowed(file)
-    with decoding(str(file), "a packed ROS 2 bag"):
-        for message in _messages(file):
-            left -= unpacked_size(io.BytesIO(message), len(message), "zstd", left)
-            _require(allowed - left, allowed, file)
-
-
-def _messages(file: Path) -> Iterator[bytes]:
-    with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+    uri = f"{file.absolute().as_uri()}?mode=ro&immutable=1"
+    with decoding(str(file), "a packed ROS 2 bag"), closing(sqlite3.connect(uri, uri=True)) as connection:
         for (message,) in connection.execute("SELECT data FROM messages"):
             if isinstance(message, bytes):
-                yield message
+                left -= unpacked_size(io.BytesIO(message), len(message), "zstd", left)
+                _require(allowed - left, allowed, file)
 
 
 def _allowed(file: Path) -> int:
@@ -120,10 +115,7 @@ def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> 
     packed, unpacked = (sum(sizes) for sizes in zip(*claims, strict=True)) if claims else (0, 0)
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
     if unpacked > allowed:
-        raise InputError(
-            f"{path}: unpacks to {unpacked:,} bytes, expected at most {allowed:,}",
-            "record the bag again without compression, or cut it into several",
-        )
+        raise InputError(f"{path}: unpacks to {unpacked:,} bytes, expected at most {allowed:,}", SMALLER)
     if packed > file_bytes:
         raise InputError(
             f"{path}: damaged: chunks of {packed:,} bytes in a file of {file_bytes:,}", WRITE_AGAIN

@@ -319,21 +319,22 @@ def require_rosbags() -> None:
         raise InputError("ROS bags need rosbags", "pip install 'psdmc[calibrate]'") from error
 
 
-def any_reader_topics(path: Path) -> tuple[str, ...]:
-    """Return the topics with joint states in a bag that rosbags' AnyReader opens."""
+def _any_reader(path: Path) -> Any:
     require_rosbags()
     from rosbags.highlevel import AnyReader
 
-    with AnyReader([path]) as reader:
+    return AnyReader([path])
+
+
+def any_reader_topics(path: Path) -> tuple[str, ...]:
+    """Return the topics with joint states in a bag that rosbags' AnyReader opens."""
+    with _any_reader(path) as reader:
         return tuple(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == MESSAGE_TYPE))
 
 
 def any_reader_messages(path: Path, topic: str) -> Iterator[bytes]:
     """Yield the serialised joint states of a topic in a bag that rosbags' AnyReader opens."""
-    require_rosbags()
-    from rosbags.highlevel import AnyReader
-
-    with AnyReader([path]) as reader:
+    with _any_reader(path) as reader:
         connections = [c for c in reader.connections if c.topic == topic and c.msgtype == MESSAGE_TYPE]
         for _, _, raw in reader.messages(connections=connections) if connections else ():
             yield bytes(raw)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
+from operator import call
 from typing import Any, TypeVar
 
 from psdmc.workers import Lost, at_once, connected, result_of, submitted
@@ -96,9 +97,7 @@ def each_part(parts: Iterable[Part], work: Callable[[Part], Result]) -> Iterator
     import cloudpickle
 
     function = workers.submitted(pickle.loads, cloudpickle.dumps(work))
-    for part, future in _ahead(
-        parts, lambda part: workers.submitted(_applied, function, part), workers.ahead
-    ):
+    for part, future in _ahead(parts, lambda part: workers.submitted(call, function, part), workers.ahead):
         yield part, workers.result(future, partial(work, part))
 
 
@@ -117,7 +116,3 @@ def _ahead(parts: Iterable[Part], submit: Callable[[Part], Any], ahead: int) -> 
         if len(waiting) > ahead:
             yield waiting.popleft()
     yield from waiting
-
-
-def _applied(work: Callable[[Part], Result], part: Part) -> Result:
-    return work(part)

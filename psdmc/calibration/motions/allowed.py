@@ -80,21 +80,17 @@ class GivenLimits:
             "effort": self.efforts.values(),
         }
         for what, values in sizes.items():
-            _require_sizes(what, values)
+            for value in values:
+                if not 0 < value <= LARGEST_LIMIT:
+                    raise InputError(
+                        f"{what} is {value:g}, expected more than 0, at most {LARGEST_LIMIT:g}",
+                        "in rad/s^2, rad/s or N m; m/s^2, m/s or N where a joint slides",
+                    )
 
     @property
     def names(self) -> tuple[str, ...]:
         named = (self.ranges, self.speeds, self.accelerations, self.efforts)
         return tuple(dict.fromkeys(name for given in named for name in given))
-
-
-def _require_sizes(what: str, values: Iterable[float]) -> None:
-    for value in values:
-        if not 0 < value <= LARGEST_LIMIT:
-            raise InputError(
-                f"{what} is {value:g}, expected more than 0, at most {LARGEST_LIMIT:g}",
-                "in rad/s^2, rad/s or N m; m/s^2, m/s or N where a joint slides",
-            )
 
 
 def bounded(chain: Mechanism, given: GivenLimits) -> Mechanism:

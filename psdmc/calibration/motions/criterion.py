@@ -101,7 +101,8 @@ def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float,
     derivatives are those by the entries of the Gram matrix (m, m) before scaling.
     """
     if objective == "log_det":
-        return negative_log_det(of)
+        inverse = (of.vectors / of.values) @ of.vectors.T
+        return of.log_det, -inverse / np.outer(of.lengths, of.lengths)
     value, by_gram = smooth_condition(of, power)
     if objective == "condition":
         return value, by_gram
@@ -127,12 +128,6 @@ def smooth_condition(of: Scaled, power: float) -> tuple[float, Array]:
     by_gram = by_matrix / np.outer(of.lengths, of.lengths)
     by_gram -= np.diag((by_matrix * of.matrix).sum(axis=1) / of.lengths**2)
     return 0.5 * float(value), by_gram
-
-
-def negative_log_det(of: Scaled) -> tuple[float, Array]:
-    """Return minus the log determinant of the unscaled Gram matrix, and its derivatives."""
-    inverse = (of.vectors / of.values) @ of.vectors.T
-    return of.log_det, -inverse / np.outer(of.lengths, of.lengths)
 
 
 SPEED_STEP = 1e-6

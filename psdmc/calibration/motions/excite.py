@@ -19,8 +19,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.allowed import Allowed, require_limits
 from psdmc.calibration.motions.criterion import FitColumns, Scaled, scaled
 from psdmc.calibration.motions.excite_options import ExciteOptions, Objective
-from psdmc.calibration.motions.limited_sines import LimitedSines
-from psdmc.calibration.motions.limited_sines import SineSum as SineSum
+from psdmc.calibration.motions.limited_sines import LimitedSines, SineSum
 from psdmc.calibration.motions.search import Criterion, SearchProgress, cpu_seconds, search
 from psdmc.calibration.motions.sweeps import swept_range
 from psdmc.errors import InputError
@@ -130,8 +129,9 @@ def excite(
     reached = [_within(space.motion(point), space, columns, torques_alone) for point in found.points]
     best = _best_allowed([*reached, best_random], space, columns, allowed)
     if best is None:
+        why = "; ".join(_faults(space.motion(drawn[0]).shrunk(SHRINKS[-1]), space, allowed))
         raise InputError(
-            f"no exciting motion is allowed: {_why_not(space, drawn[0], allowed)}",
+            f"no exciting motion is allowed: {why or 'each one hits something'}",
             "give other limits (--range, --effort, --torque-margin), or a floor that is lower",
         )
     motion, reached_columns = best
@@ -238,13 +238,6 @@ def _cleared(space: LimitedSines, point: Array, is_free: Callable[[Array], bool]
         if is_free(smaller):
             return smaller
     return None
-
-
-def _why_not(space: LimitedSines, point: Array, allowed: Allowed) -> str:
-    return (
-        "; ".join(_faults(space.motion(point).shrunk(SHRINKS[-1]), space, allowed))
-        or "each one hits something"
-    )
 
 
 SWEEP_POINTS = 15

@@ -149,8 +149,10 @@ def search(
         counted.until = budget * (number + 1) // descents
         for power in POWERS[:1] if options.objective == "log_det" else POWERS:
             counted.begin(power, point)
+            left = max(counted.until - counted.count, 1)
+            limits = {"maxiter": PER_START, "maxfun": left, "maxcor": REMEMBERED}
             with contextlib.suppress(OutOfTime):
-                minimize(counted, point, jac=True, method="L-BFGS-B", options=_lbfgs(counted))
+                minimize(counted, point, jac=True, method="L-BFGS-B", options=limits)
             point = counted.point
             if counted.is_over:
                 break
@@ -165,11 +167,6 @@ def search(
     order = sorted(range(len(best)), key=lambda k: best[k][0])
     history = np.array(counted.history).reshape(-1, 2)
     return Found(tuple(best[k][1] for k in order), counted.count, history, counted.is_late)
-
-
-def _lbfgs(counted: _Counted) -> dict[str, int]:
-    left = counted.until - counted.count
-    return {"maxiter": PER_START, "maxfun": max(left, 1), "maxcor": REMEMBERED}
 
 
 class _Counted:

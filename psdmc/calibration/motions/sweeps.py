@@ -220,7 +220,8 @@ def _to_and_fro(low: float, high: float, start: float, speed: float, options: Sw
     A reversal covers no net distance, so it starts where the range has room for its overshoot.
     """
     blend = options.blend
-    room = _blend_reach(speed, blend)
+    # how far a reversal overshoots its start: the integral of the speed up to its zero
+    room = float(_blend(np.array([0.5]), blend, speed, -speed)[0][0])
     low, high = low + room, high - room
     start = min(max(start, low), high)
     pieces: list[Piece] = [(blend, 0.0, speed)]
@@ -238,11 +239,6 @@ def _to_and_fro(low: float, high: float, start: float, speed: float, options: Sw
             pieces.append((left, direction * speed, 0.0))
             return [*pieces, (2 * blend, 0.0, 0.0)]
     return [*pieces, (blend, direction * speed, 0.0), (blend, 0.0, 0.0)]
-
-
-def _blend_reach(speed: float, blend: float) -> float:
-    """How far a reversal overshoots its start: the integral of the speed up to its zero."""
-    return float(_blend(np.array([0.5]), blend, speed, -speed)[0][0])
 
 
 def _run(pieces: Sequence[Piece], start: float, time: Array) -> tuple[Array, Array, Array]:

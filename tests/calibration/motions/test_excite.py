@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.motions.allowed import GivenLimits, bounded
-from psdmc.calibration.motions.excite import MEASURES, SineSum, excite
+from psdmc.calibration.motions.excite import MEASURES, excite
 from psdmc.calibration.motions.excite_options import ExciteOptions
-from psdmc.calibration.motions.limited_sines import LimitedSines
+from psdmc.calibration.motions.limited_sines import LimitedSines, SineSum
 from psdmc.calibration.motions.trajectory import limit_faults
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Limits

@@ -15,9 +15,10 @@ from rosbags.typesys import Stores, get_typestore
 
 from psdmc.calibration.campaign import write_campaign
 from psdmc.calibration.campaign_plan import CampaignOptions, PlannedRun
-from psdmc.calibration.motions.excite import Excitation, SineSum
+from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.formats.motion_format import resampled
+from psdmc.calibration.motions.limited_sines import SineSum
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.errors import InputError
 
