@@ -32,7 +32,7 @@ READ_AT_START = ("PYTHON", "LC_", "LANG", "OPENBLAS_", "OMP_")
 LOADED = (
     "pinocchio",
     "psdmc.cli.boundary",
-    "psdmc.cli.show_checks",
+    "psdmc.cli.tables",
     "psdmc.compiler",
     "psdmc.robot.mujoco_reading",
     "psdmc.toolchain.build_package",

@@ -19,6 +19,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from psdmc.backends import BACK_ENDS
 from psdmc.backends.c.adapters import ADAPTERS
 from psdmc.backends.manifest import (
     GENERATOR,
@@ -33,7 +34,6 @@ from psdmc.backends.manifest import (
     listed,
     renamed,
 )
-from psdmc.backends.protocol import BACK_ENDS
 from psdmc.errors import InputError
 from psdmc.files import (
     missing_folders,

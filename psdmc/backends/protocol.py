@@ -11,15 +11,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
+from psdmc.backends import BACK_ENDS
 from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Signature, in_order
 from psdmc.robot.mechanism import BASE_FRAME
-
-BACK_ENDS = ("c", "rust", "cuda")
-"""By name, the rooms of this folder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
-"""The commands `psdmc calibrate`, a model from logs, and `psdmc payload`, the load that a robot carries."""
+"""The command `psdmc calibrate`, which identifies a model's parameters from logs, and what it prints."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,6 +23,7 @@ from psdmc.errors import InputError
 if TYPE_CHECKING:
     from psdmc.calibration.description.description import FitChoice
     from psdmc.calibration.sources import LogNaming
+    from psdmc.model.calibrated import Calibrated, Verdict
 
 Topic = Annotated[
     str | None, typer.Option(metavar="TOPIC", help="topic of joint states, if a bag has several")
@@ -158,13 +160,6 @@ def calibrate(
     from psdmc.calibration.calibrate import CalibrateOptions
     from psdmc.calibration.identify.visibility import EssentialOptions
     from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
-    from psdmc.cli.show_checks import (
-        print_accuracy,
-        print_elasticity,
-        print_proposal,
-        print_torque_constants,
-        print_verdict,
-    )
     from psdmc.model.calibrated import code_of
     from psdmc.model.load import load as load_model
     from psdmc.report.calibrate_commands import calibrate_command
@@ -297,71 +292,62 @@ def naming_of(topic: str | None, joint_map: Sequence[str] | None) -> LogNaming:
     return LogNaming(topic or "", parsed_joint_map(joint_map))
 
 
-def payload(
-    model: Annotated[
-        Path,
-        typer.Argument(metavar="MODEL", help="model of the robot without the load, best a calibrated one"),
-    ],
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG...", help="logs recorded with the load, or a log description"),
-    ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="LOAD.toml", help="write the load to this file")
-    ] = None,
-    loaded: Annotated[
-        Path | None,
-        typer.Option("--loaded", metavar="MODEL.npz", help="write the model with the load to this file"),
-    ] = None,
-    frame: Annotated[
-        str | None, typer.Option(metavar="NAME", help="frame in which the load is given; default: the tip's")
-    ] = None,
-    torque_constants: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=KT,...",
-            help="joint torque per ampere in N m/A, gear included; default: the model's",
-        ),
-    ] = None,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="write the files even if the verdict is: not usable")
-    ] = False,
-    topic: Topic = None,
-    joint_map: JointMap = None,
-) -> None:
-    """Identify a load's mass, centre of mass and inertia from logs with it; the verdict comes first, exit 6: not usable."""
-    from psdmc.calibration.payload import identify_payload
-    from psdmc.cli.show_checks import print_verdict
-    from psdmc.cli.tables import print_line
-    from psdmc.model.load import load
+def print_verdict(verdict: Verdict) -> None:
+    """Print whether a calibration can be used, with reasons and doubts."""
+    for line in verdict.lines():
+        print(one_line(line))
 
-    check_output(output, model, *logs)
-    check_output(loaded, model, *logs, *([output] if output else []))
-    known, constants = load(model), parsed_torque_constants(torque_constants)
-    with steps() as progress:
-        found = identify_payload(
-            known,
-            logs,
-            frame,
-            torque_constants=constants,
-            progress=progress,
-            naming=naming_of(topic, joint_map),
+
+def print_proposal(record: Calibrated) -> None:
+    """Print the lines of a log description that describe a coupling which the calibration found; nothing if it found
+    none."""
+    from psdmc.model.calibrated import PROPOSED_COUPLING
+
+    proposed = record.facts.get(PROPOSED_COUPLING)
+    if proposed is not None:
+        print("# proposed for log.toml, not applied:")
+        print(proposed["toml"])
+
+
+def print_accuracy(record: Calibrated) -> None:
+    """Print R^2 on held-out data for each joint and step of the calibration."""
+    from psdmc.cli.tables import Table, print_table
+
+    rows = []
+    for joint in record.joint_names:
+        both = [step.joints.get(joint) for step in record.steps]
+        rows.append((joint, *("" if b is None else f"{b.held_out.r2:.4f}" for b in both)))
+    print_table(Table(("joint", *(f"{step.step} R^2" for step in record.steps)), rows))
+
+
+def print_elasticity(record: Calibrated) -> None:
+    """Print stiffness and damping of the joints with two encoders; nothing if there are none."""
+    from psdmc.cli.tables import Table, print_table
+
+    rows = [
+        (
+            row.joint,
+            row.name,
+            f"{row.value:.6g}",
+            f"{row.std:.2g}",
+            f"{row.std / abs(row.value):.2%}",
+            row.unit,
         )
-    print_verdict(found.verdict)
-    print_line(f"on {found.frame!r} of {found.robot!r}:")
-    for line in found.lines():
-        print(f"  {line}")
-    for note in found.notes:
-        print_line(f"note: {note}")
-    written = found.verdict.usable or keep
-    if written and output is not None:
-        found.save(output)
-    if written and loaded is not None:
-        found.added_to(known).save(loaded)
-    for path in (output, loaded):
-        if path is not None:
-            print(f"{path}: {'written' if written else 'not written; --keep writes it all the same'}")
-    if not found.verdict.usable:
-        raise typer.Exit(found.verdict.exit_status)
-    if loaded is not None:
-        say_next("emit-c", loaded, "-o", loaded.stem)
+        if math.isfinite(row.std)
+        else (row.joint, row.name, "not determined", "", "", row.unit)
+        for row in record.elasticity
+    ]
+    if rows:
+        print_table(Table(("joint", "elasticity", "value", "standard deviation", "of it", "unit"), rows))
+
+
+def print_torque_constants(record: Calibrated) -> None:
+    """Print the torque constants that the calibration found, with standard deviations; nothing if it found none."""
+    from psdmc.cli.tables import Table, print_table
+
+    found = [row for row in record.motors if row.seen]
+    rows = [
+        (row.joint, f"{row.value:.6g}", f"{row.std:.2g}", f"{row.std / abs(row.value):.2%}") for row in found
+    ]
+    if rows:
+        print_table(Table(("joint", "torque constant [N m/A]", "standard deviation", "of it"), rows))

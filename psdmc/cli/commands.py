@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from psdmc.cli.calibrating import calibrate, payload
+from psdmc.cli.calibrating import calibrate
 from psdmc.cli.campaigning import excite, simulate
 from psdmc.cli.emitting import EmitCommand, emit, emit_c, export_urdf
 from psdmc.cli.pipeline import build, cache, check, derive
 from psdmc.cli.running import bench, sample
 from psdmc.cli.showing import figures, show, view
 from psdmc.cli.starting import doctor, new
-from psdmc.cli.validating import compare, validate
+from psdmc.cli.validating import compare, payload, validate
 from psdmc.version import psdmc_version
 
 app = typer.Typer(

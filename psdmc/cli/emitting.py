@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from psdmc.backends import BACK_ENDS
 from psdmc.cli.arguments import check_output, names
 from psdmc.cli.console import quoted, say_next, say_next_line, steps
 from psdmc.cli.pipeline import CHECK_FAILED_STATUS, ModelFile
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from psdmc.export.export_urdf import Exported
     from psdmc.export.read_back import Reading
     from psdmc.model.dynamics_model import DynamicsModel
-
-BACK_ENDS = ("c", "rust", "cuda")
-"""Those of psdmc.backends.protocol, which loads slowly; a test compares."""
 
 
 class EmitCommand(TyperCommand):

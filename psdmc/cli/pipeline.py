@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +19,7 @@ from psdmc.target.presets import PRESETS
 
 if TYPE_CHECKING:
     from psdmc.model.dynamics_model import DynamicsModel
+    from psdmc.verification.check import CheckRow
 
 CHECK_FAILED_STATUS = 5
 
@@ -221,7 +224,6 @@ def check(
 ) -> None:
     """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source, and its mass
     matrix."""
-    from psdmc.cli.show_checks import print_check, print_mass_check
     from psdmc.model.load import load
     from psdmc.model.mass_check import check_mass_matrix
     from psdmc.robot.load import load_robot
@@ -248,11 +250,32 @@ def check(
         rows = check_model(found, source)
         progress("checking the mass matrix")
         mass = check_mass_matrix(found)
-    print_check(rows)
-    print_mass_check(mass)
+    _print_check(rows)
+    if mass is None:
+        print("mass matrix: not tested, for the base parameters are unknown")
+    else:
+        print(f"{'pass' if mass.passed else 'FAIL'}: {mass.reason}")
     if not all(row.passed for row in rows) or (mass is not None and not mass.passed):
         raise typer.Exit(CHECK_FAILED_STATUS)
     say_what_a_model_is_for(model, found)
+
+
+def _print_check(rows: Sequence[CheckRow]) -> None:
+    """Print the result of each comparison, and which programs read the robot file."""
+    from psdmc.cli.tables import Table, print_line, print_table
+    from psdmc.verification.check import readers
+
+    texts = []
+    for row in rows:
+        limit = "" if row.limit is None else f"{row.limit:.0e}"
+        error = "" if math.isnan(row.error) and row.limit is None else f"{row.error:.1e}"
+        verdict = "" if row.limit is None else "pass" if row.passed else "FAIL"
+        remark = f" ({row.remark})" if row.remark else ""
+        texts.append((verdict, error, limit, f"{row.name}: {row.against}{remark}"))
+    print_table(
+        Table(("result", "error", "limit", "relative error of what, against what"), texts, prose=True)
+    )
+    print_line(readers(rows))
 
 
 def build(
@@ -289,12 +312,12 @@ def cache(
     clear: Annotated[bool, typer.Option("--clear", help="remove every entry")] = False,
 ) -> None:
     """Show where compiled libraries are kept and how many, or remove them."""
-    from psdmc.cli.show_checks import megabytes
     from psdmc.toolchain.cache_room import cache_contents, clear_cache
 
     if clear:
         print(f"{clear_cache()} entries removed")
     found = cache_contents()
-    print(f"{found.place}: {found.entries} entries, {megabytes(found.size)} of {megabytes(found.limit)}")
+    size, limit = (f"{count / 2**20:.1f} MiB" for count in (found.size, found.limit))
+    print(f"{found.place}: {found.entries} entries, {size} of {limit}")
     if found.entries:
         say_next("cache", "--clear")

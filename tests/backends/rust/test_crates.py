@@ -15,9 +15,10 @@ from bundled import bundled_model, robot_path
 from command_line import typed
 
 import psdmc
-from psdmc.backends.protocol import BACK_ENDS, back_end
+from psdmc import backends
+from psdmc.backends import BACK_ENDS
+from psdmc.backends.protocol import back_end
 from psdmc.backends.rust.names import KEYWORDS, comment, identifier, text
-from psdmc.cli import emitting
 from psdmc.compiler import emit
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, OF_TREES, RECIPES
@@ -221,6 +222,8 @@ def test_what_is_refused(words: tuple[str, ...], said: str, tmp_path: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
-def test_the_command_line_names_all_back_ends() -> None:
-    assert emitting.BACK_ENDS == BACK_ENDS
+def test_every_folder_with_a_back_end_is_named_in_the_help_too() -> None:
+    folders = {path.parent.name for path in Path(backends.__file__).parent.glob("*/back_end.py")}
+    assert folders == set(BACK_ENDS)
+    assert f"language of the package: {', '.join(BACK_ENDS)}" in " ".join(typed("emit", "-h").stdout.split())
     assert all(back_end(name).files for name in BACK_ENDS)

@@ -25,7 +25,7 @@ from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli import main
-from psdmc.cli.show_checks import print_accuracy
+from psdmc.cli.calibrating import print_accuracy
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
 from psdmc.model.calibrated_json import document
