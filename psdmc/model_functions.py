@@ -23,8 +23,8 @@ from psdmc.model.expansion import Expansion
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.robot.coordinates import units_of
 from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism, contact_names
-from psdmc.robot.unit_lengths import units_of
 from psdmc.toolchain.call_arguments import (
     THETA_B,
     RobotAxes,

@@ -36,10 +36,10 @@ DECISIONS = {
     "recipes/load_momentum.py": "Pinocchio's side of a comparison",
     "robot/reference.py": "Pinocchio's side of a comparison",
     "robot/mujoco_reading.py": "MuJoCo's side of a comparison",
-    "robot/unit_lengths.py": "a refusal",
+    "robot/coordinates.py:refuse_other_lengths": "a refusal",
     "robot/joints/joint_type.py": "a rank",
     "robot/reference_model.py": "a rank, and the textbook's side of a comparison",
-    "robot/inertia.py": "a refusal, whose rounding is not printed",
+    "robot/inertia.py:physical_fault": "a refusal, whose rounding is not printed",
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
@@ -63,16 +63,19 @@ DECISIONS = {
     "lower/accuracy.py": "errors that are compared with limits",
     "backends/reference_states.py": "condition numbers, which order states after rounding",
 }
-"""Files that use such functions for decisions with slack, or for another program's side of a comparison."""
+"""Files, or single functions of files, that use such functions for decisions with slack, or for another program's side of
+a comparison."""
 
 
 def strange_calls() -> Iterator[str]:
     for folder in WRITTEN:
         for path in sorted((PACKAGE / folder).rglob("*.py")):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                is_call = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
-                if is_call and node.value.id in ("np", "math") and node.attr in STRANGE:
-                    yield path.relative_to(PACKAGE).as_posix()
+            file = path.relative_to(PACKAGE).as_posix()
+            for part in ast.parse(path.read_text(encoding="utf-8")).body:
+                for node in ast.walk(part):
+                    is_call = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+                    if is_call and node.value.id in ("np", "math") and node.attr in STRANGE:
+                        yield file if file in DECISIONS else f"{file}:{getattr(part, 'name', '')}"
 
 
 def test_no_written_number_comes_from_a_kernel_that_the_processor_chooses() -> None:

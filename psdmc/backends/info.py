@@ -16,9 +16,9 @@ from psdmc.model.equations import BaseParameter
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
+from psdmc.robot.coordinates import units_of
 from psdmc.robot.inertia import six_of
 from psdmc.robot.mechanism import BASE_FRAME, BODY_PARAMETERS, PARAMETERS_PER_LINK, POINT, Array, Mechanism
-from psdmc.robot.unit_lengths import units_of
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.target.vectors import LANE_BLOCK_BYTES

@@ -50,8 +50,8 @@ from psdmc.links.pseudo_inertias import PhysicalOptions, require_cvxpy
 from psdmc.model.calibrated import FRICTION_DRIFT, LOG_INFORMATION
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
-from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import require_axes, require_no_loops
 
 CAMPAIGN_FRICTION = (0.5, 1.0)
 """Exponents of viscous friction that is fitted with the stiffness of elastic joints in a campaign."""

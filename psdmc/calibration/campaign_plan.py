@@ -47,9 +47,8 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import linear_friction
 from psdmc.progress import Progress
 from psdmc.progress import Step as Share
-from psdmc.robot.derivable import require_no_loops
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import Mechanism, require_no_loops
 
 ROWS_PER_CUTOFF = 4.0
 """Rows per period of a filter's cut-off that logs need at least."""

@@ -26,9 +26,8 @@ from psdmc.model.calibrated import LINEAR, Prediction, Remark
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import ROBOT_FILES, model_of
 from psdmc.progress import Progress, silent
-from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.load import load_robot
-from psdmc.robot.mechanism import Limits, Mechanism, Placement
+from psdmc.robot.mechanism import Limits, Mechanism, Placement, require_axes, require_no_loops
 
 
 def compare(

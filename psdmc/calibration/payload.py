@@ -40,8 +40,8 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Ground
 from psdmc.model.payload import carrying_frame, load_map
 from psdmc.progress import Progress, silent
-from psdmc.robot.derivable import require_axes, require_no_loops
 from psdmc.robot.inertia import six_of, standard_parameters
+from psdmc.robot.mechanism import require_axes, require_no_loops
 
 LOAD = 10
 LOAD_NAMES = ("mass", "m x", "m y", "m z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")

@@ -20,9 +20,8 @@ from psdmc.model.glance import limit_text, numbers_text, range_text
 from psdmc.model.joined_units import joined_units
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
-from psdmc.robot.derivable import require_derivable
 from psdmc.robot.limits import listed
-from psdmc.robot.mechanism import POINT, Joint, Mechanism
+from psdmc.robot.mechanism import POINT, Joint, Mechanism, require_derivable
 
 
 def print_model(model: DynamicsModel) -> None:

@@ -27,7 +27,7 @@ def new(
     ],
 ) -> None:
     """Write a commented DH table of an arm of three joints, to be changed into your robot's."""
-    from psdmc.robot.new_file import write_new_robot
+    from psdmc.robot.dh import write_new_robot
 
     write_new_robot(robot)
     print(f"{robot}: written, a table of three joints; change it into your robot's")

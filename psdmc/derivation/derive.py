@@ -29,8 +29,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.general_gravity import under_general_gravity
 from psdmc.progress import Progress, silent
 from psdmc.reproducible import times
-from psdmc.robot.derivable import require_derivable
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, require_derivable
 
 EQUATION_NOISE = 3e-14
 """Relative uncertainty of a coefficient of B: rounding, magnified by the back substitution."""

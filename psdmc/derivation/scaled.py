@@ -22,10 +22,9 @@ from psdmc.dynamics.frames import BASE, Follows, Frame, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
 from psdmc.reproducible import length, times
-from psdmc.robot.inertia import LENGTH_ORDER
+from psdmc.robot.inertia import LENGTH_ORDER, leading_rows
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, Placement
-from psdmc.robot.zeros import leading_rows
 
 Long = NDArray[Any]
 """An array of np.longdouble: 64 bits of mantissa on x86, 113 on most Arm, 53 where the C library has no more."""

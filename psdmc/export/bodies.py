@@ -18,9 +18,8 @@ from psdmc.links.physical_links import PhysicalLinks
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.inertia import about_com, without_noise
-from psdmc.robot.limits import joined, shown
+from psdmc.robot.limits import joined, naming_faults, shown
 from psdmc.robot.mechanism import BASE, BODY_PARAMETERS, DRIVE, Array, Joint, Mechanism, NamedFrame, Placement
-from psdmc.robot.names import naming_faults
 
 WORLD = "world"
 """Link that the base hangs on where gravity does not point along the base's -z."""

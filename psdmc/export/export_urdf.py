@@ -17,9 +17,8 @@ from psdmc.files import check_place, refuse_foreign_file, write_together, write_
 from psdmc.links.physical_links import PhysicalLinks, physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
-from psdmc.robot.derivable import require_axes
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import DRIVE
+from psdmc.robot.mechanism import DRIVE, require_axes
 from psdmc.robot.xml_text import parse_xml
 
 MJCF_SUFFIX = ".xml"

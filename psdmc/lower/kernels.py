@@ -38,8 +38,7 @@ from psdmc.progress import Step
 from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.recipes.torques import with_friction, with_gravity_input
-from psdmc.robot.derivable import require_derivable
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import Mechanism, require_derivable
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS
 

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 from psdmc.errors import InputError
 from psdmc.real_arrays import real_array
 from psdmc.robot import limits
-from psdmc.robot.inertia import physical_fault, six_of, standard_parameters
+from psdmc.robot.inertia import outside, physical_fault, six_of, standard_parameters
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, parameter_names
-from psdmc.robot.zeros import outside
 
 SPAN_TOLERANCE = 1e-9
 """Largest share of a body's parameters outside those that the model admits: rounding only."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from psdmc.model.json_values import entries, number, numbers, part, text, whole
 from psdmc.robot.coordinates import Coordinate, own_coordinates
+from psdmc.robot.inertia import leading_rows
 from psdmc.robot.joints import joint_type
 from psdmc.robot.mechanism import (
     BASE,
@@ -28,7 +29,6 @@ from psdmc.robot.mechanism import (
     NamedFrame,
     Placement,
 )
-from psdmc.robot.zeros import leading_rows
 
 MOST_JOINTS = 256
 """Largest number of joints in a model file: the span alone takes 0.5 kB times its square, 64 MB."""

@@ -21,6 +21,7 @@ from psdmc.model.loop_base_parameters import LoopBaseParameters, loop_base_param
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import times
+from psdmc.robot.inertia import leading_rows
 from psdmc.robot.mechanism import (
     PARAMETERS_PER_LINK,
     ROW_NAMES,
@@ -30,7 +31,6 @@ from psdmc.robot.mechanism import (
     frozen_array,
     made_again,
 )
-from psdmc.robot.zeros import leading_rows
 
 if TYPE_CHECKING:
     import sympy

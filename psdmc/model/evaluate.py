@@ -12,8 +12,8 @@ from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import cosine, length, sine
+from psdmc.robot.coordinates import refuse_other_lengths, units_of
 from psdmc.robot.mechanism import Array, Mechanism
-from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
 
 if TYPE_CHECKING:
     from scipy import sparse

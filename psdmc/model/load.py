@@ -29,9 +29,9 @@ from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
+from psdmc.robot.inertia import leading_rows
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
-from psdmc.robot.zeros import leading_rows
 
 
 def _with_calibration(manifest: dict[str, Any]) -> dict[str, Any]:

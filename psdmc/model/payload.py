@@ -14,7 +14,7 @@ from psdmc.errors import InputError
 from psdmc.model.bodies import SPAN_TOLERANCE
 from psdmc.reproducible import times
 from psdmc.robot import limits
-from psdmc.robot.inertia import physical_fault, six_of
+from psdmc.robot.inertia import outside, physical_fault, six_of
 from psdmc.robot.mechanism import (
     BODY_PARAMETERS,
     PARAMETERS_PER_LINK,
@@ -23,7 +23,6 @@ from psdmc.robot.mechanism import (
     NamedFrame,
     Placement,
 )
-from psdmc.robot.zeros import outside
 
 ROTATION_SLACK = 1e-6
 """Largest error of the products of a rotation's rows: that of a matrix written with seven digits."""

@@ -8,8 +8,8 @@ from psdmc.dynamics.coordinates import normalized
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
 from psdmc.reproducible import times
+from psdmc.robot.inertia import leading_rows
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism
-from psdmc.robot.zeros import leading_rows
 
 RANGES = (np.pi, 3.0, 5.0)
 """q (rad or m), qd and qdd are drawn from plus or minus these."""

@@ -40,7 +40,7 @@ from psdmc.model.store import save
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_plots import excitation_figure
 from psdmc.report.calibrate_report import require_free_numbers, write_report
-from psdmc.robot.derivable import require_axes
+from psdmc.robot.mechanism import require_axes
 
 
 def excite_command(

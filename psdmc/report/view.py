@@ -28,15 +28,21 @@ from psdmc.links.physical_links import physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_tables import table
-from psdmc.robot.derivable import require_axes
+from psdmc.robot.dependent_joints import locked
 from psdmc.robot.inertia import about_com, inertia_matrix, physical_fault
 from psdmc.robot.limits import listed, shown
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.lock import locked
-from psdmc.robot.mechanism import BASE, BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Mechanism, Placement
+from psdmc.robot.mechanism import (
+    BASE,
+    BODY_PARAMETERS,
+    PARAMETERS_PER_LINK,
+    Array,
+    Mechanism,
+    Placement,
+    require_axes,
+)
 from psdmc.robot.urdf import read_urdf
-from psdmc.robot.urdf_bodies import bodies_of, body_parameters
-from psdmc.robot.urdf_chain import on_free_root
+from psdmc.robot.urdf_chain import bodies_of, body_parameters, on_free_root
 
 MARK = '<meta name="generator" content="psdmc view">'
 """What every page of `psdmc view` holds."""

@@ -25,11 +25,9 @@ from psdmc.robot.dh import (
     plain_text,
     triple_of,
 )
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import naming_faults, shown
 from psdmc.robot.mechanism import BASE, ROW_NAMES, Loop, NamedFrame, Placement
-from psdmc.robot.names import naming_faults
-from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
-from psdmc.robot.snap import snap_rotation
+from psdmc.robot.placement import from_quaternion, roll_pitch_yaw, snap_rotation
 
 FORMAT = "see the format of loops in docs/how-to/loops.md"
 ENDS = ("first", "second")

@@ -1,16 +1,18 @@
 """Describes how the position q of each joint is determined: it is an entry of the robot's q, follows other joints, or
 is constant. A mimic joint follows by q_joint = ratio q_leader + offset. A joint of a parallelogram may follow the sum
-of several joints, each with its ratio."""
+of several joints, each with its ratio. In q, quaternions, and pairs of cosine and sine, must have length one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.errors import InputError
 from psdmc.reproducible import times
 from psdmc.robot.joints import JointType
 
@@ -128,3 +130,39 @@ def _shares(coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> NDArra
             row[:, start : start + length] = ratio * np.eye(length)
         rows.append(row)
     return np.concatenate(rows)
+
+
+SLACK = 1e-6
+"""Accepted deviation of a length from one: torques are then off by as much, and a quaternion in float32 by 1e-7."""
+
+
+def units_of(types: Iterable[JointType]) -> tuple[tuple[int, int], ...]:
+    """Return the slices (start, stop) of q that are quaternions or pairs of cosine and sine, whose length must be one.
+    `types` are the types of the robot's joints, in order."""
+    found, start = [], 0
+    for kind in types:
+        if kind.unit.stop:
+            found.append((start + kind.unit.start, start + kind.unit.stop))
+        start += kind.nq
+    return tuple(found)
+
+
+def refuse_other_lengths(what: str, q: NDArray[Any], units: Sequence[tuple[int, int]]) -> None:
+    """Raise InputError for the first row of q (..., nq) in which a quaternion, or a pair of cosine and sine, has not
+    length one.
+
+    units  slices (start, stop) of q that must have length one
+    """
+    rows = np.reshape(q, (-1, q.shape[-1]))
+    for start, stop in units:
+        lengths = np.linalg.norm(rows[:, start:stop].astype(np.float64), axis=1)
+        wrong = np.flatnonzero(~(np.abs(lengths - 1.0) <= SLACK))
+        if wrong.size:
+            row = int(wrong[0])
+            places = [int(k) for k in np.unravel_index(row, q.shape[:-1])]
+            place = str(places[0]) if len(places) == 1 else f"({', '.join(map(str, places))})"
+            where = f" of row {place}" if q.ndim > 1 else ""
+            raise InputError(
+                f"{what}[{start}:{stop}]{where} has length {lengths[row]:.9g}, expected one",
+                "divide it by its length, or let integrate do it: integrate(q, 0 * v)",
+            )

@@ -1,24 +1,27 @@
-"""Reads the TOML file of a DH table (Denavit-Hartenberg parameters) into plain data, and checks every entry."""
+"""Reads the TOML file of a DH table (Denavit-Hartenberg parameters) into plain data, and checks every entry. Writes a
+first table for the user to edit."""
 
 from __future__ import annotations
 
+import json
 import math
+import os
 import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import resources
+from pathlib import Path
 from typing import Any, Literal
 
 from psdmc.errors import InputError
+from psdmc.files import write_whole
 from psdmc.robot import limits
-from psdmc.robot.inertia import INERTIA_NAMES
+from psdmc.robot.inertia import INERTIA_NAMES, ZERO_NAMES
 from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
-from psdmc.robot.limits import Range, shown
+from psdmc.robot.limits import WHITE_SPACE, Range, decimal, name_faults, naming_faults, shown
 from psdmc.robot.mechanism import BASE, Limits
-from psdmc.robot.names import name_faults, naming_faults
-from psdmc.robot.numerals import WHITE_SPACE, decimal
-from psdmc.robot.zeros import ZERO_NAMES
 
 Convention = Literal["standard", "modified"]
 
@@ -354,3 +357,17 @@ def _row(names: Sequence[str], parent: object) -> int | None:
     if parent == BASE_NAME:
         return BASE
     return names.index(parent) if isinstance(parent, str) and parent in names else None
+
+
+def write_new_robot(path: Path) -> None:
+    """Write a commented DH table. The robot gets the name of the file.
+
+    Raises InputError if `path` exists already, or if its suffix is not that of a DH table.
+    """
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: a DH table's name ends with .toml", f"such as psdmc new {path.stem}.toml")
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already, and is left as it is", "give another name")
+    text = resources.files("psdmc.robot").joinpath("template.toml").read_text(encoding="utf-8")
+    safe = path.name if path.name.isprintable() and path.name.isascii() else "ROBOT.toml"
+    write_whole(path, text.replace("@FILE@", safe).replace("@NAME@", json.dumps(path.stem)))

@@ -35,7 +35,7 @@ class Draft:
 
     parameters     n arrays (11,), about the link frames; NaN if unknown; the drive inertia Im is 0 if the file gives
                    none
-    zeros          n tuples of names that the file states to be zero (psdmc.robot.zeros.ZERO_NAMES)
+    zeros          n tuples of names that the file states to be zero (psdmc.robot.inertia.ZERO_NAMES)
     drives         n flags: the file makes this joint's drive inertia a parameter
     gravity        (3,) m/s^2 in the base frame
     frames         named frames; empty: the tip alone

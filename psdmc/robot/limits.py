@@ -1,4 +1,4 @@
-"""Limits of the sizes and numbers in a robot file. If a file exceeds a limit, the error message states the limit.
+"""Limits of the sizes, names and numbers in a robot file. If a file exceeds a limit, the error message states the limit.
 
 The limits are far beyond any real robot. With larger numbers, squares and products of lengths and masses would exceed
 the range of 64-bit floats. The error would then appear far from the wrong number.
@@ -7,6 +7,9 @@ the range of 64-bit floats. The error would then appear far from the wrong numbe
 from __future__ import annotations
 
 import math
+import re
+import unicodedata
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -125,3 +128,57 @@ def scale_fault(lengths: Iterable[float]) -> str | None:
     longest = max((abs(length) for length in lengths), default=0.0)
     fault = LONGEST_LENGTH.fault(longest)
     return f"the longest of all its lengths, {longest:g} m, {fault}" if fault else None
+
+
+# Names of links and joints: a name is any text that fits on one line, and no two are equal.
+def naming_faults(names: Sequence[str], what: str) -> list[str]:
+    """Return what is wrong with the names of a robot's links or joints, one sentence for each fault."""
+    counts = Counter(names)
+    faults = [f"a {what} has no name"] if counts[""] else []
+    faults += [fault for name in counts for fault in name_faults(name, what)]
+    return faults + [f"{n} {what}s are called {shown(name)}" for name, n in counts.items() if n > 1 and name]
+
+
+def name_faults(name: str, what: str) -> list[str]:
+    """Return what is wrong with one name, one sentence for each fault."""
+    # Control characters, line and paragraph separators, and halves of a character that no file can hold.
+    has_control = any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name)
+    faults = [f"{what} name {shown(name)} has control characters"] if has_control else []
+    if len(name) > MAX_NAME:
+        faults.append(f"{what} name {shown(name)}: expected at most {MAX_NAME}")
+    return faults
+
+
+def free_name(wanted: str, taken: set[str]) -> str:
+    """Return `wanted`, with underscores appended until the name is not in `taken`. The name is then added to `taken`."""
+    while wanted in taken:
+        wanted += "_"
+    taken.add(wanted)
+    return wanted
+
+
+# Numbers are plain decimals in ASCII. Python's float also accepts underscores, digits of other alphabets and other kinds
+# of spaces. The C++ streams of urdfdom accept none of them and read zero without a message. Because psdmc accepts only
+# plain decimals, all readers get the same number.
+WHITE_SPACE = " \t\n\r\f\v"
+"""ASCII white space, which may stand around and between numbers."""
+
+DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GAP = re.compile(f"[{WHITE_SPACE}]+")
+
+
+def words(text: str) -> list[str]:
+    """Return the words of a text that are separated by ASCII white space."""
+    return [word for word in _GAP.split(text) if word]
+
+
+def decimal(word: str) -> float | None:
+    """Return the number of a word; None if it is no finite decimal number, too long or too small."""
+    if len(word) > MAX_CHARACTERS or not DECIMAL.fullmatch(word):
+        return None
+    value = float(word)
+    if not math.isfinite(value) or (
+        abs(value) < TINIEST and re.search("[1-9]", word.lower().partition("e")[0])
+    ):
+        return None
+    return value

@@ -18,19 +18,26 @@ from psdmc.robot.closed_loops import Tables, closed_loops, loop_tables
 from psdmc.robot.dh import BASE_NAME, DhJoint, DhLink, DhRobot, read_dh
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.file_kinds import SourceFormat, as_source
-from psdmc.robot.inertia import PRODUCT_NOISE, physical_fault, standard_parameters
+from psdmc.robot.inertia import (
+    COM_NAMES,
+    PRODUCT_NOISE,
+    block_diagonal,
+    canonical,
+    link_span,
+    link_values,
+    parse_statements,
+    physical_fault,
+    standard_parameters,
+)
 from psdmc.robot.limits import shown
 from psdmc.robot.linear_loops import with_linear_loops
 from psdmc.robot.load_options import DEFAULT_SNAP, TOOL, LoadOptions, checked_options, parsed_contact
 from psdmc.robot.mechanism import BASE, DRIVE, ROW_NAMES, Array, Joint, Loop, Mechanism, NamedFrame, Placement
 from psdmc.robot.missing_inertia import with_massless_warning
-from psdmc.robot.rotation import about
-from psdmc.robot.snap import ROUNDING, coarse_right_angles, snap_rotation
-from psdmc.robot.source_words import with_source_words
-from psdmc.robot.urdf_bodies import tool_frame
+from psdmc.robot.placement import ROUNDING, about, coarse_right_angles, roll_pitch_yaw, snap_rotation
 from psdmc.robot.urdf_chain import urdf_draft
+from psdmc.robot.urdf_words import with_source_words
 from psdmc.robot.xacro_file import checked_packages
-from psdmc.robot.zeros import COM_NAMES, block_diagonal, canonical, link_span, link_values, parse_statements
 
 PACKED = b"PK\x03\x04"
 """First bytes of a model file, which is an archive."""
@@ -204,7 +211,10 @@ def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame
     named = draft.frames or (tip,)
     if any(frame.name == TOOL for frame in named):
         raise InputError(f"{source}: a frame of the file is called '{TOOL}' too", "leave --tool out")
-    return (*named, tool_frame(tip, options.tool))
+    # Turns are about fixed axes x, y, z in turn, as in URDF.
+    x, y, z, roll, pitch, yaw = options.tool
+    tool = Placement(roll_pitch_yaw((roll, pitch, yaw)), np.array((x, y, z)))
+    return (*named, NamedFrame(TOOL, tip.joint, tip.placement @ tool))
 
 
 def _with_contacts(frames: tuple[NamedFrame, ...], options: LoadOptions) -> tuple[NamedFrame, ...]:

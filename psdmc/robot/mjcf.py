@@ -17,18 +17,17 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import listed, shown
-from psdmc.robot.mjcf_copies import refuse_many_copies
-from psdmc.robot.mjcf_faults import (
+from psdmc.robot.mjcf_constraints import (
     followers,
+    mjcf_loops,
     of_balls,
     refuse_armatures,
     refuse_constraints,
     refuse_references,
 )
-from psdmc.robot.mjcf_loops import mjcf_loops
-from psdmc.robot.mjcf_terms import Names, acting, gravity, is_active, is_odd, named
+from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mjcf_text import tree_text
-from psdmc.robot.mujoco_warnings import kept_warnings
+from psdmc.robot.mujoco_model import Names, acting, gravity, is_active, is_odd, kept_warnings, named
 
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""

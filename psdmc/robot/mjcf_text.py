@@ -19,11 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.limits import TINIEST
-from psdmc.robot.mjcf_faults import Follows
-from psdmc.robot.mjcf_terms import Names, armatures
-from psdmc.robot.names import free_name
-from psdmc.robot.source_words import BALL, DRIVE, MJCF, NOTE
+from psdmc.robot.limits import TINIEST, free_name
+from psdmc.robot.mjcf_constraints import Follows
+from psdmc.robot.mujoco_model import Names, armatures
+from psdmc.robot.urdf_words import BALL, DRIVE, MJCF, NOTE
 
 Array = NDArray[np.float64]
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

@@ -12,10 +12,9 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import pinocchio
 
 from psdmc.errors import InputError
+from psdmc.robot.limits import words
 from psdmc.robot.mechanism import Array
-from psdmc.robot.numerals import words
-from psdmc.robot.source_words import ball_names
-from psdmc.robot.urdf_words import ATTRIBUTES
+from psdmc.robot.urdf_words import ATTRIBUTES, ball_names
 from psdmc.robot.xml_text import parse_xml
 
 JOINT_PREFIX = "joint\t"

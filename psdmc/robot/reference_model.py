@@ -22,9 +22,9 @@ import numpy as np
 import pinocchio
 
 from psdmc.errors import InputError
+from psdmc.robot.dependent_joints import held_positions
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.load_options import TOOL
-from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import (
     DRIVE,
     PARAMETERS_PER_LINK,

@@ -12,9 +12,8 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import listed, shown
+from psdmc.robot.limits import listed, name_faults, naming_faults, shown
 from psdmc.robot.mechanism import WARNING, Limits, Placement
-from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.urdf_words import (
     VERSIONS,
     has_dynamics,

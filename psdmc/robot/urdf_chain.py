@@ -3,36 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.reproducible import times
+from psdmc.robot.dependent_joints import held_positions, locked, mimic_coordinates
 from psdmc.robot.draft import BASE, Draft, Snap
-from psdmc.robot.inertia import physical_fault
-from psdmc.robot.joints import FREE, URDF_TYPES, JointType
-from psdmc.robot.limits import listed, shown
+from psdmc.robot.inertia import inertia_matrix, physical_fault, six_of, standard_parameters, without_noise
+from psdmc.robot.joints import FREE, REVOLUTE, URDF_TYPES, JointType
+from psdmc.robot.limits import free_name, listed, shown
 from psdmc.robot.load_options import LoadOptions
-from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, Limits, NamedFrame, Placement
-from psdmc.robot.mimic import mimic_coordinates
 from psdmc.robot.missing_inertia import judged_bodies
-from psdmc.robot.names import free_name
-from psdmc.robot.snap import (
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
+from psdmc.robot.placement import (
     ROUNDING,
     angle_between,
     coarse_right_angles,
+    from_quaternion,
     link_rotation,
+    roll_pitch_yaw,
     snap_axis,
     snap_rotation,
     snap_translation,
 )
 from psdmc.robot.tree import Route, find_route
-from psdmc.robot.urdf import Origin, UrdfJoint, UrdfRobot, read_urdf
-from psdmc.robot.urdf_bodies import bodies_of, hold_against_pinocchio, merged_parameters, place_of
+from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfJoint, UrdfRobot, read_urdf
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
@@ -56,9 +56,11 @@ def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
     root_gravity = np.array(STANDARD_GRAVITY if options.gravity is None else options.gravity)
-    bodies = merged_parameters(robot, route)
+    links = bodies_of(robot, route.movable)
+    bodies = [without_noise(_merged(robot, body)) for body in links]
     hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, options.lock, source))
-    found = judged_bodies(robot, route, bodies_of(robot, route.movable), bodies, options.unknown, source)
+    found = judged_bodies(robot, route, links, bodies, options.unknown, source)
+    frame_of_link = _LinkFrames(robot, route, placed.joints, placed.tip, source)
     springy = [joint.name for joint in route.movable if joint.has_dynamics]
     unmodelled = (
         [f"<dynamics> (damping, friction) of joints is not modelled: {listed(springy)}"] if springy else []
@@ -86,12 +88,12 @@ def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
             ),
             *_faults(robot),
         ),
-        frames=urdf_frames(robot, route, placed.joints, placed.tip, frames or route.ends, source),
+        frames=tuple(map(frame_of_link.of, frames or route.ends)),
         parents=placed.parents,
         tip_body=placed.tip.joint,
         coordinates=mimic_coordinates(route.movable, robot.joints, source),
         massless=found.massless,
-        frame_of=lambda name: base_or_frame(robot, route, placed.joints, placed.tip, name, source),
+        frame_of=frame_of_link.of_or_in_base,
     )
 
 
@@ -146,6 +148,28 @@ def _placed(route: Route, snap: float) -> _Placed:
     tip = merged_placement(end.place, f"tip '{route.tip}', merged", snap, turned, n, reach)
     snaps += [replace(one, segment=n) for one in turned]
     return _Placed(tuple(joints), tuple(parents), NamedFrame(route.tip, end.body, tip), tuple(snaps))
+
+
+def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
+    """Return the placement that an <origin> element states. The rotations about the three axes are snapped one by one:
+    near right angles become exact (`snap` in rad)."""
+    if origin.quaternion is None:
+        return Placement(roll_pitch_yaw(origin.rpy, snap), np.array(origin.xyz))
+    return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
+
+
+def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
+    """Return the placement of a joint's child link at q = 0, or at the locked position of the joint. Rotations are
+    snapped: near right angles become exact (`snap` in rad)."""
+    place = placement_of(joint.origin, snap)
+    if joint.held is None:
+        return place
+    return place @ Placement(snap_rotation(joint.held.rotation, snap)[0], joint.held.translation)
+
+
+AGREEMENT = 1e-11
+"""Allowed difference relative to the largest parameter of the body's mass, moments or inertias: rounding of angles up
+to 1e3 rad leaves 1e-13, another reading of a number far more."""
 
 
 def _reach(route: Route) -> float:
@@ -214,6 +238,86 @@ def _faults(robot: UrdfRobot) -> list[str]:
     return notes
 
 
+def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:
+    """Return for each movable joint the links that it moves together, up to the next movable joints. A link has the
+    placement in the frame of the joint's child link, which comes first. All other joints are locked at their neutral
+    position."""
+    below: dict[str, list[tuple[str, Placement]]] = {}
+    moves = {joint.name for joint in movable}
+    for joint in robot.joints:
+        if joint.name not in moves:
+            below.setdefault(joint.parent, []).append((joint.child, place_of(joint)))
+    return [_with_all_below(joint.child, below) for joint in movable]
+
+
+def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
+    """Return a link's standard parameters (10,) about a frame in which it has the placement `place`."""
+    if body is None:
+        return np.zeros(10)
+    at = place @ placement_of(body.origin)
+    turned = times(times(at.rotation, inertia_matrix(np.array(body.inertia))), at.rotation.T)
+    return standard_parameters(body.mass, at.translation, six_of(turned))
+
+
+def hold_against_pinocchio(
+    robot: UrdfRobot,
+    route: Route,
+    merged: Sequence[Array],
+    text: str,
+    source: str,
+    held: Mapping[str, float],
+) -> None:
+    """Raise InputError with the name of the first link whose inertia Pinocchio reads or merges differently.
+
+    First each link is compared alone, in a model where every joint is revolute, so that no links are merged. Then the
+    merged inertias are compared. `held` are the positions of joints that are locked at another position than the
+    neutral one.
+    """
+    free = robot.free_root
+    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), free_root=free)
+    for joint in robot.joints:
+        own = body_parameters(robot.inertials[joint.child], Placement.identity())
+        _compare(
+            own, alone.inertias[alone.getJointId(JOINT_PREFIX + joint.name)], joint.child, "the body", source
+        )
+    movable = [joint.name for joint in route.movable]
+    whole = locked_at(pinocchio_model(text, source, [*movable, *held], free_root=free), held)
+    for joint, own in zip(route.movable, merged, strict=True):
+        body = whole.inertias[whole.getJointId(JOINT_PREFIX + joint.name)]
+        _compare(own, body, joint.child, "all that moves with it", source)
+
+
+def _with_all_below(link: str, below: dict[str, list[tuple[str, Placement]]]) -> dict[str, Placement]:
+    """The link and all links that hang on it, each with its place in the link's frame."""
+    places: dict[str, Placement] = {}
+    queue = [(link, Placement.identity())]
+    while queue:
+        name, place = queue.pop()
+        places[name] = place
+        queue += [(child, place @ origin) for child, origin in reversed(below.get(name, []))]
+    return places
+
+
+def _merged(robot: UrdfRobot, body: Mapping[str, Placement]) -> Array:
+    """(10,) standard parameters of links together."""
+    total = np.zeros(10)
+    for name, place in body.items():
+        total = total + body_parameters(robot.inertials[name], place)
+    return total
+
+
+def _compare(own: Array, other: object, link: str, what: str, source: str) -> None:
+    found = np.array(other.toDynamicParameters())  # type: ignore[attr-defined]
+    for group in (slice(0, 1), slice(1, 4), slice(4, 10)):
+        size = max(float(np.abs(own[group]).max()), float(np.abs(found[group]).max()))
+        if not np.all(np.abs(own[group] - found[group]) <= AGREEMENT * size):
+            values = " and ".join(" ".join(f"{x:.9g}" for x in each[group]) for each in (own, found))
+            raise InputError(
+                f"{source}: link '{link}': psdmc and Pinocchio read {what} differently: {values}",
+                "write its numbers as plain decimals, and report the file: one of the two readers is wrong",
+            )
+
+
 # A root link on a free joint, and links as named frames.
 ROOT_JOINT = "root_joint"
 """Pinocchio's name of the free joint; more underscores follow where a joint of the file is called so."""
@@ -246,85 +350,61 @@ def on_free_root(robot: UrdfRobot) -> UrdfRobot:
     )
 
 
-def urdf_frames(
-    robot: UrdfRobot,
-    route: Route,
-    joints: Sequence[Joint],
-    tip: NamedFrame,
-    names: Iterable[str],
-    source: str,
-) -> tuple[NamedFrame, ...]:
-    """Return the named frames of these links, placed by the numbers of the file. The placement of the tip equals that
-    in the chain.
+@dataclass(frozen=True, slots=True, eq=False)
+class _LinkFrames:
+    """Frames of links, placed by the numbers of the file. The placement of the tip equals that in the chain."""
 
-    Raises InputError if a link does not exist, does not move, or is not rigidly attached to a link of the chain.
-    """
-    carriers = {joint.name: number for number, joint in enumerate(joints)}
-    return tuple(
-        tip if name == tip.name else _frame_on(robot, route, joints, carriers, name, source) for name in names
-    )
+    robot: UrdfRobot
+    route: Route
+    joints: tuple[Joint, ...]
+    tip: NamedFrame
+    source: str
 
-
-def base_or_frame(
-    robot: UrdfRobot, route: Route, joints: Sequence[Joint], tip: NamedFrame, name: str, source: str
-) -> NamedFrame:
-    """Return the frame of a link, placed in the base frame (joint BASE) if no joint moves the link."""
-    fixed, carrier = _carried_by(robot, name)
-    if name not in robot.inertials or carrier is not None:
-        return urdf_frames(robot, route, joints, tip, (name,), source)[0]
-    place = Placement.identity()
-    for joint in route.to_base:
-        place = place @ place_of(joint)
-    place = place.inverse()
-    for joint in fixed:
-        place = place @ place_of(joint)
-    return NamedFrame(name, ON_BASE, place)
-
-
-def _frame_on(
-    robot: UrdfRobot, route: Route, joints: Sequence[Joint], carriers: dict[str, int], name: str, source: str
-) -> NamedFrame:
-    if name not in robot.inertials:
-        raise InputError(
-            f"{source}: frame {shown(name)} is no link of the file",
-            f"links that can be frames: {listed(_rigid(robot, carriers))}",
-        )
-    fixed, carrier = _carried_by(robot, name)
-    if carrier is None:
-        raise InputError(
-            f"{source}: frame {shown(name)} is fixed to the root: no joint moves it",
-            f"links that can be frames: {listed(_rigid(robot, carriers))}",
-        )
-    if carrier.name not in carriers:
-        above = carrier in route.to_base
-        where = "above the base" if above else f"not between '{route.base}' and the tip '{route.tip}'"
-        raise InputError(
-            f"{source}: frame {shown(name)} moves with joint '{carrier.name}', which is {where}: it is on no link of the "
-            "chain",
-            f"choose another --tip or --base, or one of {listed(_rigid(robot, carriers))}",
-        )
-    number = carriers[carrier.name]
-    place = joints[number].link_frame
-    for joint in fixed:
-        place = place @ place_of(joint)
-    return NamedFrame(name, number, place)
-
-
-def _carried_by(robot: UrdfRobot, link: str) -> tuple[list[UrdfJoint], UrdfJoint | None]:
-    """Fixed joints from the link that a joint moves down to this link, and that joint; None at the root."""
-    above = {joint.child: joint for joint in robot.joints}
-    fixed: list[UrdfJoint] = []
-    while link in above and not above[link].is_movable:
-        fixed.append(above[link])
-        link = above[link].parent
-    return fixed[::-1], above.get(link)
-
-
-def _rigid(robot: UrdfRobot, carriers: dict[str, int]) -> list[str]:
-    """The links that may be frames."""
-    found = []
-    for link in robot.inertials:
-        _, carrier = _carried_by(robot, link)
+    def of(self, name: str) -> NamedFrame:
+        """Return the named frame of a link. Raises InputError if the link does not exist, does not move, or is not rigidly
+        attached to a link of the chain."""
+        if name == self.tip.name:
+            return self.tip
+        carriers = {joint.name: number for number, joint in enumerate(self.joints)}
+        fixed, carrier = self._carried_by(name)
         if carrier is not None and carrier.name in carriers:
-            found.append(link)
-    return found
+            number = carriers[carrier.name]
+            place = self.joints[number].link_frame
+            for joint in fixed:
+                place = place @ place_of(joint)
+            return NamedFrame(name, number, place)
+        hint = "links that can be frames:"
+        if name not in self.robot.inertials:
+            fault = "is no link of the file"
+        elif carrier is None:
+            fault = "is fixed to the root: no joint moves it"
+        else:
+            ends = f"'{self.route.base}' and the tip '{self.route.tip}'"
+            where = "above the base" if carrier in self.route.to_base else f"not between {ends}"
+            fault = f"moves with joint '{carrier.name}', which is {where}: it is on no link of the chain"
+            hint = "choose another --tip or --base, or one of"
+        above = {link: self._carried_by(link)[1] for link in self.robot.inertials}
+        rigid = [link for link, joint in above.items() if joint is not None and joint.name in carriers]
+        raise InputError(f"{self.source}: frame {shown(name)} {fault}", f"{hint} {listed(rigid)}")
+
+    def of_or_in_base(self, name: str) -> NamedFrame:
+        """Return the frame of a link, placed in the base frame (joint BASE) if no joint moves the link."""
+        fixed, carrier = self._carried_by(name)
+        if name not in self.robot.inertials or carrier is not None:
+            return self.of(name)
+        place = Placement.identity()
+        for joint in self.route.to_base:
+            place = place @ place_of(joint)
+        place = place.inverse()
+        for joint in fixed:
+            place = place @ place_of(joint)
+        return NamedFrame(name, ON_BASE, place)
+
+    def _carried_by(self, link: str) -> tuple[list[UrdfJoint], UrdfJoint | None]:
+        """Fixed joints from the link that a joint moves down to this link, and that joint; None at the root."""
+        above = {joint.child: joint for joint in self.robot.joints}
+        fixed: list[UrdfJoint] = []
+        while link in above and not above[link].is_movable:
+            fixed.append(above[link])
+            link = above[link].parent
+        return fixed[::-1], above.get(link)

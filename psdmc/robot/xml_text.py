@@ -11,8 +11,7 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from psdmc.errors import InputError
-from psdmc.robot.limits import MAX_CHARACTERS, Range, shown
-from psdmc.robot.numerals import decimal, words
+from psdmc.robot.limits import MAX_CHARACTERS, Range, decimal, shown, words
 
 UNBOUND_PREFIX = errors.codes[errors.XML_ERROR_UNBOUND_PREFIX]
 """Of a parser's error: a prefix that nothing declares."""

@@ -18,9 +18,9 @@ from scipy.special import ndtri
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity
+from psdmc.robot.coordinates import units_of
 from psdmc.robot.limits import listed, shown
 from psdmc.robot.mechanism import Limits, Mechanism
-from psdmc.robot.unit_lengths import units_of
 
 Array = NDArray[Any]
 

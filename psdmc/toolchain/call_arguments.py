@@ -17,7 +17,7 @@ from psdmc.errors import InputError
 from psdmc.program.gravity_input import GRAVITY, takes_gravity
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.real_arrays import AxisNames, real_array
-from psdmc.robot.unit_lengths import refuse_other_lengths
+from psdmc.robot.coordinates import refuse_other_lengths
 from psdmc.toolchain.stubs import arguments
 
 Array = NDArray[Any]

@@ -23,7 +23,7 @@ from psdmc.links.physical_links import NoSuchLinks
 from psdmc.model.calibrated import by_joint
 from psdmc.model.calibrated_json import from_json
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.zeros import leading_rows
+from psdmc.robot.inertia import leading_rows
 
 AGREEMENT = 1e-9
 """Share of a joint's largest torque: what the command promises."""

@@ -141,7 +141,11 @@ def test_messages_are_covered(tmp_path: Path):
 def test_many_messages_are_found():
     files = {piece.file for piece in messages()}
 
-    assert {"psdmc/cli/pipeline.py", "psdmc/robot/mimic.py", "psdmc/toolchain/build_package.py"} <= files
+    assert {
+        "psdmc/cli/pipeline.py",
+        "psdmc/robot/dependent_joints.py",
+        "psdmc/toolchain/build_package.py",
+    } <= files
 
 
 def test_the_command_fails_on_a_planted_sentence(

@@ -33,7 +33,7 @@ from psdmc.report.view import (
 from psdmc.robot.inertia import six_of, standard_parameters
 from psdmc.robot.load import load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement
-from psdmc.robot.rotation import roll_pitch_yaw
+from psdmc.robot.placement import roll_pitch_yaw
 
 ARM = robot_path("two_link").parent / "rounded_arm.urdf"
 

@@ -14,8 +14,8 @@ from psdmc.derivation.derive import derive_model
 from psdmc.derivation.provenance import provenance
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.dependent_joints import parsed
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
-from psdmc.robot.lock import parsed
 from psdmc.robot.reference import reference
 from psdmc.verification.check import check_model
 

@@ -11,7 +11,7 @@ import pytest
 from bundled import robot_path
 
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
-from psdmc.robot.snap import coarse_right_angles
+from psdmc.robot.placement import coarse_right_angles
 
 ARM = robot_path("rounded_arm").read_text(encoding="utf-8")
 COARSE = ARM.replace("1.5708", "1.57").replace("3.1416", "3.14")

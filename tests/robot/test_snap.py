@@ -9,8 +9,14 @@ from hypothesis import strategies as st
 from small_robots import EXAMPLES, joint, link, load_dh, load_urdf
 
 from psdmc.robot.load import load_robot
-from psdmc.robot.rotation import about, roll_pitch_yaw
-from psdmc.robot.snap import angle_between, snap_axis, snap_rotation, snap_translation
+from psdmc.robot.placement import (
+    about,
+    angle_between,
+    roll_pitch_yaw,
+    snap_axis,
+    snap_rotation,
+    snap_translation,
+)
 
 angles = st.floats(-3.0, 3.0)
 

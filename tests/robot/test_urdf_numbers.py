@@ -8,7 +8,7 @@ import pytest
 from small_robots import INERTIAL, joint, largest_difference, link, load_urdf, robot_data, urdf
 
 from psdmc.errors import InputError
-from psdmc.robot import urdf_bodies
+from psdmc.robot import urdf_chain
 from psdmc.robot.load import load_robot, load_robot_text
 from psdmc.robot.urdf import read_urdf
 
@@ -160,7 +160,7 @@ def test_merged_bodies_are_the_sum_about_the_links_frame():
 
 @pytest.mark.parametrize("field", ["mass", "inertia"])
 def test_a_body_that_pinocchio_reads_otherwise_is_an_error_that_names_the_link(field: str, monkeypatch):
-    real = urdf_bodies.pinocchio_model
+    real = urdf_chain.pinocchio_model
 
     def misreading(*arguments, **options):
         model = real(*arguments, **options)
@@ -173,7 +173,7 @@ def test_a_body_that_pinocchio_reads_otherwise_is_an_error_that_names_the_link(f
             model.inertias[k] = body
         return model
 
-    monkeypatch.setattr(urdf_bodies, "pinocchio_model", misreading)
+    monkeypatch.setattr(urdf_chain, "pinocchio_model", misreading)
 
     found = refused(arm())
 

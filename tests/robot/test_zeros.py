@@ -7,10 +7,9 @@ import pytest
 from small_robots import EXAMPLES, joint, link, load_dh, load_urdf
 
 from psdmc.errors import InputError
-from psdmc.robot.inertia import standard_parameters
+from psdmc.robot.inertia import COM_NAMES, column_echelon, link_span, standard_parameters
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import PARAMETER_NAMES
-from psdmc.robot.zeros import COM_NAMES, column_echelon, link_span
 
 TWO_LINKS = (link("base"), link("arm"), link("hand"), joint("j1", "base", "arm"), joint("j2", "arm", "hand"))
 

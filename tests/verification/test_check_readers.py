@@ -17,8 +17,8 @@ from psdmc.robot import load as robot_load
 from psdmc.robot import urdf_chain
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement
-from psdmc.robot.snap import snap_axis
-from psdmc.robot.urdf_bodies import placement_of
+from psdmc.robot.placement import snap_axis
+from psdmc.robot.urdf_chain import placement_of
 from psdmc.verification.check import MUJOCO, CheckRow, check_model, readers
 
 BODY = (

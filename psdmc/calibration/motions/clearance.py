@@ -18,10 +18,9 @@ from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics, frame_placement
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.limits import shown
-from psdmc.robot.lock import held_positions
+from psdmc.robot.dependent_joints import held_positions
+from psdmc.robot.limits import shown, words
 from psdmc.robot.mechanism import Mechanism
-from psdmc.robot.numerals import words
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.urdf import read_urdf
 from psdmc.robot.xml_text import parse_xml

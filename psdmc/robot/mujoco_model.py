@@ -1,18 +1,43 @@
-"""Collects values that a compiled MJCF file stores in several arrays: drive inertias, force coefficients and active
-constraints.
+"""Reads MuJoCo's model of a robot: MuJoCo's warnings, values that several of its arrays store together, and names.
 
-If the installed version of MuJoCo does not have an array, its values count as zero.
+The values are drive inertias, force coefficients, active constraints and gravity. If the installed version of MuJoCo
+does not have an array, its values count as zero.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.names import free_name
+from psdmc.robot.limits import free_name
+
+
+@contextmanager
+def kept_warnings(mujoco: Any) -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings until the end of the block, one line each. MuJoCo gives some of them to a callback, and
+    others to Python's warnings; those come last. By itself MuJoCo would print them and write MUJOCO_LOG.TXT."""
+    said: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: said.append(" ".join(str(text).split())))
+    try:
+        with warnings.catch_warnings(record=True) as raised:
+            warnings.simplefilter("always", UserWarning)
+            yield said
+    finally:
+        mujoco.set_mju_user_warning(before)
+        for one in raised:
+            text = " ".join(str(one.message).split())
+            if not issubclass(one.category, UserWarning):
+                warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+            elif text not in said:
+                said.append(text)
+
 
 Array = NDArray[np.float64]
 
@@ -86,16 +111,10 @@ def _joint_transmissions(mujoco: Any) -> tuple[int, int]:
 
 def _of(model: Any, kind: str, word: str) -> Array:
     found = getattr(model, f"{kind}_{word}", None)
-    return np.zeros(_sizes(model)[kind]) if found is None else np.asarray(found)
-
-
-def _sizes(model: Any) -> dict[str, int]:
-    return {
-        "jnt": model.njnt,
-        "dof": model.nv,
-        "tendon": model.ntendon,
-        "actuator": len(model.actuator_trntype),
-    }
+    if found is not None:
+        return np.asarray(found)
+    counts = {"jnt": model.njnt, "dof": model.nv, "tendon": model.ntendon}
+    return np.zeros(len(model.actuator_trntype) if kind == "actuator" else counts[kind])
 
 
 @dataclass(frozen=True, slots=True)
