@@ -29,7 +29,7 @@ from pyarrow import parquet
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import columns_of, write_columns
 from psdmc.compiler import derive
-from psdmc.model import recursive
+from psdmc.model import evaluate
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import save
 from psdmc.reproducible import in_any_order
@@ -51,7 +51,7 @@ def rows_of_log(model: DynamicsModel, first: int, last: int, rate: float) -> Log
         qd += size * w * np.cos(angle)
         qdd -= size * w**2 * np.sin(angle)
     with in_any_order():
-        tau = recursive.torques(model.mechanism, model.equivalent_parameters(), [q, qd, qdd])
+        tau = evaluate.torques(model.mechanism, model.equivalent_parameters(), [q, qd, qdd])
     tau += 2.0 * np.tanh(qd / 0.03) + 3.0 * qd
     tau += 0.3 * np.random.default_rng([1, first]).standard_normal(tau.shape)
     return Log("long", model.joint_names, times, np.round(q / 1e-6) * 1e-6, None, tau, "motor_torque")

@@ -49,10 +49,10 @@ from psdmc.calibration.verdict.delivered import log_parts
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.compiler import derive
 from psdmc.errors import InputError
-from psdmc.model import recursive
+from psdmc.model import evaluate
+from psdmc.model.bodies import body_parameters, load_parameters
 from psdmc.model.calibrated import code_of
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.payload import body_parameters, load_parameters
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 TWO_LINK_GAINS = (12.0, 5.0)
@@ -108,7 +108,7 @@ def with_tool(robot: Robot) -> Log:
     chain = model.mechanism
     x = np.zeros(PARAMETERS_PER_LINK * len(chain.joints))
     x[body_parameters(chain.tip_frame.joint)] = load_parameters(chain, robot.tool, TOOL)
-    torque = recursive.torques(chain, x, [states.q, states.qd, states.qdd])
+    torque = evaluate.torques(chain, x, [states.q, states.qd, states.qdd])
     when = log.time - log.time[0]
     more = np.stack([np.interp(when, states.time, column) for column in torque.T], axis=1)
     return replace(log, effort=log.effort + more)

@@ -236,11 +236,13 @@ def _values_by_rows(
 
 
 _FROM_MONOMIALS: Mapping[str, Callable[[Expansion, Mechanism, Array, list[Array]], Array]] = {
-    **dict.fromkeys(("inverse_dynamics", "nonlinear_effects", "gravity"), evaluate.torques),
-    "mass_matrix": lambda expansion, chain, theta, states: evaluate.mass_matrix(
+    **dict.fromkeys(("inverse_dynamics", "nonlinear_effects", "gravity"), evaluate.expanded_torques),
+    "mass_matrix": lambda expansion, chain, theta, states: evaluate.expanded_mass_matrix(
         expansion, chain, theta, states[0]
     ),
-    "regressor": lambda expansion, chain, theta, states: evaluate.regressor(expansion, chain, states),
+    "regressor": lambda expansion, chain, theta, states: evaluate.expanded_regressor(
+        expansion, chain, states
+    ),
 }
 """Functions that E, P and theta_b give directly, from q, qd and qdd."""
 

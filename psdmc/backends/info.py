@@ -10,11 +10,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from psdmc.friction.joints import Friction
-from psdmc.model.bodies import refuse_outside
+from psdmc.model.bodies import load_map, refuse_outside
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
 from psdmc.model.linear_friction import linear_friction
-from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import units_of
 from psdmc.robot.inertia import six_of

@@ -16,7 +16,7 @@ from typing import Any
 from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.errors import InputError
 from psdmc.files import read_file
-from psdmc.model.parameter_table import BaseParameters
+from psdmc.model.equations import BaseParameters
 
 SCHEMA = 1
 GENERATOR = "psdmc"

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from psdmc.friction.in_dynamics import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
+from psdmc.model.bodies import body_parameters, load_parameters
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.general_gravity import for_every_gravity
-from psdmc.model.near_closed import near_closed
-from psdmc.model.payload import body_parameters, load_parameters
-from psdmc.model.random_states import on_joints, random_parameters
+from psdmc.model.parameter_checks import for_every_gravity
+from psdmc.model.random_states import near_closed, on_joints, random_parameters
 from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.signature import Q_GUESS, TAU, Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows

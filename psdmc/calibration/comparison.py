@@ -21,7 +21,7 @@ from psdmc.calibration.verdict.delivered import Delivered, delivered, linear_tor
 from psdmc.errors import InputError
 from psdmc.friction.law import At
 from psdmc.friction.state import STATE_LAW
-from psdmc.model import recursive
+from psdmc.model import evaluate
 from psdmc.model.calibrated import LINEAR, Prediction, Remark
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import ROBOT_FILES, model_of
@@ -300,7 +300,7 @@ def friction_of(found: Delivered, q: Array, qd: Array) -> Array:
         still = np.zeros_like(q)
         plain_ones = replace(found, extra=np.where(found.columns.of_springs, 0.0, found.extra))
         x = found.model.equivalent_parameters()
-        return linear_torque(plain_ones, q, qd, still) - recursive.torques(
+        return linear_torque(plain_ones, q, qd, still) - evaluate.torques(
             found.model.mechanism, x, [q, qd, still]
         )
     torque, state = np.zeros_like(qd), STATE_LAW.state
@@ -327,9 +327,9 @@ def joint_differences(a: Side, b: Side, both: bool) -> tuple[JointDifference, ..
     for side in (a, b):
         x = side.model.equivalent_parameters()
         rubbed.append(friction_of(side.found, q, qd) if both and side.found is not None else still)
-        whole.append(recursive.torques(side.model.mechanism, x, [q, qd, qdd]) + rubbed[-1])
-        weight.append(recursive.torques(side.model.mechanism, x, [q, still, still]))
-        masses = recursive.mass_matrix(side.model.mechanism, x, q)
+        whole.append(evaluate.torques(side.model.mechanism, x, [q, qd, qdd]) + rubbed[-1])
+        weight.append(evaluate.torques(side.model.mechanism, x, [q, still, still]))
+        masses = evaluate.mass_matrix(side.model.mechanism, x, q)
         inertia.append(np.diagonal(masses, axis1=1, axis2=2))
     rms, typical, gravity, friction = (
         np.sqrt(np.mean(values**2, axis=0))

@@ -22,10 +22,10 @@ from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.errors import InputError
 from psdmc.files import write_whole
-from psdmc.model import recursive
+from psdmc.model import evaluate
+from psdmc.model.bodies import body_parameters, carrying_frame, load_parameters
 from psdmc.model.calibrated import Verdict
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.payload import body_parameters, carrying_frame, load_parameters
 from psdmc.robot.inertia import INERTIA_NAMES, inertia_matrix, six_of
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 
@@ -83,7 +83,7 @@ class KnownLoad:
                 states = stretch.states
 
                 def needed(own: slice, states=states) -> Array:  # type: ignore[no-untyped-def]
-                    return recursive.torques(chain, alone, [states.q[own], states.qd[own], states.qdd[own]])
+                    return evaluate.torques(chain, alone, [states.q[own], states.qd[own], states.qdd[own]])
 
                 found.append(smoothed_rows(states, stretch.at, needed))
         return np.concatenate(found)
@@ -95,7 +95,7 @@ def unreached(chain: Mechanism, q: Array, load: KnownLoad) -> dict[str, str]:
     down = chain.gravity / (np.linalg.norm(chain.gravity) or 1.0)
     weight = load.mass * float(np.linalg.norm(chain.gravity))
     still = np.zeros_like(q)
-    felt = np.abs(recursive.torques(chain, load.parameters(chain), [q, still, still])).max(axis=0)
+    felt = np.abs(evaluate.torques(chain, load.parameters(chain), [q, still, still])).max(axis=0)
     axes = _axes(chain, q)
     reasons = {}
     for k, joint in enumerate(chain.joints):

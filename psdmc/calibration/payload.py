@@ -35,10 +35,10 @@ from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.dynamics.parameters import inertia_matrix, inertia_of, second_moments
 from psdmc.errors import InputError
 from psdmc.links.pseudo_inertias import pseudo_inertia, require_cvxpy
+from psdmc.model.bodies import carrying_frame, load_map
 from psdmc.model.calibrated import SHOWN, JointFigures, Verdict, code_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Ground
-from psdmc.model.payload import carrying_frame, load_map
 from psdmc.progress import Progress, silent
 from psdmc.robot.inertia import six_of, standard_parameters
 from psdmc.robot.mechanism import require_axes, require_no_loops
@@ -107,7 +107,7 @@ def fit_load(
     """Return the load and the friction that explain the difference between measured torques and the torques of the
     model without the load.
 
-    onto_theta  (l, 10) change of the l base parameters per unit of each load parameter (psdmc.model.payload.load_map)
+    onto_theta  (l, 10) change of the l base parameters per unit of each load parameter (psdmc.model.bodies.load_map)
     friction    (n joints, f values) the model's own friction, in the order of friction_names; None: unknown
     theta_std   (l,) standard deviations of the model's base parameters, taken as independent; zero if unknown
     beside      function that returns the torques (rows, n) of springs and further friction at some rows; None: none

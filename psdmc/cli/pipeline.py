@@ -225,7 +225,7 @@ def check(
     """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source, and its mass
     matrix."""
     from psdmc.model.load import load
-    from psdmc.model.mass_check import check_mass_matrix
+    from psdmc.model.parameter_checks import check_mass_matrix
     from psdmc.robot.load import load_robot
     from psdmc.verification.check import check_model
 

@@ -16,9 +16,15 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.calibrated import WHOLE, Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.glance import limit_text, numbers_text, range_text
-from psdmc.model.joined_units import joined_units
-from psdmc.model.summary import Summary, summary, term_texts
+from psdmc.model.summary import (
+    Summary,
+    joined_units,
+    limit_text,
+    numbers_text,
+    range_text,
+    summary,
+    term_texts,
+)
 from psdmc.program.cost import cost
 from psdmc.robot.limits import listed
 from psdmc.robot.mechanism import POINT, Joint, Mechanism, require_derivable

@@ -26,7 +26,7 @@ from psdmc.derivation.scaled import Scaled, length_unit, parameter_units, scaled
 from psdmc.dynamics.regressor import EFFECT
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.general_gravity import under_general_gravity
+from psdmc.model.parameter_checks import under_general_gravity
 from psdmc.progress import Progress, silent
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, require_derivable

@@ -32,8 +32,8 @@ from psdmc.frameworks.differentiation import (
 from psdmc.functions import SIGNATURES, no_function
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.general_gravity import for_every_gravity
 from psdmc.model.load import model_of
+from psdmc.model.parameter_checks import for_every_gravity
 from psdmc.program.gravity_input import GRAVITY, takes_gravity
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS

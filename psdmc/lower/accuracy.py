@@ -13,7 +13,7 @@ import numpy as np
 
 from psdmc.functions import inverse_dynamics
 from psdmc.lower.factored import Arrangement, RobotConstants, trace_dynamics
-from psdmc.model import recursive
+from psdmc.model import evaluate
 from psdmc.model.random_states import states_of
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Program
@@ -92,7 +92,7 @@ class Accuracy:
         return self._newton_euler(q, 0.0 * qd, 0.0 * qdd) if part is Polynomials.GRAVITY else self._torques
 
     def _newton_euler(self, *states: Array) -> Array:
-        return recursive.torques(self.robot.chain, self._parameters, list(states))
+        return evaluate.torques(self.robot.chain, self._parameters, list(states))
 
     @cached_property
     def _parameters(self) -> Array:
@@ -104,7 +104,7 @@ class Accuracy:
 
     @cached_property
     def _mass(self) -> Array:
-        return recursive.mass_matrix(self.robot.chain, self._parameters, self._states["q"])
+        return evaluate.mass_matrix(self.robot.chain, self._parameters, self._states["q"])
 
 
 def _relative(difference: Array, whole: Array, least: float = 0.0) -> float:

@@ -10,8 +10,7 @@ from psdmc.errors import InputError
 from psdmc.functions import RECIPES, default_of, recipe_of
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
-from psdmc.model.standard_parameters import lack_of_standard_parameters
+from psdmc.model.parameter_checks import check_mass_matrix, is_surely_positive, lack_of_standard_parameters
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.limits import shown
 from psdmc.robot.missing_inertia import idle_joints, massless_words, unknown_option

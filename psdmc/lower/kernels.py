@@ -27,7 +27,7 @@ from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.general_gravity import for_every_gravity
+from psdmc.model.parameter_checks import for_every_gravity
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.model import bodies, equations, evaluate, glance, payload, recursive, store, symbolic
+from psdmc.model import bodies, equations, evaluate, store, summary
 from psdmc.model.answers import Answers
 from psdmc.model.calibrated import Calibrated
-from psdmc.model.expansion import Expansion
+from psdmc.model.equations import BaseParameters
+from psdmc.model.expansion import Expansion, torque_expression
 from psdmc.model.loop_base_parameters import LoopBaseParameters, loop_base_parameters
-from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
 from psdmc.reproducible import times
 from psdmc.robot.inertia import leading_rows
@@ -91,10 +91,10 @@ class DynamicsModel(Answers):
             )
 
     def __repr__(self) -> str:
-        return glance.text(self)
+        return summary.text_summary(self)
 
     def _repr_html_(self) -> str:
-        return glance.html(self)
+        return summary.html_summary(self)
 
     def _repr_latex_(self) -> str:
         return self.base_parameters._repr_latex_()
@@ -349,7 +349,7 @@ class DynamicsModel(Answers):
         - an inertia is not symmetric, or belongs to a link without mass
         - a parameter is not zero, but the model was derived with the assumption that it is (option `assume_zero`)
         """
-        x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
+        x = bodies.link_parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
 
     def inverse_dynamics(
@@ -392,9 +392,9 @@ class DynamicsModel(Answers):
             )
         shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
         if self.expansion is None:
-            found = recursive.torques(self.mechanism, times(self.representative, theta), arrays)
+            found = evaluate.torques(self.mechanism, times(self.representative, theta), arrays)
         else:
-            found = evaluate.torques(self.expansion, self.mechanism, theta, arrays)
+            found = evaluate.expanded_torques(self.expansion, self.mechanism, theta, arrays)
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
@@ -449,7 +449,7 @@ class DynamicsModel(Answers):
         unknown, known = self.unknown_base_parameters, self.file_theta_b
         values = [None] * self.l if known is None else known.tolist()
         shown = [None if k in unknown else value for k, value in enumerate(values)]
-        return BaseParameters(equations.base_parameters(self.mechanism, self.B, self.pivots, shown))
+        return equations.base_parameters(self.mechanism, self.B, self.pivots, shown)
 
     def to_latex(self) -> str:
         """Return the equations, values and units of the base parameters as LaTeX, in amsmath's environment `aligned`.
@@ -470,7 +470,7 @@ class DynamicsModel(Answers):
         derived with `expand=False`. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
-        return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
+        return torque_expression(self.mechanism, self.expanded(), joint, values)
 
     @property
     def content_hash(self) -> str:
@@ -502,13 +502,13 @@ class DynamicsModel(Answers):
         Raises InputError if no rigid body has such a mass and inertia, or if a number is unusually large. Raises
         InputError also if the load needs a parameter that the model assumes to be zero (option `assume_zero` of `derive`).
         """
-        load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)
-        body = payload.carrying_frame(self.mechanism, frame).joint
-        chain = payload.loaded(self.mechanism, load, float(mass), body)
+        load = bodies.load_parameters(self.mechanism, mass, com, inertia, frame)
+        body = bodies.carrying_frame(self.mechanism, frame).joint
+        chain = bodies.loaded(self.mechanism, load, float(mass), body)
         if self.theta_b is None:
             raise InputError(
                 f"the base parameters of '{self.mechanism.name}' are unknown",
                 "calibrate before adding a load",
             )
-        index = payload.body_parameters(body)
+        index = bodies.body_parameters(body)
         return replace(self, theta_b=self.theta_b + times(self.B[:, index], load), mechanism=chain)

@@ -1,13 +1,23 @@
-"""Inverse dynamics in NumPy from E, P and theta_b. This code is slow and simple; psdmc checks faster code with it."""
+"""Torques, mass matrix and regressor in NumPy. This code is slow and simple; psdmc checks faster code with it.
+
+They are computed from standard parameters by the recursive algorithms of psdmc.dynamics, or from E, P and theta_b. The
+time of the former does not depend on the number of monomials of the torques.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from psdmc.dynamics.composite_body import mass_matrix as composite_bodies
+from psdmc.dynamics.frames import base_acceleration, frames_of
+from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
+from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
+from psdmc.dynamics.regressor import regressor as standard_regressor
+from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.real_arrays import real_array
@@ -17,7 +27,6 @@ from psdmc.robot.mechanism import Array, Mechanism
 
 if TYPE_CHECKING:
     from scipy import sparse
-
 
 CHUNK_BYTES = 64 * 2**20
 """Bytes of monomials' values held at once."""
@@ -52,6 +61,42 @@ def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], lis
     ]
 
 
+def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:
+    """Compute joint torques tau (states, n), N m or N, from the links' parameters (11n,) and q, qd, qdd."""
+    q, qd, qdd = (list(array.T) for array in arrays)
+    bodies, drives = bodies_of(chain, x), drive_inertia_of(x)
+    found = newton_euler(frames_of(chain), bodies, drives, q, qd, qdd, base_acceleration(chain))
+    return _columns(found, len(arrays[0]))
+
+
+def mass_matrix(chain: Mechanism, x: Array, q: Array) -> Array:
+    """Compute the mass matrix M(q), (states, n, n), from q (states, n) and the links' standard parameters (11n,), by
+    the composite-rigid-body algorithm."""
+    rows = composite_bodies(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
+    return np.stack([_columns(row, len(q)) for row in rows], axis=1)
+
+
+def link_regressor(chain: Mechanism, wanted: Sequence[int], arrays: list[Array]) -> Array:
+    """Compute the columns `wanted` of the regressor (states, n, wanted) of the links' standard parameters (11n,), at q, qd,
+    qdd (states, n)."""
+    q, qd, qdd = (list(array.T) for array in arrays)
+    placements = [joint.link_frame for joint in chain.joints]
+    rows = standard_regressor(
+        frames_of(chain), placements, frozenset(wanted), q, qd, qdd, base_acceleration(chain)
+    )
+    count = len(arrays[0])
+    return np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
+
+
+def _columns(values: Sequence[Scalar], count: int) -> Array:
+    """(count, len(values)) from scalars or (count,) arrays."""
+    found = np.empty((count, len(values)))
+    for i, value in enumerate(values):
+        found[:, i] = value
+    return found
+
+
+# From E, P and theta_b.
 class _Monomials:
     """The monomials y of an expansion, prepared for evaluation: products of the rows of E, those of gravity times |g|.
 
@@ -110,14 +155,14 @@ def _factors(exponents: NDArray[np.uint8]) -> Iterator[NDArray[np.intp]]:
         yield factor
 
 
-def torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[Array]) -> Array:
+def expanded_torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[Array]) -> Array:
     """Compute joint torques tau (states, n), N m or N, from base parameters (l,) and q, qd, qdd (states, n). There are
     n joints."""
     weights = _weights(expansion, theta)
     return _by_chunks(expansion, chain, arrays, lambda y: (weights @ y).T)
 
 
-def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Array:
+def expanded_regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Array:
     """Compute the regressor Y (states, n, l), with the torques tau = Y theta_b, at q, qd, qdd (states, n)."""
     transposed = [matrix.T.tocsr() for matrix in expansion.P]
 
@@ -127,7 +172,7 @@ def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Ar
     return _by_chunks(expansion, chain, arrays, rows)
 
 
-def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
+def expanded_mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
     """Compute the mass matrix M (states, n, n) at q (states, n), for n joints. Column j is the sum of the torques'
     terms with qdd_j, at qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)

@@ -1,4 +1,6 @@
-"""E and P of a model: E holds the exponents of the torques' monomials, P their coefficients per base parameter."""
+"""E and P of a model: E holds the exponents of the torques' monomials, P their coefficients per base parameter.
+
+The torques of small robots are also returned as SymPy expressions, term by term from E and P."""
 
 from __future__ import annotations
 
@@ -10,13 +12,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.mechanism import made_again
+from psdmc.errors import InputError, ToolchainError
+from psdmc.reproducible import length
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Array, Mechanism, made_again
 
 if TYPE_CHECKING:
+    import sympy
     from scipy import sparse
+
 
 BLOCKS = 5
 """Row blocks of E: exponents of q, sin q, cos q, qd and qdd."""
+
+MOST_MONOMIALS = 2000
+"""Of one torque as a SymPy expression. SymPy takes about a millisecond for each."""
 
 
 class RowBlocks(NamedTuple):
@@ -126,15 +136,88 @@ class Expansion:
         """Return the n sparse matrices P (p, l), one per joint. They are made on first access, because SciPy is slow to
         import."""
         if not self._matrices:
-            self._matrices.extend(self._made())
+            from scipy import sparse
+
+            joint, row, column, value = self.entries
+            starts = np.searchsorted(joint, np.arange(self.n + 1)).tolist()
+            self._matrices.extend(
+                sparse.csr_array((value[a:b], (row[a:b], column[a:b])), shape=(self.p, self.l))
+                for a, b in pairwise(starts)
+            )
         return tuple(self._matrices)
 
-    def _made(self) -> list[sparse.csr_array]:
-        from scipy import sparse
 
-        joint, row, column, value = self.entries
-        starts = np.searchsorted(joint, np.arange(self.n + 1)).tolist()
-        return [
-            sparse.csr_array((value[a:b], (row[a:b], column[a:b])), shape=(self.p, self.l))
-            for a, b in pairwise(starts)
-        ]
+def torque_expression(
+    robot: Mechanism, expansion: Expansion, joint: int | str, theta_b: Array | None
+) -> sympy.Expr:
+    """Return the torque of one joint as a SymPy expression: the sum of monomials times combinations of theta_b.
+
+    joint    number from 0, or name
+    theta_b  (l,) numbers that replace the symbols theta_b0, theta_b1 and so on; None: the symbols stay
+
+    The symbols q1, qd1, qdd1 and so on are real. In them, joints are numbered from 1, as in the equations of base
+    parameters. Symbols theta_b0 and so on are numbered as the entries of theta_b.
+
+    Raises InputError if there is no such joint, or if the torque has more than MOST_MONOMIALS monomials. Raises
+    ToolchainError if SymPy is not installed.
+    """
+    sp, number = _sympy(), _joint_number(robot, joint)
+    entries = expansion.entries
+    own = np.flatnonzero(entries.joint == number)
+    used, place = np.unique(entries.row[own], return_inverse=True)
+    if len(used) > MOST_MONOMIALS:
+        raise InputError(
+            f"the torque of joint {shown(robot.v_names[number])} has {len(used)} monomials, "
+            f"expressions are made of up to {MOST_MONOMIALS}",
+            "lock joints or cut the chain; model.E, model.P and psdmc show --terms have all of them",
+        )
+    thetas = list(sp.symbols(f"theta_b:{expansion.l}", real=True))
+    if theta_b is not None:
+        thetas = [sp.Float(value) for value in theta_b.tolist()]
+    weights: list[list[Any]] = [[] for _ in used]
+    for k, entry in zip(place.tolist(), own.tolist(), strict=True):
+        weights[k].append(_number(sp, float(entries.value[entry])) * thetas[entries.column[entry]])
+    factors = _symbols(sp, robot.nv)
+    strength = _number(sp, length(np.asarray(robot.gravity)))
+    terms = (
+        sp.Add(*weight) * _monomial(sp, expansion, int(column), factors, strength)
+        for column, weight in zip(used, weights, strict=True)
+    )
+    found: sympy.Expr = sp.Add(*terms)
+    return found
+
+
+def _joint_number(robot: Mechanism, joint: int | str) -> int:
+    numbers = {name: i for i, name in enumerate(robot.v_names)} | {i: i for i in range(robot.nv)}
+    if joint not in numbers:
+        raise InputError(
+            f"no joint {shown(joint)}",
+            f"the joints are 0 to {robot.nv - 1}: {', '.join(robot.v_names)}",
+        )
+    return numbers[joint]
+
+
+def _sympy() -> Any:
+    try:
+        import sympy
+    except ImportError as error:
+        raise ToolchainError("torque expressions need SymPy", "pip install 'psdmc[notebook]'") from error
+    return sympy
+
+
+def _symbols(sp: Any, n: int) -> list[Any]:
+    """The quantities that the rows of E are exponents of."""
+    q, qd, qdd = (sp.symbols(f"{letters}1:{n + 1}", real=True) for letters in ("q", "qd", "qdd"))
+    return [*q, *map(sp.sin, q), *map(sp.cos, q), *qd, *qdd]
+
+
+def _monomial(sp: Any, expansion: Expansion, column: int, factors: list[Any], strength: Any) -> Any:
+    """A column of E as a product; one without rates times |g|."""
+    exponents = expansion.E[:, column]
+    product = sp.Mul(*(factors[row] ** int(exponents[row]) for row in np.flatnonzero(exponents)))
+    return product if exponents[RowBlocks.of(expansion.n).rates].any() else strength * product
+
+
+def _number(sp: Any, value: float) -> Any:
+    """A whole number as such, any other one as SymPy's float."""
+    return sp.Integer(int(value)) if value.is_integer() else sp.Float(value)

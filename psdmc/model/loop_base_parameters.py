@@ -24,7 +24,7 @@ from psdmc.dynamics.frames import Frame, frames_of
 from psdmc.dynamics.manifold import integrated, restored
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InputError
-from psdmc.model import recursive
+from psdmc.model import evaluate
 from psdmc.model.random_states import RANGES
 from psdmc.reproducible import lengths, times, triangle_solved
 from psdmc.robot.graded import graded_pivots, halving_shares
@@ -167,7 +167,7 @@ def _sampled(robot: Mechanism, representative: Array) -> tuple[Array, Array]:
     drift = _over(loop_drift(frames, robot.loops, list(q), list(qd)), count)
     allowed = _allowed(robot.loops, blocked, drift, qdd)
     wanted = np.flatnonzero(representative.any(axis=1))
-    tree = recursive.link_regressor(robot, wanted.tolist(), [q.T, qd.T, allowed.motion.T])
+    tree = evaluate.link_regressor(robot, wanted.tolist(), [q.T, qd.T, allowed.motion.T])
     closed = tree.transpose(1, 2, 0).copy()  # rate, parameter, state
     for direction in allowed.basis:
         share = np.add.reduce(direction[:, None] * closed)

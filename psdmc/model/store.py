@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 
 from psdmc.errors import InputError
 from psdmc.files import write_whole
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.calibrated_json import as_json
 from psdmc.model.chain_json import MOST_JOINTS, chain_to_json, is_plain_chain
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
-from psdmc.model.model_parts import ModelParts
+from psdmc.robot.mechanism import Mechanism
 from psdmc.version import psdmc_version
 
 CHAIN_SCHEMA = 1
@@ -47,8 +48,23 @@ _NO_DATE = (1980, 1, 1, 0, 0, 0)
 Arrays = Mapping[str, NDArray[Any]]
 
 
-class Model(ModelParts, Protocol):
-    """The attributes of a model that a model file contains."""
+class Model(Protocol):
+    """The attributes of a model that a model file contains. DynamicsModel itself imports this file."""
+
+    @property
+    def theta_b(self) -> NDArray[np.float64] | None: ...
+
+    @property
+    def mechanism(self) -> Mechanism: ...
+
+    @property
+    def certificate(self) -> NDArray[np.float64]: ...
+
+    @property
+    def provenance(self) -> Mapping[str, Any]: ...
+
+    @property
+    def calibrated(self) -> Calibrated | None: ...
 
     @property
     def expansion(self) -> Expansion | None: ...

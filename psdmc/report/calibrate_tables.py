@@ -16,7 +16,7 @@ from psdmc.model.calibrated import (
     Quality,
     Verdict,
 )
-from psdmc.model.joined_units import joined_units
+from psdmc.model.summary import joined_units
 
 NOTHING = "–"
 """A cell without a number."""

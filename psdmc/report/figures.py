@@ -21,7 +21,7 @@ from psdmc.friction.law import Array, At, Row, total
 from psdmc.friction.terms import OPTIONAL
 from psdmc.model.calibrated import Calibrated, NumberRow, ParameterRow, StepQuality
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.latex import terms_latex
+from psdmc.model.equations import terms_latex
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_plots import MEASURED, PREDICTED, RESIDUAL, thinned
 from psdmc.report.drawing import Figure, document

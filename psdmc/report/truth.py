@@ -16,7 +16,7 @@ from psdmc.calibration.plant.virtual_robot import VirtualRobot
 from psdmc.errors import InputError
 from psdmc.model.calibrated import Calibrated
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.joined_units import joined_units
+from psdmc.model.summary import joined_units
 from psdmc.report import published_denso as published
 from psdmc.report.calibrate_tables import NOTHING, joint_number, number, r_squared, table
 

@@ -12,9 +12,8 @@ import numpy as np
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.near_closed import near_closed
-from psdmc.model.random_states import on_joints
-from psdmc.model.standard_parameters import lack_of_standard_parameters
+from psdmc.model.parameter_checks import lack_of_standard_parameters
+from psdmc.model.random_states import near_closed, on_joints
 from psdmc.program.signature import Q_GUESS, TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.packed import VALUES, unpacked

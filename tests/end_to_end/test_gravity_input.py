@@ -25,7 +25,7 @@ from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, OF_TREES, RECIPES
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.general_gravity import under_general_gravity
+from psdmc.model.parameter_checks import under_general_gravity
 from psdmc.model.random_states import on_joints
 from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.interpret import interpret

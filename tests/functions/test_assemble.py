@@ -18,7 +18,7 @@ import psdmc
 from psdmc.dynamics.frames import frames_of
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
-from psdmc.model.near_closed import near_closed
+from psdmc.model.random_states import near_closed
 from psdmc.recipes.passive import closer
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot

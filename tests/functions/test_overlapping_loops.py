@@ -13,7 +13,7 @@ from psdmc.backends.c.package import package_view
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower, wanted
-from psdmc.model.near_closed import near_closed
+from psdmc.model.random_states import near_closed
 from psdmc.program.signature import Sizes
 
 IN_LOOPS = [name for name, recipe in RECIPES.items() if recipe.regions]

@@ -9,8 +9,7 @@ import pytest
 from bundled import bundled_model
 from matplotlib.mathtext import MathTextParser
 
-from psdmc.model.equations import Power, Symbol, Term, dh_lengths
-from psdmc.model.latex import number_latex, symbol_latex
+from psdmc.model.equations import Power, Symbol, Term, dh_lengths, number_latex, symbol_latex
 from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK
 
 ROBOTS = ["two_link_full", "scara", "denso_wall", "kr6", "rounded_arm"]

@@ -10,9 +10,9 @@ import pytest
 from bundled import bundled_model, bundled_robot
 
 from psdmc.derivation.derive import derive_model
-from psdmc.model import mass_check
+from psdmc.model import evaluate
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
+from psdmc.model.parameter_checks import check_mass_matrix, is_surely_positive
 from psdmc.robot.load import load_robot_text
 from psdmc.robot.reference import reference
 
@@ -75,7 +75,7 @@ def test_cholesky_proves_only_what_eigenvalues_in_closed_form_say(
     monkeypatch: pytest.MonkeyPatch, matrix: list[list[float]], is_sure: bool
 ):
     """The eigenvalues of [[1, c], [c, 1]] are 1 - c and 1 + c."""
-    monkeypatch.setattr(mass_check.recursive, "mass_matrix", lambda *_: np.tile(matrix, (2000, 1, 1)))
+    monkeypatch.setattr(evaluate, "mass_matrix", lambda *_: np.tile(matrix, (2000, 1, 1)))
 
     assert is_surely_positive(bundled_model("two_link")) == is_sure
 

@@ -9,8 +9,7 @@ import pytest
 from bundled import bundled_model
 
 from psdmc.errors import ToolchainError
-from psdmc.model.equations import BaseParameter
-from psdmc.model.parameter_table import BaseParameters
+from psdmc.model.equations import BaseParameter, BaseParameters
 
 
 @pytest.mark.parametrize("name", ["two_link", "kr6"])

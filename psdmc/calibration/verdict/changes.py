@@ -16,9 +16,9 @@ from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.delivered import Delivered, PredictedRows
 from psdmc.errors import InputError
+from psdmc.model.bodies import load_map
 from psdmc.model.calibrated import OrNaN, by_joint
 from psdmc.model.grounds import OrInf
-from psdmc.model.payload import load_map
 
 CHANCE = 1e-3
 """Probability of a chi-square as large in an unchanged robot, below which a change counts: one false alarm in a thousand

@@ -43,7 +43,7 @@ from psdmc.calibration.logs.smoothed_rows import smoothed_rows
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
-from psdmc.model import recursive
+from psdmc.model import evaluate
 from psdmc.model.calibrated import WHOLE, Prediction, StepQuality, by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
@@ -295,7 +295,7 @@ def linear_torque(found: Delivered, q: Array, qd: Array, qdd: Array) -> Array:
     """Return the motor torque (N, n) of a calibrated file whose friction is linear in its values: rigid bodies,
     friction, springs."""
     with in_any_order():
-        rigid = recursive.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
+        rigid = evaluate.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
     law = found.prediction
     coupling = coupling_of(law.coupling)
     speed = qd if coupling is None else coupling.to_motors(qd)
@@ -313,7 +313,7 @@ def _torque_with_state(
     """(rows, n) motor torque after delay and filter, of a friction law with a state, which starts at zero."""
     model = found.model
     motion = [states.q, states.qd, states.qdd]
-    torque = recursive.torques(model.mechanism, model.equivalent_parameters(), motion)
+    torque = evaluate.torques(model.mechanism, model.equivalent_parameters(), motion)
     for k, name in enumerate(model.v_names):
         if name in friction.joints:
             torque[:, k] += friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)

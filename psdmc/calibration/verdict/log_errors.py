@@ -22,9 +22,9 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.effort_checks import CLUSTERS, RANK_TOLERANCE, clustered
 from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.errors import InputError
-from psdmc.model import recursive
+from psdmc.model import evaluate
+from psdmc.model.bodies import load_map
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.payload import load_map
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 ROWS = 1500
@@ -282,7 +282,7 @@ def _hypotheses(
     motion = (evidence.q, evidence.qd, evidence.qdd)
 
     def torque(*parts: Array) -> Array:
-        return recursive.torques(chain, x, list(parts))
+        return evaluate.torques(chain, x, list(parts))
 
     rigid, one = torque(*motion), np.eye(evidence.n)
     moving = np.flatnonzero(np.ptp(evidence.q, axis=0) > 0).tolist()
@@ -319,7 +319,7 @@ def _tilts(model: DynamicsModel, motion: Sequence[Array]) -> Array:
     parts = [
         _slope(
             *(
-                recursive.torques(replace(chain, gravity=g + s * STEP * np.cross(axis, g)), x, list(motion))
+                evaluate.torques(replace(chain, gravity=g + s * STEP * np.cross(axis, g)), x, list(motion))
                 for s in (1, -1)
             )
         )

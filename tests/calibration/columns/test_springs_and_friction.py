@@ -43,7 +43,7 @@ from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli.boundary import run
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.parameter_checks import check_mass_matrix
 
 BALANCER = {
     "kind": "gas",

@@ -11,7 +11,7 @@ from bundled import bundled_model
 from psdmc import calibrate
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.parameter_checks import check_mass_matrix
 
 
 def planar_log(path: Path) -> None:

@@ -19,7 +19,7 @@ from psdmc.derivation.derive import derive_model
 from psdmc.model.calibrated import by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.parameter_checks import check_mass_matrix
 from psdmc.model.store import save
 from psdmc.robot.load import load_robot
 

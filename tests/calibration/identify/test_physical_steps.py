@@ -15,7 +15,7 @@ from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.parameter_checks import check_mass_matrix
 
 pytest.importorskip("cvxpy")
 HEAVIER = 1.2

@@ -15,7 +15,7 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.derivation.derive import derive_model
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.parameter_checks import check_mass_matrix
 from psdmc.robot.load import load_robot
 
 REFERENCE = np.array([0.974, 0.989, 0.996, 0.986, 0.976, 0.962])

@@ -30,7 +30,7 @@ from psdmc.compiler import emit_c
 from psdmc.errors import InputError
 from psdmc.model.calibrated_json import document
 from psdmc.model.load import load
-from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.parameter_checks import check_mass_matrix
 from psdmc.model.store import save
 from psdmc.report.calibrate_report import write_report
 from psdmc.toolchain.build_package import build_package

@@ -1,14 +1,18 @@
-"""A test of whether the mass matrix is positive definite in random poses within the joint limits, as forward dynamics
-needs.
+"""Checks of what a model's parameters suffice for: forward dynamics, functions of single links, gravity as an input.
 
 A measured or published theta_b may belong to no possible bodies. Some accelerations then have negative kinetic energy,
-and a controller that divides by the mass matrix acts in the wrong direction.
+and a controller that divides by the mass matrix acts in the wrong direction. So the mass matrix is tested in random
+poses within the joint limits.
+
+Torques determine only combinations of the links' masses, centres and inertias, the base parameters. Gravity along an
+axis or a plane of the robot hides more of them. The first joint of a SCARA robot is vertical, so its weight exerts no
+torque on it. Base parameters for a general direction of gravity suffice for every direction.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +20,12 @@ from numpy.typing import NDArray
 
 from psdmc.dynamics.coordinates import positions
 from psdmc.dynamics.frames import frames_of
-from psdmc.model import recursive
+from psdmc.errors import InputError
+from psdmc.model import evaluate
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.random_states import on_joints
+from psdmc.model.random_states import on_joints, random_parameters, states_of
+from psdmc.reproducible import times
+from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism
 
 POSES = 2000
@@ -29,6 +36,20 @@ STACK = 1 << 24
 ROUNDING = 64 * float(np.finfo(float).eps)
 """Share below which a number is rounding and counts as zero: of the magnitudes that are summed in an inertia, and of a
 matrix's largest eigenvalue, every joint in its own unit."""
+
+BELONGS = 1e-9
+"""Share of the largest base parameter by which B x may differ from theta_b: both were rounded."""
+
+DIRECTION = (4.27, -3.19, -8.23)
+"""m/s^2, along no axis, plane or diagonal that robots have."""
+
+OTHERS = ((9.1, 2.3, 1.7), (-1.9, 8.7, 3.1))
+"""m/s^2, for which the base parameters are tested."""
+
+GRAVITY_STATES, GRAVITY_SEED = 8, 20_261_128
+
+HIDDEN = 1e-9
+"""Torque, as a share of a joint's largest one, beyond which a model lacks a parameter. Rounding leaves less than 1e-12."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +132,7 @@ def _drawn(model: DynamicsModel) -> tuple[Array, Array, Array]:
     low, high = (np.array(bound) for bound in zip(*ranges, strict=True))
     drawn = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.nq))
     poses = on_joints(model.mechanism, drawn)
-    mass = recursive.mass_matrix(model.mechanism, model.equivalent_parameters(), poses)
+    mass = evaluate.mass_matrix(model.mechanism, model.equivalent_parameters(), poses)
     return poses, mass, ROUNDING * _magnitudes(model, np.abs(poses).max(axis=0))
 
 
@@ -181,3 +202,47 @@ def _range(joint: Joint) -> tuple[float, float]:
     free = joint.type.free_range
     low, high = joint.limits.lower, joint.limits.upper
     return (low if np.isfinite(low) else -free, high if np.isfinite(high) else free)
+
+
+def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
+    """Return a sentence on why the model lacks mass, centre and inertia of some link; None if it has them."""
+    parameters = model.mechanism.parameters
+    if np.isnan(parameters).any():
+        return "it needs mass and inertia of every link, and some are unknown"
+    if not parameters[:, 0].sum() > 0.0:
+        return "it needs mass, and the links have none"
+    theta = times(model.B, parameters.reshape(-1))
+    if model.theta_b is None or np.abs(theta - model.theta_b).max() > BELONGS * np.abs(theta).max():
+        return (
+            "it needs mass and inertia of every link, which torques do not show, and the model's base parameters are "
+            "not those of the links in its file"
+        )
+    return None
+
+
+def under_general_gravity(chain: Mechanism) -> Mechanism:
+    """Return the robot with gravity in a general direction."""
+    return replace(chain, gravity=np.array(DIRECTION))
+
+
+def for_every_gravity(model: DynamicsModel) -> DynamicsModel:
+    """Return the model with gravity in a general direction. Its code depends on no property of the file's gravity.
+
+    Raises InputError if the base parameters do not determine the torques under every gravity. Then a change of the link
+    parameters that the model does not see changes torques.
+    """
+    chain = model.mechanism
+    x = random_parameters(chain)
+    seen = times(model.representative, times(model.B, x))
+    states = list(states_of(chain, np.random.default_rng(GRAVITY_SEED), GRAVITY_STATES))
+    for gravity in OTHERS:
+        turned = replace(chain, gravity=np.array(gravity))
+        torques = evaluate.torques(turned, x, states)
+        largest = np.abs(torques).max(axis=0)
+        lacking = np.abs(evaluate.torques(turned, seen, states) - torques).max(axis=0)
+        if (lacking > HIDDEN * largest).any():
+            raise InputError(
+                f"{shown(chain.name)}: its base parameters determine the torques under the gravity of its file only",
+                "derive the model with --gravity-input (gravity_input=True)",
+            )
+    return replace(model, mechanism=under_general_gravity(chain))
