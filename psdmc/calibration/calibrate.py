@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from psdmc.calibration.campaign_file import plain_logs, read_campaign, validation_logs
+from psdmc.calibration.campaign_file import plain_logs, read_campaign
 from psdmc.calibration.description.description import FitChoice
 from psdmc.calibration.identify.four_steps import (
     FourSteps,
     Runs,
     calibrate_four_steps,
-    checked_runs,
     physical_steps,
 )
 from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
@@ -21,7 +21,7 @@ from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
 from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.log_information import ALONE, MAIN_SHARE, LogInformation, log_information
-from psdmc.calibration.identify.motor_model import motors_of_logs, one_quantity
+from psdmc.calibration.identify.motor_model import motors_of_logs
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
@@ -123,12 +123,19 @@ def calibrate(
             "give --loaded LOG and --load MASS,X,Y,Z",
         )
     campaign = campaign_of(paths)
-    plain = None if campaign is None else _exciting_logs(campaign, model.v_names)
-    if plain is not None:
-        held += validation_logs(paths[0])
-        paths, campaign = list(plain), None
+    plain = None
     if campaign is not None:
-        _require_plain(campaign, options, held, naming, with_load)
+        with suppress(InputError):  # read_campaign says later why the campaign cannot be read
+            plain = plain_logs(campaign, model.v_names)
+    if plain is not None:
+        paths, held, campaign = list(plain[0]), [*held, *plain[1]], None
+    if campaign is not None:
+        flags = _only_for_plain_logs(options, held, naming, with_load)
+        if flags:
+            raise InputError(
+                f"{', '.join(flags)} {'is' if len(flags) == 1 else 'are'} for plain logs, {campaign} is a campaign",
+                "leave it out: each step of a campaign has its cut-off, split and friction",
+            )
         runs = read_campaign(campaign, model.v_names)
         return calibrate_campaign(model, runs, options, regressor, torque_constants, progress)
     naming.require_bag([*paths, *held, *with_load])
@@ -140,7 +147,10 @@ def calibrate(
         full = LoadedLogs(own.logs, load)
     options = replace(options, linear=found.linear)
     given = {**found.constants, **(torque_constants or {})}
-    constants = given if full is not None else {**_constants_of(model, found.logs), **given}
+    known = model.calibrated
+    constants = given
+    if full is None and known is not None and found.logs[0].quantity == "current":
+        constants = {**{row.joint: row.value for row in known.motors}, **given}
     result = calibrate_logs(model, found.logs, options, regressor, constants or None, progress, full)
     kept = [
         f"{name}={constants[name]:.6g}" for name in model.v_names if name in constants and name not in given
@@ -151,33 +161,14 @@ def calibrate(
     return with_model(replace(result, notes=(note, *result.notes)))
 
 
-def _constants_of(model: DynamicsModel, logs: Sequence[AnyLog]) -> dict[str, float]:
-    """Torque constants of a model that was calibrated before, by joint, for logs of currents; none for other logs."""
-    if model.calibrated is None or one_quantity(logs) != "current":
-        return {}
-    return {row.joint: row.value for row in model.calibrated.motors}
-
-
-def _exciting_logs(campaign: Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
-    """The logs of a campaign of exciting motions alone; None also where it cannot be read, which is said later."""
-    try:
-        return plain_logs(campaign, joint_names)
-    except InputError:
-        return None
-
-
 def _paths(sources: str | Path | Sequence[str | Path]) -> list[Path]:
     return [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
 
 
-def _require_plain(
-    campaign: Path,
-    options: CalibrateOptions,
-    validation: list[Path],
-    naming: LogNaming,
-    loaded: list[Path],
-) -> None:
-    """InputError where what is for plain logs is given with a campaign."""
+def _only_for_plain_logs(
+    options: CalibrateOptions, validation: list[Path], naming: LogNaming, loaded: list[Path]
+) -> list[str]:
+    """The given command-line options and tables that are for plain logs only."""
     given = [flag for flag, value in options.choice.by_flag().items() if value is not None]
     given += ["--validate"] if validation else []
     given += ["--loaded"] if loaded else []
@@ -185,12 +176,7 @@ def _require_plain(
     given += [f"[{name}]" for name in options.linear.tables]
     given += ["--prior-confidence"] if options.prior_confidence is not None else []
     given += ["--essential"] if options.essential is not None else []
-    if given:
-        are = "is" if len(given) == 1 else "are"
-        raise InputError(
-            f"{', '.join(given)} {are} for plain logs, {campaign} is a campaign",
-            "leave it out: each step of a campaign has its cut-off, split and friction",
-        )
+    return given
 
 
 def calibrate_campaign(
@@ -211,8 +197,6 @@ def calibrate_campaign(
             f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
             "calibrate from logs that do not belong to a campaign",
         )
-    progress("checking logs")
-    logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(
         model.mechanism,
         regressor,
@@ -224,17 +208,21 @@ def calibrate_campaign(
         model.file_theta_b,
     )
 
-    def record(steps: FourSteps, theta_b: Array) -> Calibration:
-        return with_data(four_step_record(model, steps, theta_b, options.campaign), logs)
+    def judged(
+        steps: FourSteps, theta_b: Array, plain: Calibration | None = None, distance: float | None = None
+    ) -> Calibration:
+        record = with_data(four_step_record(model, steps, theta_b, options.campaign), found.logs)
+        return judged_record(record, runs, plain, distance)
 
     progress("reading the result back")
-    plain = judged_record(record(found, found.inertial.theta_b), runs)
-
-    def consistent() -> Calibration:
-        near = physical_steps(model, found, options.consistency)
-        return judged_record(record(near.found, near.theta_b), runs, plain, near.distance)
-
-    result = _physical(plain, consistent, options, progress)
+    result = judged(found, found.inertial.theta_b)
+    if options.physical:
+        progress("physical consistency")
+        try:
+            near = physical_steps(model, found, options.consistency)
+            result = judged(near.found, near.theta_b, result, near.distance)
+        except NotPhysical as error:
+            result = replace(result, facts={**result.facts, NOT_PHYSICAL: error.message})
     progress("verdict")
     step = options.campaign.inertial
     linear = replace(
@@ -253,19 +241,6 @@ def calibrate_campaign(
     return with_verdict_on_campaign(
         result, model, regressor, runs, found.motors, step.filter, options.verdict
     )
-
-
-def _physical(
-    plain: Calibration, consistent: Callable[[], Calibration], options: CalibrateOptions, progress: Progress
-) -> Calibration:
-    """The physically consistent record where it is wanted and exists; else the unconstrained fit's, with a note."""
-    if not options.physical:
-        return plain
-    progress("physical consistency")
-    try:
-        return consistent()
-    except NotPhysical as error:
-        return replace(plain, facts={**plain.facts, NOT_PHYSICAL: error.message})
 
 
 def calibrate_logs(
@@ -295,7 +270,7 @@ def calibrate_logs(
     found = calibrate_linear(
         model.mechanism, regressor, model.l, logs, linear, motors, model.file_theta_b, progress
     )
-    fit = LogFit(model, logs, linear, options.physical, options.consistency, known, progress)
+    fit = LogFit(model, logs, linear, options, known, progress)
     result = fit.record(found)
     if loaded is not None and by_load is not None:
         result = with_loaded_logs(result, loaded, by_load, linear)
@@ -321,24 +296,23 @@ MOST_ALONE = 3
 class LogFit:
     """Data that all results of one linear fit need.
 
-    logs         logs that were fitted
-    physical     whether the result must be physically possible
-    consistency  options of the search for a physically possible result
-    known        what the user knows of the links before the fit, such as bounds of masses
+    logs     logs that were fitted
+    linear   options of the fit, with the robot's springs and friction
+    options  options of the calibration, such as whether the result must be physically possible
+    known    what the user knows of the links before the fit, such as bounds of masses
     """
 
     model: DynamicsModel
     logs: Sequence[AnyLog]
     linear: LinearOptions
-    physical: bool
-    consistency: PhysicalOptions
+    options: CalibrateOptions
     known: Knowledge
     progress: Progress
 
     def record(self, found: LinearResult) -> Calibration:
         """Return the final result of a linear fit. As the options say, it uses what the user knows of the links, is
         physically possible, and drops parameters that the data do not need."""
-        if len(self.known.bounds) and not self.physical:
+        if len(self.known.bounds) and not self.options.physical:
             raise InputError(
                 "[[bodies]] bounds masses or centres of mass, and the unconstrained fit knows none",
                 "leave out --no-physical, or the bounds",
@@ -373,7 +347,7 @@ class LogFit:
     def _consistent(self, found: LinearResult) -> Calibration:
         """The physically consistent record where it is wanted and exists; else the unconstrained one, with a note."""
         plain = judged_record(self._of(found, found.estimate.values), self.logs, check=self.linear.check)
-        if not self.physical:
+        if not self.options.physical:
             return plain
         self.progress("physical consistency")
         try:
@@ -389,7 +363,7 @@ class LogFit:
         return judged_record(record, self.logs, plain, near.distance, self.linear.check)
 
     def _nearest(self, found: LinearResult) -> Physical:
-        options = self.consistency
+        options = self.options.consistency
         if found.stated:  # the file's bodies are in the estimate: resembling them must not count twice
             options = replace(options, known_body=options.unknown_body)
         problem, solved = found.problem, found.estimate

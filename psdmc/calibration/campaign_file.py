@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.steps import FrictionRun, GravityRun, InertialRun, Load, MotorRun
@@ -51,41 +51,33 @@ def is_campaign(path: Path) -> bool:
 
 
 def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """Return the runs (recorded motions) that a campaign.toml lists; the path may also name its folder. Raises
-    InputError with the run and the missing entry."""
+    """Return the runs (recordings of one motion each) that a campaign.toml lists; the path may also name its folder. Raises
+    InputError with all faults, and the run of each."""
     path = Path(path)
     path = path / FILE if is_folder(path) else path
-    return runs_of(read_toml(path, WHAT), path)
-
-
-def runs_of(content: dict[str, Any], path: Path) -> tuple[ListedRun, ...]:
-    """Return the runs (recordings of one motion each) that the content of a campaign.toml lists. `path` is the path of
-    this file. Raises InputError with all faults."""
     faults: list[str] = []
-    tables = TomlTable(content, "campaign", ("run",), faults).items("run")
+    tables = TomlTable(read_toml(path, WHAT), "campaign", ("run",), faults).items("run")
     if not tables and not faults:
         faults.append("no [[run]]")
     if len(tables) > LARGEST_RUNS:
         faults.append(f"{len(tables)} runs, expected at most {LARGEST_RUNS}")
         tables = []
-    runs = tuple(_listed(path.parent, f"run {k}", table, faults) for k, table in enumerate(tables, start=1))
+    folder, runs = path.parent, []
+    for k, entry in enumerate(tables, start=1):
+        table = TomlTable(entry, f"run {k}", _RUN_KEYS, faults)
+        step = cast(Step, table.word("step", STEPS))
+        log = table.text("log")
+        run = ListedRun(
+            step=step,
+            name=table.text("name", Path(log).stem),
+            log=folder / log,
+            trajectory=folder / table.text("trajectory") if table.has("trajectory") else None,
+            joint=table.text("joint", None if step in ("motor", "friction") else ""),
+            load=_load(table.content["load"], f"run {k}: load", faults) if table.has("load") else None,
+        )
+        runs.append(run)
     require_none(faults, str(path), HINT)
-    return runs
-
-
-def _listed(folder: Path, where: str, value: object, faults: list[str]) -> ListedRun:
-    table = TomlTable(value, where, _RUN_KEYS, faults)
-    step = cast(Step, table.word("step", STEPS))
-    needs_joint = step in ("motor", "friction")
-    log = table.text("log")
-    return ListedRun(
-        step=step,
-        name=table.text("name", Path(log).stem),
-        log=folder / log,
-        trajectory=folder / table.text("trajectory") if table.has("trajectory") else None,
-        joint=table.text("joint", None if needs_joint else ""),
-        load=_load(table.content["load"], f"{where}: load", faults) if table.has("load") else None,
-    )
+    return tuple(runs)
 
 
 def _load(value: object, where: str, faults: list[str]) -> Load:
@@ -93,22 +85,20 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
     return Load(table.number("mass", SMALLEST_MASS, LARGEST_MASS), table.triple("com", LARGEST_ARM))
 
 
-def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
-    """Return the logs of a campaign that has only exciting motions without load, for one linear fit. Return None for
-    any other campaign. Validation runs do not count.
+def plain_logs(
+    path: str | Path, joint_names: Sequence[str]
+) -> tuple[tuple[Path, ...], tuple[Path, ...]] | None:
+    """Return the logs of a campaign that has only exciting motions without load, for one linear fit, and the logs of its
+    validation runs, with which no step fits a value. Return None for any other campaign.
 
     Raises InputError if a run names a joint that the model does not have.
     """
-    runs = [run for run in listed_runs(path) if run.step != "validation"]
-    if any(run.step != "inertial" or run.load is not None for run in runs):
+    runs = listed_runs(path)
+    fitted = [run for run in runs if run.step != "validation"]
+    if any(run.step != "inertial" or run.load is not None for run in fitted):
         return None
-    _require_joints(runs, joint_names, path)
-    return tuple(run.log for run in runs)
-
-
-def validation_logs(path: str | Path) -> tuple[Path, ...]:
-    """Return the logs of a campaign's validation runs, with which no step fits a value."""
-    return tuple(run.log for run in listed_runs(path) if run.step == "validation")
+    _require_joints(fitted, joint_names, path)
+    return tuple(run.log for run in fitted), tuple(run.log for run in runs if run.step == "validation")
 
 
 def tested_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...]:
@@ -119,14 +109,13 @@ def tested_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...
     """
     runs = listed_runs(path)
     _require_joints(runs, joint_names, path)
-    found = validation_logs(path) or tuple(
-        run.log for run in runs if run.step == "inertial" and run.load is None
-    )
+    found = [run.log for run in runs if run.step == "validation"]
+    found = found or [run.log for run in runs if run.step == "inertial" and run.load is None]
     if not found:
         raise InputError(
             f"{path}: no exciting motion without a load", "give logs of the robot without a load"
         )
-    return found
+    return tuple(found)
 
 
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:

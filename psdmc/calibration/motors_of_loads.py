@@ -82,22 +82,17 @@ def motors_with_load(
     found = motors_by_load(
         chain, regressor, model.l, empty, full, loaded.load, options, model.theta_b, progress
     )
-    return _together(chain.joint_names, found, given or {}), found
-
-
-def _together(names: Sequence[str], found: MotorResult, given: Mapping[str, float]) -> Motors:
-    known = np.array([given.get(name, np.nan) for name in names], dtype=np.float64)
-    constants = np.where(found.identified, found.torque_constant, known)
-    missing = [k for k, value in enumerate(constants) if np.isnan(value)]
+    names, motors = chain.joint_names, found.motors(chain.joint_names, given or {})
+    missing = [k for k, value in enumerate(motors.torque_constant) if np.isnan(value)]
     if missing:
+        constants = motors.torque_constant
         seen = ",".join(f"{names[k]}={constants[k]:.6g}" for k in range(len(names)) if found.identified[k])
         reasons = [text for text in found.warnings if code_of(text) == "constant_not_found"]
         raise InputError(
             f"{'; '.join(reasons)} (found: {seen})",
             "or give --torque-constants for " + ", ".join(names[k] for k in missing),
         )
-    relative = np.where(found.identified, np.abs(found.std / constants), 0.0)
-    return Motors(constants, relative)
+    return motors, found
 
 
 def with_loaded_logs(

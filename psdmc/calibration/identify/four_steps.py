@@ -57,8 +57,12 @@ class Runs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourSteps:
-    """The results of the four steps motors, gravity, friction and inertia; `motor` is None if the logs hold torques."""
+    """The results of the four steps motors, gravity, friction and inertia; `motor` is None if the logs hold torques.
 
+    logs  all logs of the campaign, after they were checked
+    """
+
+    logs: tuple[Log, ...]
     motor: MotorResult | None
     motors: Motors
     gravity: GravityResult
@@ -69,17 +73,6 @@ class FourSteps:
     def warnings(self) -> tuple[str, ...]:
         found = self.motor.warnings if self.motor is not None else ()
         return (*found, *self.gravity.warnings, *self.friction.warnings, *self.inertial.warnings)
-
-
-def checked_runs(chain: Mechanism, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
-    """Return all logs of a campaign after checking them. Raises InputError if there are too few runs (recorded motions)
-    or if a log cannot be used."""
-    _require_runs(runs)
-    logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]
-    logs += [(run.log, options.gravity) for run in runs.gravity]
-    logs += [(run.log, options.friction) for run in runs.friction]
-    logs += [(run.log, options.inertial) for run in runs.inertial]
-    return tuple(checked(log, chain, step.filter.cutoff) for log, step in logs)
 
 
 def calibrate_four_steps(
@@ -93,7 +86,8 @@ def calibrate_four_steps(
     file_theta: Array | None = None,
 ) -> FourSteps:
     """Return torque constants, gravity parameters, friction and inertial parameters from the runs of a campaign. The
-    last three are determined repeatedly, as often as the options say.
+    last three are determined repeatedly, as often as the options say. Raises InputError if there are too few runs
+    (recorded motions), or if a log cannot be used.
 
     torque_constants  N m/A by joint name, for joints on which the weight of the load does not act (an axis along
                       gravity)
@@ -102,7 +96,19 @@ def calibrate_four_steps(
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)
-    _require_runs(runs)
+    say("checking logs")
+    steps = {"gravity": runs.gravity, "friction": runs.friction, "inertial": runs.inertial}
+    missing = [step for step, own in steps.items() if not own]
+    if missing:
+        raise InputError(
+            f"the campaign has no {' and no '.join(missing)} run",
+            "`psdmc excite` plans all four steps; one log alone is calibrated when it is given instead of a campaign",
+        )
+    logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]
+    logs += [(run.log, options.gravity) for run in runs.gravity]
+    logs += [(run.log, options.friction) for run in runs.friction]
+    logs += [(run.log, options.inertial) for run in runs.inertial]
+    checked_logs = tuple(checked(log, chain, step.filter.cutoff) for log, step in logs)
     say("motors")
     motor = calibrate_motors(chain, runs.motor, options.motor) if runs.motor else None
     motors = _motors(chain, motor, runs, torque_constants or {})
@@ -120,18 +126,7 @@ def calibrate_four_steps(
         inertial = calibrate_inertial(robot, gravity, friction, runs.inertial, options.inertial, file_theta)
         theta_b = inertial.theta_b
     assert friction is not None
-    return FourSteps(motor, motors, gravity, friction, inertial)
-
-
-def _require_runs(runs: Runs) -> None:
-    """InputError where a step that later ones need has no run."""
-    steps = {"gravity": runs.gravity, "friction": runs.friction, "inertial": runs.inertial}
-    missing = [step for step, own in steps.items() if not own]
-    if missing:
-        raise InputError(
-            f"the campaign has no {' and no '.join(missing)} run",
-            "`psdmc excite` plans all four steps; one log alone is calibrated when it is given instead of a campaign",
-        )
+    return FourSteps(checked_logs, motor, motors, gravity, friction, inertial)
 
 
 def _motors(chain: Mechanism, motor: MotorResult | None, runs: Runs, given: Mapping[str, float]) -> Motors:
@@ -150,21 +145,17 @@ def _motors(chain: Mechanism, motor: MotorResult | None, runs: Runs, given: Mapp
                 "log currents in every run, or leave the motor runs out",
             )
         return Motors.torques(len(chain))
-    constant, relative = np.full(len(chain), np.nan), np.zeros(len(chain))
-    if motor is not None:
-        constant = np.array(motor.torque_constant)
-        relative = np.where(motor.identified, np.abs(motor.std / constant), 0.0)
-    for k, name in enumerate(chain.joint_names):
-        if np.isnan(constant[k]) and name in given:
-            constant[k] = given[name]
-    missing = [name for name, value in zip(chain.joint_names, constant, strict=True) if np.isnan(value)]
+    unknown = np.full(len(chain), np.nan)
+    motors = (motor or MotorResult(unknown, unknown, ())).motors(chain.joint_names, given)
+    constants = zip(chain.joint_names, motors.torque_constant, strict=True)
+    missing = [name for name, value in constants if np.isnan(value)]
     if missing:
         why = "unidentifiable" if motor is not None else "unknown, for there is no motor run"
         raise InputError(
             f"joint(s) {', '.join(missing)}: torque constant {why}, so currents cannot become torques",
             "use a load that these joints feel, give --torque-constants for them, or log torques",
         )
-    return Motors(constant, relative)
+    return motors
 
 
 # Made physically consistent

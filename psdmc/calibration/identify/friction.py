@@ -433,11 +433,10 @@ def prepared(robot: Robot, theta_gravity: Array, run: FrictionRun, k: int, optio
 
     Friction acts at the motors, gravity and inertia at the links. Behind an elastic gear, these move differently.
     """
-    links = filtered(checked(run.log, robot.chain, options.filter.cutoff), options.filter)
     of_motors = run.log.of_motors
-    states = links
-    if of_motors is not None:
-        states = filtered(checked(of_motors, robot.chain, options.filter.cutoff), options.filter)
+    logs = [run.log] if of_motors is None else [run.log, of_motors]
+    motions = [filtered(checked(log, robot.chain, options.filter.cutoff), options.filter) for log in logs]
+    links, states = motions[0], motions[-1]
     _require_alone(run, robot.chain, k, states)
     gravity = (gravity_regressor(robot.regressor, links.q) @ theta_gravity)[:, k]
     if run.tool is not None:

@@ -94,23 +94,23 @@ def calibrate_inertial(
     rows = _stacked([_rows(robot, friction, run, options) for run in runs])
     static = rows.columns @ (split.from_phi() @ gravity.estimate.values) + rows.known
     target = rows.torque - static - rows.friction
-    out = held_out(len(target), options.split)
     consider = _considered(robot.motors, gravity, friction, rows)
+    out = held_out(len(target), options.split)
     kept = np.repeat(~out[:, None], robot.chain.nv, axis=1)
     scale = base_parameter_scale(robot.chain, robot.regressor, torque_sizes(rows.torque), file_theta)
     start = np.zeros(len(split.rest)) if file_theta is None else file_theta[split.rest]
     prior = Prior(start, scale[split.rest], rows.noise @ split.from_psi())
     solved = estimate(rows.columns @ split.from_psi(), target, options.fit, consider, kept, prior)
-    theta_b = split.from_phi() @ gravity.estimate.values + split.from_psi() @ solved.values
+    warnings = noise_warnings("inertial", robot.chain.v_names, solved)
     by_phi, by_psi = split.from_phi(), split.from_psi()
     return InertialResult(
-        theta_b=theta_b,
+        theta_b=by_phi @ gravity.estimate.values + by_psi @ solved.values,
         covariance=_combined(robot.motors, gravity, friction, solved),
         identifiable=_identifiable(gravity, solved),
         estimate=solved,
         unseen=np.hstack([by_phi @ _believable(gravity.estimate), by_psi @ _believable(solved)]),
         scale=scale,
-        warnings=noise_warnings("inertial", robot.chain.v_names, solved),
+        warnings=warnings,
     )
 
 

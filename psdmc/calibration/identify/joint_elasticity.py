@@ -133,13 +133,14 @@ def joint_elasticity(
             own.append(_samples(model, link, motor, options, efforts, theta_b))
         samples = _Samples.of(own)
         parts.append(samples.at(~held_out_of(log, len(samples.torque), options.split)))
+    behind_gear = kept[0].quantity == "joint_torque"
     whole = _Samples.of(parts)
     rows: list[NumberRow] = []
     for k in np.flatnonzero(moving):
         joint = chain.leading_joints[k]
         covariance = None if known is None else known.covariance_with_delay(joint.name)
         inertia = options.elasticity.drive_inertia.get(joint.name)
-        found = _fitted(whole, int(k), kept[0].quantity, options, inertia, covariance)
+        found = _fitted(whole, int(k), behind_gear, options, inertia, covariance)
         rows += _rows(joint, *found, float(motors.relative_std[k]))
     return Elasticity(tuple(rows), _notes(chain, both & ~moving, rows))
 
@@ -248,19 +249,22 @@ def _samples(
 def _fitted(
     samples: _Samples,
     k: int,
-    quantity: str,
+    behind_gear: bool,
     options: LinearOptions,
     inertia: float | None,
     known: Array | None,
 ) -> tuple[tuple[str, ...], Array, Array, NDArray[np.bool_]]:
-    """Names, values, standard deviations and whether each is determined, for the unknowns that are reported; `known` is the
-    covariance of earlier results."""
+    """Names, values, standard deviations and whether each is determined, for the unknowns that are reported.
+
+    behind_gear  whether sensors behind the gear measured the torques
+    known        covariance of earlier results; None: there are none
+    """
     columns, noise = samples.columns[:, k], samples.noise[:, k]
     columns = columns - columns.mean(axis=0) * [1.0, 0.0, 0.0]  # encoders have their own zeros
     torque = samples.torque[:, k]
     names: tuple[str, ...] = (STIFFNESS, DAMPING, INERTIA)
     friction = samples.friction[:, k]
-    if quantity == "joint_torque":
+    if behind_gear:
         names, friction = names[:2], friction[:, :0]
     elif inertia is not None:
         torque, names = torque - inertia * columns[:, 2], names[:2]

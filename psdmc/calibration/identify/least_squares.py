@@ -16,11 +16,8 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import Consider, Estimate, FitOptions, Prior
 from psdmc.calibration.identify.residuals import (
-    Sandwich,
-    huber_sandwich,
     sample_correlation,
     spread,
-    squares,
     widening,
 )
 from psdmc.calibration.logs.log import Array, RowStore
@@ -264,18 +261,15 @@ def estimate_rows(
     options = options or FitOptions()
     use = np.ones(target.shape, dtype=bool) if use is None else use
     solved = _Solved(rows, target, use.astype(np.float64), options, prior, 0.0)
-    for _ in range(1 if options.method == "ols" else options.rounds):
-        plain = options.method == "ols"
+    plain = options.method == "ols"
+    for _ in range(1 if plain else options.rounds):
         weights = (
             use.astype(np.float64) if plain else np.where(use, _weights(solved.residual, use, options), 0.0)
         )
-        solved = _Solved(rows, target, weights, options, prior, _level(solved.residual * weights, use))
+        weighted = np.where(use, solved.residual * weights, 0.0)
+        level = float(np.sqrt(np.sum(weighted**2) / max(int(use.sum()), 1)))
+        solved = _Solved(rows, target, weights, options, prior, level)
     return solved.estimate(considered)
-
-
-def _level(weighted: Array, use: NDArray[np.bool_]) -> float:
-    """RMS of a weighted residual's usable entries."""
-    return float(np.sqrt(np.sum(np.where(use, weighted, 0.0) ** 2) / max(int(use.sum()), 1)))
 
 
 def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Array:
@@ -289,6 +283,68 @@ def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Ar
         return np.broadcast_to(1.0 / sigma, residual.shape)
     size = np.maximum(np.abs(residual) / sigma, 1e-12)
     return np.asarray(np.sqrt(np.minimum(1.0, options.huber / size)) / sigma)
+
+
+# Standard deviations of a fit with Huber's weights
+#
+# Huber's weights reduce the effect of outliers. The fit solves sum of psi(u) x = 0, where u is the residual in standard
+# deviations, and psi(u) = u limited to plus or minus a bound. Its covariance is B^-1 C B^-1 with B the sum of
+# mean(psi') x x' and C the sum of mean(psi^2) x x' (Huber 1981, chapter 7). The formula of weighted least squares with
+# w = psi(u) / u would use mean(w) and mean(w) mean(w u^2) instead. Its standard deviations are 10 % too small for normal
+# errors and a bound of 1.345.
+
+
+LEAST_SLOPE = 0.5
+"""Of mean(psi'): standard deviations are taken from the median size of the residual, so that half of it, and more, lies
+below the bound. Less is left from a round whose residual was another one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sandwich:
+    """Factors that convert the sums w x x' of a weighted fit to the matrices B and C of its covariance B^-1 C B^-1.
+
+    Here x is a row of the fit, w its weight, psi Huber's function of the scaled residual u.
+
+    slope  (n,) for each joint, the factor for B: mean(psi') / mean(w)
+    level  (n,) for each joint, the factor for C: mean(psi^2) / mean(w), in squared units of the weighted residual
+    unit   level / slope^2 for all joints together: the variance per unit of the fit's weighted sum of squares
+    """
+
+    slope: Array
+    level: Array
+    unit: float
+
+
+def huber_sandwich(weighted: Array, use: NDArray[np.bool_], bound: float, share: float) -> Sandwich:
+    """Return the factors that change the covariance of least squares into that of a fit with Huber's weights.
+
+    Huber's weights reduce the effect of outliers. Each of the n joints (columns of `weighted`) has one factor for the
+    matrix B and one for the matrix C of the covariance B^-1 C B^-1 (see the class Sandwich). One more factor, `unit`,
+    is for all joints together. It multiplies the inverse of the sum of w x x' over the fit's rows x with weights w.
+
+    weighted  (N, n) sqrt(w) u: residuals u in standard deviations times the root of their weights w
+    use       (N, n) True: the sample is used
+    bound     limit of u above which Huber's weights are below one
+    share     degrees of freedom divided by the number of samples; a smaller share gives a larger covariance
+    """
+    each = [_factors(weighted[use[:, k], k], bound, share) for k in range(weighted.shape[1])]
+    slope, level = np.array(each).T
+    together = _factors(weighted[use], bound, share)
+    return Sandwich(slope, level, together[1] / together[0] ** 2)
+
+
+def _factors(weighted: Array, bound: float, share: float) -> tuple[float, float]:
+    """Slope and level of some entries; of none, one and zero."""
+    if not len(weighted):
+        return 1.0, 0.0
+    size = np.abs(weighted)
+    # beyond the bound w = bound / |u|, and the weighted residual is sqrt(bound |u|)
+    weight = float(np.mean((bound / np.maximum(size, bound)) ** 2))
+    slope = max(float(np.mean(size <= bound)), LEAST_SLOPE)
+    return slope / weight, float(np.mean(np.minimum(size, bound) ** 2)) / weight / share
+
+
+# The solution
 
 
 NUMERICAL = 1e-9
@@ -368,7 +424,10 @@ class _Solved:
         l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
         bound = self.options.huber if self.options.method == "irls" else np.inf
-        sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)), bound)
+        clusters = min(self.options.clusters, len(weighted) // 4)
+        if clusters < FEWEST_CLUSTERS or not self.rank:
+            clusters = 0  # too few rows for robust standard deviations
+        sums = collected(self.rows, self.weights, weighted, clusters, bound)
         sandwich = self._sandwich(weighted, use)
         by_scores = self._by_scores(sandwich, sums.squares)
         white = by_scores @ np.tensordot(sandwich.level, sums.squares, axes=1) @ by_scores.T
@@ -376,7 +435,9 @@ class _Solved:
         fit = by_scores @ np.tensordot(level, sums.squares, axes=1) @ by_scores.T
         optimism = self._optimism(np.diag(fit), sums.scores @ self._by_inner(sums.inner))
         common = max(float(np.median(optimism[self.identifiable])), 1.0) if self.identifiable.any() else 1.0
-        factor = self._noise_factor(common**2 * np.diag(fit), np.diag(white))
+        widened, of_noise = common**2 * np.diag(fit), np.diag(white)
+        seen = np.flatnonzero((of_noise > 0) & self.identifiable)
+        factor = float(np.sqrt(np.max(widened[seen] / of_noise[seen]))) if len(seen) else 1.0
         # a variance of c stretches has the relative standard error sqrt(2 / (c - 1))
         beyond = 1.0 + 2.0 * np.sqrt(2.0 / max(len(sums.scores) - 1, 1))
         own = np.where(optimism**2 > beyond * common**2, optimism, common)
@@ -411,7 +472,8 @@ class _Solved:
         freedom = max(count - self.rank, 1)
         if self.options.method == "irls":
             return huber_sandwich(weighted, use, self.options.huber, freedom / count)
-        return squares(weighted.shape[1], float(np.sum(weighted**2)) / freedom)
+        n, variance = weighted.shape[1], float(np.sum(weighted**2)) / freedom
+        return Sandwich(np.ones(n), np.full(n, variance), variance)
 
     def _by_scores(self, sandwich: Sandwich, own: Array) -> Array:
         """(l, l) change of the values per unit of the score A' r; own (n, l, l) are the joints' squares A'A."""
@@ -425,16 +487,6 @@ class _Solved:
         inverse of A'A of the rows whose psi' is one, not of the mean of psi' (Huber and Ronchetti 2009, chapter 7)."""
         by_seen = np.linalg.pinv(self.inverse.T @ inner @ self.inverse, hermitian=True)
         return np.asarray(self.inverse @ by_seen @ self.inverse.T)
-
-    def _noise_factor(self, widened: Array, white: Array) -> float:
-        """The largest ratio of a standard deviation to that for white residuals."""
-        seen = np.flatnonzero((white > 0) & self.identifiable)
-        return float(np.sqrt(np.max(widened[seen] / white[seen]))) if len(seen) else 1.0
-
-    def _clusters(self, count: int) -> int:
-        """Number of stretches of time for robust standard deviations; 0 where there are too few rows."""
-        clusters = min(self.options.clusters, count // 4)
-        return clusters if clusters >= FEWEST_CLUSTERS and self.rank else 0
 
     def _optimism(self, widened: Array, moved: Array) -> Array:
         """(l,) cluster-robust over widened standard deviation (Liang and Zeger 1986): clusters are stretches of time.

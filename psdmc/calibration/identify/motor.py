@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import payload_torque
 from psdmc.calibration.identify.residuals import quality, widening
 from psdmc.calibration.identify.steps import MotorRun, StepOptions
@@ -40,6 +41,14 @@ class MotorResult:
     @property
     def identified(self) -> NDArray[np.bool_]:
         return np.isfinite(self.torque_constant)
+
+    def motors(self, joint_names: Sequence[str], given: Mapping[str, float]) -> Motors:
+        """Return the motors with these torque constants, and with given ones (N m/A by joint name) for the other joints. A
+        constant is NaN if it is neither identified nor given."""
+        known = np.array([given.get(name, np.nan) for name in joint_names], dtype=np.float64)
+        constants = np.where(self.identified, self.torque_constant, known)
+        relative = np.where(self.identified, np.abs(self.std / constants), 0.0)
+        return Motors(constants, relative)
 
 
 def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
