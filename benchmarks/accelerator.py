@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 
 import psdmc
-from psdmc.backends.cuda.names import symbol_of
-from psdmc.backends.cuda.package import BLOCK
+from psdmc.backends.cuda.back_end import BLOCK, symbol_of
 from psdmc.backends.info import EmitOptions
 from psdmc.bench.cases import LEGGED, robot_data
 from psdmc.emission import EmitRequest, cuda_source

@@ -23,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.package_files import library_files
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.bench.build import built, cxx, native_flags
 from psdmc.bench.case import robot_as_numbers

@@ -59,7 +59,7 @@ def package_of(model: DynamicsModel, asked: EmitRequest, progress: Progress) -> 
 def cuda_source(model: DynamicsModel, asked: EmitRequest, progress: Progress) -> CudaSource:
     """Return the CUDA source of a model's functions, for `compile` with the target "cuda"."""
     from psdmc.backends.c.render import render
-    from psdmc.backends.cuda.package import cuda_package
+    from psdmc.backends.cuda.back_end import cuda_package
     from psdmc.toolchain.cuda_robot import CudaSource  # it makes a method for each function, which takes time
 
     cuda = cuda_package(replace(emission(model, asked, progress), references=None))

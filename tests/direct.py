@@ -9,8 +9,8 @@ from pathlib import Path
 import cffi
 import numpy as np
 
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView
-from psdmc.backends.c.package_files import library_files
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Sizes

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView
-from psdmc.backends.c.package_files import library_files
 from psdmc.errors import InternalError, ToolchainError
 from psdmc.functions import BY_ROWS, SIGNATURES
 from psdmc.program.gravity_input import takes_gravity

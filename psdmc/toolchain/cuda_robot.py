@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from psdmc.backends.cuda.names import symbol_of
-from psdmc.backends.cuda.package import BLOCK
+from psdmc.backends.cuda.back_end import BLOCK, symbol_of
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
 from psdmc.program.gravity_input import GRAVITY

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from psdmc.backends.c.header import patterns
 from psdmc.backends.c.package import PackageView
-from psdmc.backends.c.tables import patterns
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import contact_names

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from cffi import FFI
 
+from psdmc.backends.c.friction import ScalarFunction, calls_in
 from psdmc.backends.c.render import environment
-from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
 from psdmc.friction.joints import Friction, ordered
 from psdmc.friction.law import At, Term
 from psdmc.friction.laws import LAWS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 
 
 @pytest.mark.parametrize(("robot", "real"), SEVERAL)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc import emission
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.info import EmitOptions
 from psdmc.cli.show import print_model
 from psdmc.model.load import load

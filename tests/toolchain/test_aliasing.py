@@ -11,7 +11,7 @@ from direct import Direct, shared_library, states
 from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.info import EmitOptions
 
 KERNELS = arm_kernels()

@@ -16,7 +16,7 @@ from traced import arm_kernels, arm_package, arm_references
 from unoptimised import wrapper
 
 import psdmc
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.info import EmitOptions
 from psdmc.backends.package_folder import write_package
 from psdmc.backends.reference_states import ReferenceStates

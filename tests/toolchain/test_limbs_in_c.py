@@ -210,7 +210,7 @@ def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(tmp_pa
 
 def test_many_pivots_are_looked_at_in_one_loop(tmp_path: Path) -> None:
     """One by one, each would write its own NaN into all accelerations."""
-    from psdmc.backends.c.package_files import package_files
+    from psdmc.backends.c.back_end import package_files
 
     text = package_files(package_of(LEGS, EmitOptions()))["src/forward_dynamics.c"]
     (line,) = re.findall(r"return fail\(.*", text)
@@ -218,7 +218,7 @@ def test_many_pivots_are_looked_at_in_one_loop(tmp_path: Path) -> None:
 
 
 def test_the_package_says_what_it_has(tmp_path: Path) -> None:
-    from psdmc.backends.c.package_files import package_files
+    from psdmc.backends.c.back_end import package_files
 
     files = package_files(package_of(LEGS, EmitOptions()))
     assert "src/limbs4.h" in files
@@ -228,7 +228,7 @@ def test_the_package_says_what_it_has(tmp_path: Path) -> None:
 
 
 def test_machines_without_vectors_and_packages_without_limbs_have_no_trace_of_them() -> None:
-    from psdmc.backends.c.package_files import package_files
+    from psdmc.backends.c.back_end import package_files
 
     for options in (EmitOptions(target=SCALAR),):
         assert not [path for path in package_files(package_of(LEGS, options)) if "limbs" in path]

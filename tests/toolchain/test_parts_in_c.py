@@ -10,7 +10,7 @@ from direct import Direct, all_expected, error, shared_library, states
 from slow_cases import slow_but_for
 from traced import L, N, arm, arm_kernels, arm_package
 
-from psdmc.backends.c.package_files import library_files
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.info import EmitOptions
 
 KERNELS = arm_kernels()

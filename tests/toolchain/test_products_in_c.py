@@ -11,8 +11,8 @@ from direct import Direct, all_expected, shared_library, states
 from slow_cases import slow_but_for
 from test_odd_sizes import INFO
 
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import package_view
-from psdmc.backends.c.package_files import library_files
 from psdmc.backends.info import EmitOptions
 from psdmc.program.kernel import Kernel
 from psdmc.program.products import Product, written_out

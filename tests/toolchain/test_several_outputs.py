@@ -13,8 +13,8 @@ from odd_package import odd_package as package
 from unoptimised import compiled as library
 from unoptimised import wrapper
 
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.c.package import package_view
-from psdmc.backends.c.package_files import package_files
 from psdmc.backends.info import EmitOptions
 from psdmc.backends.package_folder import write_package
 from psdmc.backends.reference_states import ReferenceStates

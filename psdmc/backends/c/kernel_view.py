@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from psdmc.backends.c.body import RegionsView
 from psdmc.backends.c.limbs import LimbsView
 from psdmc.backends.c.lines import Body, Multiplication
-from psdmc.backends.c.regions import RegionsView
 from psdmc.program.products import LARGE
 from psdmc.program.signature import Signature
 from psdmc.program.theta_rows import THETA_ROWS

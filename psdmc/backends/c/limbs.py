@@ -3,144 +3,23 @@ limb is one lane of a SIMD vector. The data include the C vector types."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.expressions import literal
-from psdmc.backends.c.lanes import TransposeStage, transpose_stage
 from psdmc.backends.c.limb_rows import FOUR, StoreView, store_views
 from psdmc.backends.c.lines import Body
+from psdmc.backends.c.vectors import NamedByCount
 from psdmc.backends.info import EmitOptions
 from psdmc.program.cost import Cost
 from psdmc.program.limb_cost import whole_cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
 from psdmc.program.thin_products import INVERSE, ThinProducts
-from psdmc.target.vectors import VectorUnit
-
-NARROWEST = 16
-"""Bytes of the narrowest vector."""
 
 HELD = 32
 """Values of a core's stage that may wait for its end to be put out. More of them do not fit the registers of any target:
 each is then stored as soon as it is known."""
-
-
-@dataclass(frozen=True, slots=True)
-class LimbWidth:
-    """A C vector type that holds one real number for each of `count` limbs (such as legs). It consists of one or more
-    registers of `lanes` numbers each. Lanes after the last limb repeat the first limb."""
-
-    count: int
-    lanes: int
-
-    @property
-    def parts(self) -> int:
-        """Registers."""
-        return -(-self.count // self.lanes)
-
-    @property
-    def filled(self) -> str:
-        """Return the C initialiser of a vector of limbs from macro arguments, one per limb (such as a leg)."""
-        names = [names_of(self.count)[k if k < self.count else 0] for k in range(self.parts * self.lanes)]
-        parts = (names[k : k + self.lanes] for k in range(0, len(names), self.lanes))
-        return ", ".join(f"{{{', '.join(part)}}}" for part in parts)
-
-    @property
-    def whole(self) -> int:
-        """Parts without a lane to spare."""
-        return self.count // self.lanes
-
-    @property
-    def folds(self) -> tuple[str, ...]:
-        """Return the lane orders with which the lanes of a register are summed. In each step, one half of the lanes is
-        added to the other half, until two lanes are left."""
-        distances = [self.lanes >> k for k in range(1, self.lanes.bit_length() - 1)]
-        return tuple(", ".join(str(lane ^ distance) for lane in range(self.lanes)) for distance in distances)
-
-    @property
-    def piece(self) -> int:
-        """Return how many neighbouring outputs of one limb a vector holds when it is stored, at most four."""
-        return min(self.lanes, FOUR)
-
-    @property
-    def stages(self) -> tuple[TransposeStage, ...]:
-        """Return the steps that transpose, in registers, a square block of `piece` vectors with `piece` lanes each."""
-        return tuple(transpose_stage(self.lanes, distance) for distance in (1, 2) if distance < self.piece)
-
-    @property
-    def beyond(self) -> tuple[int, ...]:
-        """Return the lanes of the last register that hold limbs (such as legs), if the limbs do not fill the register."""
-        return tuple(range(self.count % self.lanes))
-
-
-class NamedByCount:
-    """C names of types and macros that contain a number of limbs, such as limbs4 for four legs."""
-
-    __slots__ = ()
-    count: int
-
-    @property
-    def name(self) -> str:
-        return f"limbs{self.count}"
-
-    @property
-    def macro(self) -> str:
-        return self.name.upper()
-
-
-@dataclass(frozen=True, slots=True)
-class LimbVector(NamedByCount):
-    """The C vector types for one number of limbs, such as four legs. Each machine of the target uses the widest type
-    that it supports.
-
-    widths   possible register sizes, widest first
-    integer  C integer type with the size of one real number
-    """
-
-    count: int
-    widths: tuple[LimbWidth, ...]
-    integer: str
-
-    @property
-    def in_fours(self) -> bool:
-        """Return whether the number of limbs is a multiple of four, so that vectors of four have no empty lane."""
-        return self.count % FOUR == 0
-
-    @property
-    def arguments(self) -> str:
-        return ", ".join(names_of(self.count))
-
-
-def names_of(count: int) -> list[str]:
-    """Names of macro arguments, one per limb."""
-    return [f"limb{k}" for k in range(count)]
-
-
-def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVector, ...]:
-    """Return the C vector types for groups of limbs, whose numbers of limbs are `counts`."""
-    narrowest = NARROWEST // options.real_bytes
-    integer = "long long" if options.real == "float64" else "int"
-    widest = max((unit.bytes // options.real_bytes for unit in options.target.vectors), default=1)
-    found = []
-    for count in sorted(set(counts)):
-        enough = max(narrowest, 1 << (count - 1).bit_length())
-        lanes = [narrowest << k for k in range(8) if narrowest << k <= min(enough, widest)]
-        found.append(LimbVector(count, tuple(LimbWidth(count, each) for each in reversed(lanes)), integer))
-    return tuple(found)
-
-
-def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[VectorUnit, ...]:
-    """Return the register sizes that only the code for limbs (such as legs) uses. They are narrower than the registers
-    that the target uses for other code."""
-    wanted = {width.lanes * options.real_bytes for vector in vectors for width in vector.widths}
-    halves: list[VectorUnit] = []
-    for unit in options.target.vectors:
-        narrower = unit.half
-        while narrower is not None:
-            halves.append(narrower)
-            narrower = narrower.half
-    return tuple(unit for unit in dict.fromkeys(halves) if unit.bytes in wanted)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from psdmc.backends.c.body import calls_of, make_body, sections_of, unread, without_products
+from psdmc.backends.c.body import calls_of, make_body, regions_view, sections_of, unread, without_products
 from psdmc.backends.c.expressions import c_real, is_call, uniform_of
 from psdmc.backends.c.kernel_view import (
     FunctionView,
@@ -29,7 +29,6 @@ from psdmc.backends.c.lines import (
     Zeros,
     multiplication,
 )
-from psdmc.backends.c.regions import regions_view
 from psdmc.backends.info import EmitOptions
 from psdmc.backends.protocol import functions_of
 from psdmc.errors import InternalError

@@ -8,20 +8,17 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from psdmc.backends.c.bodies_view import BodiesView, PayloadView
+from psdmc.backends.c.bodies import BodiesView, EstimatorView, PayloadView
 from psdmc.backends.c.body import calls_of
-from psdmc.backends.c.cpp import CppClass, cpp_classes
-from psdmc.backends.c.describe import description
-from psdmc.backends.c.estimator import EstimatorView
 from psdmc.backends.c.expressions import LARGEST_FLOAT, CallView, CReal, c_real, call_views, rounded_out
 from psdmc.backends.c.friction import FrictionView
+from psdmc.backends.c.header import CppClass, Pattern, Table, cpp_classes, description, patterns, tables
 from psdmc.backends.c.kernel_view import FunctionView, KernelView
 from psdmc.backends.c.lines import Shape
 from psdmc.backends.c.make_kernel_view import function_views
 from psdmc.backends.c.render import identifier
 from psdmc.backends.c.self_test import ReferenceView, SelfTestView, given_vectors, labels, reference_view
-from psdmc.backends.c.tables import Pattern, Table, patterns, tables
-from psdmc.backends.c.vectors_view import VectorsView
+from psdmc.backends.c.vectors import VectorsView
 from psdmc.backends.describe import uses_contacts, uses_frames
 from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
@@ -170,12 +167,16 @@ class PackageView:
     @property
     def sources(self) -> tuple[str, ...]:
         """C files of the library, relative to the package."""
-        payload = ("src/payload.c",) if self.info.payload else ()
-        bodies = ("src/bodies.c",) if self.info.bodies else ()
-        friction = ("src/friction.c",) if self.info.friction else ()
-        functions = (f"src/{unit.name}.c" for function in self.functions for unit in function.units)
+        functions = (unit.name for function in self.functions for unit in function.units)
+        names = ("tables", *functions, *self.further_functions)
         estimator = self.estimator.sources if self.estimator else ()
-        return ("src/tables.c", *functions, *payload, *bodies, *friction, *estimator)
+        return (*(f"src/{name}.c" for name in names), *estimator)
+
+    @property
+    def further_functions(self) -> tuple[str, ...]:
+        """Return the names of the C files with functions for loads, bodies and friction, those that the package has."""
+        own = {"payload": self.info.payload, "bodies": self.info.bodies, "friction": self.info.friction}
+        return tuple(name for name, content in own.items() if content)
 
     @property
     def friction(self) -> FrictionView | None:

@@ -1,4 +1,4 @@
-"""Translates a PROGRAM (the list of operations to generate) to Rust statements.
+"""Translates a PROGRAM (the list of operations to generate) to Rust statements, and untrusted text to Rust.
 
 A value that is used once is written at its use. A product that is used once, as a term of a sum, becomes a fused
 multiply-add.
@@ -10,10 +10,56 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from psdmc.backends.rust.names import variable
+from psdmc.backends.render import DEVICE, identifier_of, utf8
 from psdmc.program.angles import angles_first
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.signature import Quantity
+
+_WORDS = """
+as async await break const continue crate dyn else enum extern false fn for gen if impl in let loop match mod move mut pub
+ref return self static struct super trait true type union unsafe use where while abstract become box do final macro
+override priv try typeof unsized virtual yield
+"""
+KEYWORDS = frozenset(_WORDS.split())
+"""Of all editions, reserved ones too."""
+
+TAKEN = KEYWORDS | {"core", "std", "alloc", "test", "proc_macro", "build", "deps", "examples", "incremental"}
+"""What a crate must not be called: crates that come with the compiler, and folders of cargo."""
+
+
+def identifier(name: str) -> str:
+    """A crate's name for `name`, in lower case."""
+    return identifier_of(name, _is_reserved).lower()
+
+
+def _is_reserved(word: str) -> bool:
+    return word.lower() in TAKEN or DEVICE.fullmatch(word) is not None
+
+
+def variable(name: str) -> str:
+    """Return the Rust name of a quantity or function. An underscore is added if the name is a Rust keyword or another
+    name that the Rust code uses."""
+    return f"{name}_" if name in KEYWORDS or name == "fma" else name
+
+
+def string(untrusted: str) -> str:
+    """Return a Rust string literal: plain ASCII stays readable, and an unpaired surrogate becomes U+FFFD."""
+    return f'"{"".join(map(_character, untrusted))}"'
+
+
+def _character(one: str) -> str:
+    if " " <= one <= "~" and one not in '"\\':
+        return one
+    return f"\\u{{{0xFFFD if 0xD800 <= ord(one) < 0xE000 else ord(one):x}}}"
+
+
+def comment(untrusted: str) -> str:
+    """Return text that is safe in a line of Rust documentation: ASCII without backticks, which end code."""
+    return "".join(chr(b) if 32 <= b < 127 and b != 96 else f"<{b:02x}>" for b in utf8(untrusted))
+
+
+# Statements
+
 
 DEEPEST = 4
 """Deepest nesting of operations in one expression."""

@@ -8,8 +8,8 @@ from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
 
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.package_files import library_files
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case

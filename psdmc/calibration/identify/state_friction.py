@@ -13,8 +13,8 @@ import cffi
 import numpy as np
 
 from psdmc.backends.c.expressions import CallView
+from psdmc.backends.c.friction import ScalarFunction, calls_in
 from psdmc.backends.c.render import identifier, render
-from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
 from psdmc.calibration.logs.log import Array
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW, state_programs

@@ -14,9 +14,9 @@ from operation_arguments import arguments
 from slow_cases import slow_but_for
 from small import pendulum, pendulum_info
 
+from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.expressions import CALLS, is_call
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.package_files import library_files
 from psdmc.backends.info import EmitOptions
 from psdmc.errors import InputError
 from psdmc.program.interpret import interpret

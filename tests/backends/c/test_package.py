@@ -25,8 +25,8 @@ from small import (
     pendulum_references,
 )
 
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.c.package import package_view
-from psdmc.backends.c.package_files import package_files
 from psdmc.backends.info import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
@@ -87,7 +87,7 @@ def test_the_order_of_kernels_does_not_matter() -> None:
 
 def test_the_text_is_the_same_under_every_hash_seed() -> None:
     script = (
-        "import hashlib, json; from small import pendulum; from psdmc.backends.c.package_files import package_files;"
+        "import hashlib, json; from small import pendulum; from psdmc.backends.c.back_end import package_files;"
         "print(hashlib.sha256(json.dumps(package_files(pendulum())).encode()).hexdigest())"
     )
     here = str(Path(__file__).parent)

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small import INVERSE, kernel, pendulum, pendulum_info
 
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.c.expressions import rounded_out
 from psdmc.backends.c.package import package_view
-from psdmc.backends.c.package_files import package_files
 from psdmc.backends.info import EmitOptions, JointInfo
 from psdmc.errors import InputError
 

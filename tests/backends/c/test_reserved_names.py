@@ -13,7 +13,7 @@ import pytest
 from slow_cases import slow_but_for
 from small import pendulum, pendulum_info
 
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.c.render import RESERVED, identifier, is_reserved
 
 NEWEST_GLIBC = (2, 36)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from small import pendulum, pendulum_references
 
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.info import EmitOptions
 from psdmc.target.native import NATIVE
 from psdmc.target.presets import CORTEX_M4F, PRESETS, SCALAR, X86_64_V3, preset

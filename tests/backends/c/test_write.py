@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from small import pendulum, pendulum_info
 
-from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.back_end import package_files
 from psdmc.backends.info import EmitOptions
 from psdmc.backends.manifest import OWN_NAME, RENAMED, digest, edited_files
 from psdmc.backends.package_folder import write_package

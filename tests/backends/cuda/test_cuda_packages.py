@@ -17,7 +17,7 @@ from pinocchio_robots import path_of
 
 import psdmc
 from psdmc.backends.c import make_kernel_view
-from psdmc.backends.cuda.names import identifier
+from psdmc.backends.cuda.back_end import identifier
 from psdmc.compiler import compare_emitted, emit
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, OF_TREES, RECIPES
 

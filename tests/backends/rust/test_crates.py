@@ -18,7 +18,7 @@ import psdmc
 from psdmc import backends
 from psdmc.backends import BACK_ENDS
 from psdmc.backends.protocol import back_end
-from psdmc.backends.rust.names import KEYWORDS, comment, identifier, text
+from psdmc.backends.rust.body import KEYWORDS, comment, identifier, string
 from psdmc.compiler import emit
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE, OF_TREES, RECIPES
@@ -135,7 +135,7 @@ def test_names() -> None:
     }
     assert re.fullmatch(r"robot_[0-9a-f]{8}", identifier("机械臂"))
     assert len(identifier("x" * 200)) == 63
-    assert text('a"\\\n\u202e\ud800') == '"a\\u{22}\\u{5c}\\u{a}\\u{202e}\\u{fffd}"'
+    assert string('a"\\\n\u202e\ud800') == '"a\\u{22}\\u{5c}\\u{a}\\u{202e}\\u{fffd}"'
     assert comment("a`\nb\u202e") == "a<60><0a>b<e2><80><ae>"
 
 

@@ -11,8 +11,8 @@ from bundled import bundled_model
 from random_programs import SEEDS, outputs_of, random_program
 
 from psdmc.backends.info import package_info
+from psdmc.backends.rust.back_end import _kernel
 from psdmc.backends.rust.body import WRITTEN, statements
-from psdmc.backends.rust.crate import _kernel
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
