@@ -93,8 +93,15 @@ def anchored_way(table: TomlTable, chain: Mechanism) -> Way:
     table."""
     ends = [_anchor(table, key, chain) for key in ("from", "to")]
     way = BetweenAnchors(chain, (ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]))
-    if not table.faults:
-        _require_line(way, table, chain)
+    if table.faults:
+        return way
+    size, _ = way.length(poses(chain))
+    if np.ptp(size) < LEAST_CHANGE:
+        table.faults.append(f"{table.where}: no joint changes the distance of `from` and `to`")
+    elif size.min() < SHORTEST:
+        table.faults.append(
+            f"{table.where}: `from` and `to` come within {size.min():.2g} m of each other: a line of no direction"
+        )
     return way
 
 
@@ -119,17 +126,6 @@ def _anchor(table: TomlTable, key: str, chain: Mechanism) -> tuple[int, Array]:
             f"{own.where}: link {quoted(link)} is not the robot's, it has {listed(list(dict.fromkeys(known)))}"
         )
     return BASE, point
-
-
-def _require_line(way: BetweenAnchors, table: TomlTable, chain: Mechanism) -> None:
-    """A fault where the two points do not move against each other, or meet."""
-    size, _ = way.length(poses(chain))
-    if np.ptp(size) < LEAST_CHANGE:
-        table.faults.append(f"{table.where}: no joint changes the distance of `from` and `to`")
-    elif size.min() < SHORTEST:
-        table.faults.append(
-            f"{table.where}: `from` and `to` come within {size.min():.2g} m of each other: a line of no direction"
-        )
 
 
 def jointed_way(table: TomlTable, chain: Mechanism) -> Way:

@@ -351,14 +351,7 @@ def read_description(path: str | Path, joint_names: tuple[str, ...] | None = Non
     joint_names  joints of the model; None: names of joints are not checked
     """
     path = Path(path)
-    return description_of(read_toml(path, WHAT), path, joint_names)
-
-
-def description_of(
-    content: Mapping[str, Any], path: Path, joint_names: tuple[str, ...] | None = None
-) -> LogDescription:
-    """Return a log description from the content of its TOML file."""
-    faults: list[str] = []
+    content, faults = read_toml(path, WHAT), list[str]()
     TomlTable(content, "description", tuple(table.key for table in TABLES), faults)
     reading = Reading(path.parent, joint_names, faults)
     parts = {table.key: table.read(content[table.key], reading) for table in TABLES if table.key in content}

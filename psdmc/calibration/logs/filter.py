@@ -86,7 +86,7 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
     """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
-    return _states(log, grid, low_pass, noticed(log, grid, low_pass, options, check), options, 0, grid.count)
+    return _states(grid, low_pass, noticed(grid, low_pass, options, check), options, 0, grid.count)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,69 +112,62 @@ def stretches(
     """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
-    found = noticed(log, grid, low_pass, options, check, rows)
+    found = noticed(grid, low_pass, options, check, rows)
     reach = 2 * low_pass.memory
-    every = independent_rows(grid, options, log)
+    every = independent_rows(grid, options)
     for start in range(0, grid.count, rows):
         wanted = every[(every >= start) & (every < start + rows)]
         if len(wanted):
             first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
-            yield Stretch(_states(log, grid, low_pass, found, options, first, last), wanted - first)
+            yield Stretch(_states(grid, low_pass, found, options, first, last), wanted - first)
 
 
 def _states(
-    log: AnyLog,
-    grid: EvenGrid,
-    low_pass: LowPass,
-    found: Noticed,
-    options: FilterOptions,
-    first: int,
-    last: int,
+    grid: EvenGrid, low_pass: LowPass, found: Noticed, options: FilterOptions, first: int, last: int
 ) -> States:
     """Rows first to last of the even grid."""
-    position, effort = evenly_spaced(log, grid, first, last)
+    position, effort = grid.rows(first, last)
     q = np.where(found.still, found.rest, low_pass(position))
     qd, qdd = central_differences(q, grid.period)
-    usable = _usable(grid, options, log)
+    usable = _usable(grid, options)
     use = np.zeros(last - first, dtype=bool)
     use[max(usable.start - first, 0) : max(usable.stop - first, 0)] = True
-    time = grid.time(first, last)
-    smooth = low_pass(effort)
     return States(
-        time,
-        grid.period,
-        q,
-        qd,
-        qdd,
-        smooth,
-        use,
-        low_pass,
-        options.cutoff,
-        found.noise,
-        found.still,
-        found.motion,
-        first,
-        effort,
+        time=grid.time(first, last),
+        period=grid.period,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        effort=low_pass(effort),
+        use=use,
+        low_pass=low_pass,
+        cutoff=options.cutoff,
+        noise=found.noise,
+        still=found.still,
+        motion=found.motion,
+        first=first,
+        raw=effort,
     )
 
 
-def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
+def _usable(grid: EvenGrid, options: FilterOptions) -> range:
     """The rows that are left after the filter's start; InputError where there are none."""
     margin = int(np.ceil(options.settle / options.cutoff / grid.period))
     if grid.count <= 2 * margin:
         raise InputError(
-            f"{log.name}: too short: {log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz filter settled",
+            f"{grid.log.name}: too short: {grid.log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz"
+            " filter settled",
             "record a longer run",
         )
     return range(margin, grid.count - margin)
 
 
-def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDArray[np.intp]:
+def independent_rows(grid: EvenGrid, options: FilterOptions) -> NDArray[np.intp]:
     """Return the indices of the usable rows of a whole log that are one period of the filter's cut-off apart.
 
     Rows that are closer share their noise and are not independent.
     """
-    usable = _usable(grid, options, log)
+    usable = _usable(grid, options)
     return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
 
 
@@ -255,7 +248,6 @@ class Noticed:
 
 
 def noticed(
-    log: AnyLog,
     grid: EvenGrid,
     low_pass: LowPass,
     options: FilterOptions,
@@ -269,19 +261,19 @@ def noticed(
     """
     smallest = (check or CheckOptions()).smallest_motion
     given = ("noticed", options, smallest, rows)
-    return once(log, given, lambda: _noticed(log, grid, low_pass, options, smallest, rows))
+    return once(grid.log, given, lambda: _noticed(grid, low_pass, options, smallest, rows))
 
 
 def _noticed(
-    log: AnyLog, grid: EvenGrid, low_pass: LowPass, options: FilterOptions, smallest: float, rows: int
+    grid: EvenGrid, low_pass: LowPass, options: FilterOptions, smallest: float, rows: int
 ) -> Noticed:
     reach, every = low_pass.memory, -(-grid.count // NOISE_ROWS)
     raw, smooth = [], []
-    n = len(log.joint_names)
+    n = len(grid.log.joint_names)
     total, bounds = np.zeros(n), np.array([[np.inf] * n, [-np.inf] * n, [np.inf] * n, [-np.inf] * n])
     for start in range(0, grid.count, rows):
         first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
-        position, _ = evenly_spaced(log, grid, first, last)
+        position, _ = grid.rows(first, last)
         own = slice(start - first, min(start + rows, grid.count) - first)
         filtered_position = low_pass(position)[own]
         position = position[own]
@@ -305,41 +297,48 @@ NOISE_ROWS = 200_000
 
 
 # Equal time steps
-#
-# Rows of a log whose times already have equal steps stay unchanged.
+
+
+NEIGHBOURS = 4
+"""Rows on either side that interpolation between rows uses; its slopes need one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvenGrid:
-    """The times of a log after resampling to equal steps, from the first row to the last, beginning at zero.
+    """A log at equal time steps, from the first row to the last, with times from zero.
 
-    duration  s, from the first row to the last
-    count     number of rows
-    same      True: the rows of the log already have equal steps
+    count  number of rows
+    same   True: the rows of the log already have equal steps, and stay unchanged
     """
 
-    duration: float
+    log: AnyLog
     count: int
     same: bool
 
     @property
     def period(self) -> float:
-        return self.duration / (self.count - 1)
+        return self.log.duration / (self.count - 1)
 
     def time(self, first: int, last: int) -> Array:
         """Return the times of the rows `first` to before `last`, s."""
         time: Array = self.period * np.arange(first, last, dtype=np.float64)
         if last == self.count:
-            time[-1] = self.duration
+            time[-1] = self.log.duration
         return time
 
-
-def even_grid(log: AnyLog) -> EvenGrid:
-    """Return the times with equal steps for a log: its own times if they are equal, else steps of its median period."""
-    own = EvenGrid(log.duration, len(log), True)
-    if all(_near(own, log, start) for start in range(0, len(log), TIMES_AT_ONCE)):
-        return own
-    return EvenGrid(log.duration, round(log.duration / log.period) + 1, False)
+    def rows(self, first: int, last: int) -> tuple[Array, Array]:
+        """Return position and effort of the rows `first` to before `last`, by interpolation between the log's rows."""
+        if self.same:
+            part = self.log.rows(first, last)
+            return part.position, part.effort
+        wanted, logged = self.time(first, last), self.log.time
+        begin, end = np.searchsorted(logged, logged[0] + wanted[[0, -1]])
+        part = self.log.rows(max(int(begin) - NEIGHBOURS, 0), int(end) + NEIGHBOURS)
+        time = part.time - logged[0]
+        return (
+            np.asarray(interpolate.PchipInterpolator(time, part.position)(wanted)),
+            np.asarray(interpolate.PchipInterpolator(time, part.effort)(wanted)),
+        )
 
 
 TIMES_AT_ONCE = 1_000_000
@@ -348,28 +347,11 @@ EVEN = 1e-6
 """Share of a period by which the times of an even log differ from equal steps."""
 
 
-def _near(grid: EvenGrid, log: AnyLog, start: int) -> bool:
-    time = log.time[start : start + TIMES_AT_ONCE] - log.time[0]
-    return bool(np.abs(grid.time(start, start + len(time)) - time).max() < EVEN * grid.period)
-
-
-NEIGHBOURS = 4
-"""Rows on either side that interpolation between rows uses; its slopes need one."""
-
-
-def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[Array, Array]:
-    """Return position and effort of a log, interpolated at the times `first` to `last` of an evenly spaced grid.
-
-    If the log already has these times, the function returns the logged rows unchanged.
-    """
-    if grid.same:
-        part = log.rows(first, last)
-        return part.position, part.effort
-    wanted = grid.time(first, last)
-    begin, end = np.searchsorted(log.time, log.time[0] + wanted[[0, -1]])
-    part = log.rows(max(int(begin) - NEIGHBOURS, 0), int(end) + NEIGHBOURS)
-    time = part.time - log.time[0]
-    return (
-        np.asarray(interpolate.PchipInterpolator(time, part.position)(wanted)),
-        np.asarray(interpolate.PchipInterpolator(time, part.effort)(wanted)),
-    )
+def even_grid(log: AnyLog) -> EvenGrid:
+    """Return a log with equal time steps: those of the log if they are equal, else steps of its median period."""
+    own = EvenGrid(log, len(log), True)
+    for start in range(0, len(log), TIMES_AT_ONCE):
+        time = log.time[start : start + TIMES_AT_ONCE] - log.time[0]
+        if not np.abs(own.time(start, start + len(time)) - time).max() < EVEN * own.period:
+            return EvenGrid(log, round(log.duration / log.period) + 1, False)
+    return own

@@ -96,8 +96,7 @@ ALWAYS_ALLOWED = 64 * 1024**2
 
 def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
     """Raise InputError if a table has too many rows, columns or values. The check needs only the table's size."""
-    found, most = (rows, columns), (LARGEST_ROWS, LARGEST_COLUMNS)
-    for what, count, largest in zip(("rows", "columns"), found, most, strict=True):
+    for what, count, largest in (("rows", rows, LARGEST_ROWS), ("columns", columns, LARGEST_COLUMNS)):
         if count > largest:
             raise InputError(
                 f"{name}: {count:,} {what}, expected at most {largest:,}",

@@ -212,16 +212,14 @@ class RowStore:
         self._count += len(rows)
         if self._file is None:
             self._pieces.append(rows)
-            if 8 * self.width * self._count > self.held:
-                self._to_disk()
+            if 8 * self.width * self._count <= self.held:
+                return
+            self._file = tempfile.TemporaryFile(prefix="psdmc_")  # noqa: SIM115  it lives as long as the store
+            pieces, self._pieces = self._pieces, []
         else:
-            self._file.write(np.ascontiguousarray(rows, dtype=np.float64).tobytes())
-
-    def _to_disk(self) -> None:
-        self._file = tempfile.TemporaryFile(prefix="psdmc_")  # noqa: SIM115  it lives as long as the store
-        for piece in self._pieces:
+            pieces = [rows]
+        for piece in pieces:
             self._file.write(np.ascontiguousarray(piece, dtype=np.float64).tobytes())
-        self._pieces = []
 
     def rows(self, start: int, stop: int) -> Array:
         """Return a copy of some rows, (stop - start, width)."""

@@ -150,15 +150,15 @@ def _times(of: Looked) -> Iterator[Fault]:
         )
         text = f"time_s grows by {step:.3g} s from row to row, expected at least {smallest:g} s"
         yield Fault(text, "write time_s in seconds")
-    elif unit := suspected_unit(of):
+    elif unit := _suspected_unit(of):
         yield Fault(f"time_s looks like {unit}: {log.period:.4g} from row to row", "write time_s in seconds")
     else:
         yield from _gaps_and_length(of)
 
 
-def suspected_unit(of: Looked) -> str:
-    """Return the likely unit of time if it is not seconds. It follows from the ratio of velocity to slope of the
-    position, or else from the period."""
+def _suspected_unit(of: Looked) -> str:
+    """The likely unit of time if it is not seconds: from the ratio of velocity to slope of the position, or else from the
+    period."""
     ratios = list(of.survey.velocity_ratios.values())
     if ratios:
         middle = float(np.median(ratios))

@@ -257,7 +257,13 @@ class BagFormat(LogFormat):
         store, has_velocity = RowStore(0), True
         stamps: list[tuple[int, int]] = []
         piece: list[Array] = []
-        for number, row in enumerate(self._messages(path, topic), start=1):
+        for number, raw in enumerate(self.raw_messages(path, topic), start=1):
+            if len(raw) > LARGEST_MESSAGE:
+                raise InputError(
+                    f"{path}: a message of {len(raw):,} bytes, expected at most {LARGEST_MESSAGE:,}",
+                    "record the joints' states alone on that topic",
+                )
+            row = self.decoded(raw)
             if number == 1:
                 names = tuple(row.name)
                 store = RowStore(3 * len(names), 8 * LARGEST_VALUES if held is None else held)
@@ -279,15 +285,6 @@ class BagFormat(LogFormat):
             store.append(np.array(piece, dtype=np.float64))
         seconds, fraction = np.array(stamps, dtype=np.float64).T
         return names, seconds + 1e-9 * fraction, store, has_velocity
-
-    def _messages(self, path: Path, topic: str) -> Iterator[Any]:
-        for raw in self.raw_messages(path, topic):
-            if len(raw) > LARGEST_MESSAGE:
-                raise InputError(
-                    f"{path}: a message of {len(raw):,} bytes, expected at most {LARGEST_MESSAGE:,}",
-                    "record the joints' states alone on that topic",
-                )
-            yield self.decoded(raw)
 
 
 def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> None:

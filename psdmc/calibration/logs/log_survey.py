@@ -130,7 +130,8 @@ def _surveyed(log: AnyLog, saturated_share: float) -> Survey:
             reach = np.maximum(reach, np.abs(part.position).max(axis=0))
             steps = np.diff(part.time)
             shortest, longest = min(shortest, float(steps.min())), max(longest, float(steps.max()))
-            slope = position_slope(part)
+            # central differences over two periods: too coarse for dynamics, but they distinguish units
+            slope = (part.position[2:] - part.position[:-2]) / (part.time[2:] - part.time[:-2])[:, None]
             power += np.sum(slope**2, axis=0)
             if part.velocity is not None:
                 has_velocity = True
@@ -167,12 +168,6 @@ def _surveyed(log: AnyLog, saturated_share: float) -> Survey:
             straight / len(log),
             (shortest, longest),
         )
-
-
-def position_slope(log: Log) -> Array:
-    """Return central differences (N - 2, n) of the position over two periods. They are too coarse for dynamics but
-    sufficient to distinguish units."""
-    return np.asarray((log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None])
 
 
 ALONE = 10.0

@@ -73,7 +73,7 @@ class Clearance:
             whole[list(self.place)] = pose
             if pin.computeCollisions(self.model, data, self.shapes, shaped, whole, True):
                 pairs = zip(self.shapes.collisionPairs, shaped.collisionResults, strict=True)
-                near = next(_names(self.shapes, pair) for pair, result in pairs if result.isCollision())
+                near = next(_named(self.shapes, pair) for pair, result in pairs if result.isCollision())
                 return touch(near, pose)
         return None
 
@@ -105,7 +105,7 @@ class FloorPoints:
             return None
         row, point = low[0]
         names = [f"the origin of joint {shown(name)}" for name in self.chain.joint_names]
-        return touch(([*names, "the tip"][self.above[point]], FLOOR), poses[row])
+        return touch(f"{[*names, 'the tip'][self.above[point]]} and {FLOOR}", poses[row])
 
     def _heights(self, q: Array) -> Array:
         """(N, n + 1) m above the base's origin."""
@@ -133,10 +133,10 @@ def floor_points(chain: Mechanism, height: float) -> FloorPoints:
     )
 
 
-def touch(pair: tuple[str, str], pose: Array) -> str:
-    """Return a sentence that names the two links that come too close at a pose (n,)."""
+def touch(pair: str, pose: Array) -> str:
+    """Return a sentence that says that a pair, "A and B", comes too close at a pose (n,)."""
     angles = ", ".join(f"{value:.2f}" for value in pose)
-    return f"{' and '.join(pair)} come within {1000 * APART:g} mm of each other at q = ({angles})"
+    return f"{pair} come within {1000 * APART:g} mm of each other at q = ({angles})"
 
 
 def spread(q: Array, step: float) -> Iterator[Array]:
@@ -276,17 +276,11 @@ def _gravity_size(chain: Mechanism) -> float:
 
 
 def _named(shapes: Any, pair: Any) -> str:
-    return " and ".join(_names(shapes, pair))
-
-
-def _names(shapes: Any, pair: Any) -> tuple[str, str]:
-    """Names of the links that two shapes are of; Pinocchio puts a number behind."""
-    first, second = (str(shapes.geometryObjects[k].name) for k in (pair.first, pair.second))
-    return _link(first), _link(second)
-
-
-def _link(name: str) -> str:
-    return FLOOR if name == FLOOR else f"link {shown(name.rpartition('_')[0] or name)}"
+    """The links that two shapes are of, "A and B"; Pinocchio puts a number behind their names."""
+    names = [str(shapes.geometryObjects[k].name) for k in (pair.first, pair.second)]
+    return " and ".join(
+        FLOOR if name == FLOOR else f"link {shown(name.rpartition('_')[0] or name)}" for name in names
+    )
 
 
 SHAPES: Mapping[str, tuple[str, ...]] = {

@@ -276,7 +276,7 @@ def predicted_rows(
         return _torque_with_state(found, friction, part.states, part.at)
 
     log = checked(log, found.model.mechanism, step.filter.cutoff, check)
-    count, first = len(independent_rows(even_grid(log), step.filter, log)), 0
+    count, first = len(independent_rows(even_grid(log), step.filter)), 0
     whole = PredictedRows(np.empty(count), *(np.empty((count, len(log.joint_names))) for _ in range(3)))
     for stretch, torque in each_part(stretches(log, step.filter, check), predicted):
         states, at = stretch.states, stretch.at

@@ -188,7 +188,7 @@ def evidence_of(
     """
     most = max(1, MOST_SHIFTED // model.nv // len(motions))
     logs = [checked(motion.log, model.mechanism, options.cutoff) for motion in motions]
-    counts = [len(independent_rows(even_grid(log), options, log)) for log in logs]
+    counts = [len(independent_rows(even_grid(log), options)) for log in logs]
     step, firsts = max(1, -(-sum(counts) // MOST_ROWS)), accumulate(counts, initial=0)
     parts = [
         _samples(
