@@ -20,11 +20,13 @@ from psdmc.cli.pipeline import (
     xacro_arguments,
 )
 from psdmc.errors import InputError
-from psdmc.robot.file_kinds import ROBOT_SUFFIXES
 
 if TYPE_CHECKING:
     from psdmc.lower.kernels import Lowering
     from psdmc.robot.mechanism import Mechanism
+
+ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".toml")
+"""Endings of files that `psdmc show` reads as a robot; all others are models."""
 
 LARGEST_EXPANDED = 2000
 """`show --cost` prints the expanded lowering too up to this many monomials; beyond, it takes minutes."""

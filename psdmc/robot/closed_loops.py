@@ -15,7 +15,10 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.dh import (
+from psdmc.robot.limits import naming_faults, shown
+from psdmc.robot.mechanism import BASE, ROW_NAMES, Loop, NamedFrame, Placement
+from psdmc.robot.placement import from_quaternion, roll_pitch_yaw, snap_rotation
+from psdmc.robot.toml_table import (
     LENGTH,
     CheckedTable,
     angle,
@@ -25,9 +28,6 @@ from psdmc.robot.dh import (
     plain_text,
     triple_of,
 )
-from psdmc.robot.limits import naming_faults, shown
-from psdmc.robot.mechanism import BASE, ROW_NAMES, Loop, NamedFrame, Placement
-from psdmc.robot.placement import from_quaternion, roll_pitch_yaw, snap_rotation
 
 FORMAT = "see the format of loops in docs/how-to/loops.md"
 ENDS = ("first", "second")

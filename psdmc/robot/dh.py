@@ -1,27 +1,53 @@
-"""Reads the TOML file of a DH table (Denavit-Hartenberg parameters) into plain data, and checks every entry. Writes a
-first table for the user to edit."""
+"""DH tables (Denavit-Hartenberg parameters) in TOML: reads and checks every entry, places the joints, and writes a first
+table for the user to edit."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
-import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from psdmc.errors import InputError
 from psdmc.files import write_whole
+from psdmc.reproducible import times
 from psdmc.robot import limits
-from psdmc.robot.inertia import INERTIA_NAMES, ZERO_NAMES
+from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.inertia import (
+    COM_NAMES,
+    INERTIA_NAMES,
+    ZERO_NAMES,
+    canonical,
+    physical_fault,
+    standard_parameters,
+)
 from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
-from psdmc.robot.limits import WHITE_SPACE, Range, decimal, name_faults, naming_faults, shown
-from psdmc.robot.mechanism import BASE, Limits
+from psdmc.robot.limits import name_faults, naming_faults, shown
+from psdmc.robot.load_options import LoadOptions
+from psdmc.robot.mechanism import BASE, Array, Joint, Limits, NamedFrame, Placement
+from psdmc.robot.placement import ROUNDING, about, coarse_right_angles, snap_rotation
+from psdmc.robot.toml_table import (
+    LENGTH,
+    CheckedTable,
+    Triple,
+    angle,
+    any_list,
+    as_it_is,
+    finite,
+    not_negative,
+    one_of,
+    plain_text,
+    triple_of,
+    within,
+)
 
 Convention = Literal["standard", "modified"]
 
@@ -196,125 +222,6 @@ def _zero_names(value: object) -> tuple[str, ...]:
     return names
 
 
-# Readers of values: each returns a typed value, or raises ValueError with what was found and expected.
-Triple = tuple[float, float, float]
-
-
-def angle(value: object, accepted: Range = limits.ANGLE) -> float:
-    """Return an angle in rad from a number or a text such as "90 deg" or "1.5 rad". Raises ValueError."""
-    if not isinstance(value, str):
-        return within(accepted)(value)
-    plain = value.strip(WHITE_SPACE)
-    number, unit = decimal(plain[:-3].strip(WHITE_SPACE)), plain[-3:]
-    if number is None or unit not in ("deg", "rad"):
-        raise ValueError(f'{shown(value)} is no angle: write radians, or "90 deg"')
-    return within(accepted)(math.radians(number) if unit == "deg" else number)
-
-
-def finite(value: object) -> float:
-    """Return a number read from a file if it is finite as a 64-bit float. Raises ValueError for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"found {shown(value)}, expected a finite number")
-    if not abs(value) <= sys.float_info.max:
-        raise ValueError(f"found {shown(value)}, expected a finite number")
-    return float(value)
-
-
-def within(accepted: Range) -> Callable[[object], float]:
-    """Return a reader of finite numbers within a range, which its ValueError names."""
-
-    def convert(value: object) -> float:
-        number = finite(value)
-        fault = accepted.fault(number)
-        if fault:
-            raise ValueError(f"{number:g} {fault}")
-        return number
-
-    return convert
-
-
-class CheckedTable:
-    """Reads one TOML table key by key. All faults are collected in `problems`, each with the name of the table."""
-
-    def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
-        self.where, self.problems = where, problems
-        self.table: Mapping[str, Any] = value if isinstance(value, dict) else {}
-        if not isinstance(value, dict):
-            problems.append(f"{where}: found {shown(value)}, expected a table")
-        for key in self.table:
-            if key not in keys:
-                problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
-
-    def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
-        """Return a key's value, converted by a reading function; `default` if it is missing or wrong."""
-        if key not in self.table:
-            return default
-        try:
-            return convert(self.table[key])
-        except ValueError as error:
-            self.problems.append(f"{self.where}: {key}: {error}")
-            return default
-
-
-LENGTH = within(limits.LENGTH)
-"""A reader of lengths, m."""
-
-
-def as_it_is(value: object) -> object:
-    """Return a value of a file unchanged. This reading function is for values whose parts are read one by one."""
-    return value
-
-
-def plain_text(value: object) -> str:
-    """Return a value of a file if it is a text that is not empty. Raises ValueError for anything else."""
-    if not isinstance(value, str) or not value:
-        raise ValueError(f"found {shown(value)}, expected a text")
-    return value
-
-
-def any_list(value: object) -> list[object]:
-    """Return a value of a file if it is a list, with entries of any type. Raises ValueError for anything else."""
-    if not isinstance(value, list):
-        raise ValueError(f"found {shown(value)}, expected a list")
-    return value
-
-
-def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
-    """Return a reading function for lists of three values. `convert` reads each of the values."""
-
-    def read(value: object) -> Triple:
-        values = any_list(value)
-        if len(values) != 3:
-            raise ValueError(f"found {shown(value)}, expected three numbers")
-        x, y, z = (convert(v) for v in values)
-        return (x, y, z)
-
-    return read
-
-
-def not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
-    """Return a reading function for numbers that must not be negative. `convert` reads the number."""
-
-    def read(value: object) -> float:
-        number = convert(value)
-        if number < 0.0:
-            raise ValueError(f"found {number:g}, expected no less than zero")
-        return number
-
-    return read
-
-
-def one_of(*words: str) -> Callable[[object], str]:
-    """Return a reading function that accepts only one of the given words."""
-
-    def read(value: object) -> str:
-        if not isinstance(value, str) or value not in words:
-            raise ValueError(f"found {shown(value)}, expected one of {', '.join(words)}")
-        return str(value)
-
-    return read
-
-
 BASE_NAME = "base"
 """The name of the base in `parent`, as in messages and frames."""
 
@@ -357,6 +264,138 @@ def _row(names: Sequence[str], parent: object) -> int | None:
     if parent == BASE_NAME:
         return BASE
     return names.index(parent) if isinstance(parent, str) and parent in names else None
+
+
+# Robots from DH tables
+#
+# Standard convention: a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next; the
+# distal frame is the link frame. The joint frame lies after Rz(theta + q), and the link frame has a
+# constant placement in the joint frame.
+#
+# Modified convention (Craig): a row is Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and the joint frame is the link
+# frame. For a prismatic joint q adds to d and not to theta.
+
+
+def dh_draft(text: str, source: str, options: LoadOptions) -> Draft:
+    """Return the robot that a DH file describes. Raises InputError for options that only URDFs have."""
+    if options.base is not None or options.tip is not None:
+        raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
+    if options.lock:
+        raise InputError(f"{source}: --lock holds joints of a URDF", "leave it out for a DH table")
+    if options.floating:
+        raise InputError(
+            f"{source}: --floating frees the root link of a URDF",
+            "the base of a DH table is fixed: leave --floating out",
+        )
+    if options.unknown:
+        raise InputError(
+            f"{source}: --unknown names links of a URDF", "in a DH table leave out what is unknown of a link"
+        )
+    robot, snap = read_dh(text, source), options.snap
+    joints, snaps = _placed_joints(robot, snap)
+    parents = tuple(row.parent for row in robot.joints)
+    leaves = [i for i in range(len(joints)) if i not in parents]
+    ends = tuple(link_name(leaf + 1) for leaf in leaves) if len(leaves) > 1 else ()
+    named = tuple(_frame(joints, name, source) for name in options.frames or ends)
+    tip = named[0].joint if ends else len(joints) - 1
+    return Draft(
+        name=robot.name,
+        convention=robot.convention,
+        base_name=BASE_NAME,
+        tip_name=joints[tip].link_name,
+        joints=joints,
+        parameters=tuple(_parameters(row) for row in robot.joints),
+        zeros=tuple(row.link.zero for row in robot.joints),
+        drives=tuple(row.drive_inertia is not None for row in robot.joints),
+        gravity=np.array(robot.gravity if options.gravity is None else options.gravity),
+        tip=joints[tip].link_frame,
+        snaps=snaps,
+        notes=(
+            *coarse_right_angles({j.name: (j.alpha, j.theta) for j in robot.joints}, snap),
+            *_faults(robot),
+        ),
+        frames=named,
+        parents=parents,
+        tip_body=tip,
+        loops=robot.loops,
+        frame_of=lambda name: (
+            NamedFrame(name, BASE, Placement.identity())
+            if name == BASE_NAME
+            else _frame(joints, name, source)
+        ),
+    )
+
+
+def _frame(joints: Sequence[Joint], name: str, source: str) -> NamedFrame:
+    """A link's own frame; InputError where there is no such link."""
+    names = [joint.link_name for joint in joints]
+    if name not in names:
+        raise InputError(f"{source}: frame {shown(name)} is no link", f"a DH table has {', '.join(names)}")
+    number = names.index(name)
+    return NamedFrame(name, number, joints[number].link_frame)
+
+
+def link_name(number: int) -> str:
+    """Return the name of a link of a DH table: link1, link2 and so on. The file gives links no names."""
+    return f"link{number}"
+
+
+def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tuple[Snap, ...]]:
+    snaps: list[Snap] = []
+    joints: list[Joint] = []
+    links: list[Placement] = []
+    for number, row in enumerate(robot.joints, start=1):
+        before = Placement.identity() if row.parent == BASE else links[row.parent]
+        twist = _exact(about(0, row.alpha), f"alpha of joint '{row.name}'", snap, snaps, len(joints))
+        turn = _exact(about(2, row.theta), f"theta of joint '{row.name}'", snap, snaps, len(joints))
+        offset = Placement(turn, np.zeros(3))
+        if robot.convention == "standard":
+            placement = before @ offset
+            link = Placement(twist, np.array([row.a, 0.0, row.d]))
+        else:
+            placement = before @ Placement(twist, times(twist, np.array([row.a, 0.0, row.d]))) @ offset
+            link = Placement.identity()
+        joints.append(Joint(row.name, link_name(number), row.type, placement, link, row.limits))
+        links.append(link)
+    return tuple(joints), tuple(snaps)
+
+
+def _exact(rotation: Array, where: str, snap: float, snaps: list[Snap], segment: int) -> Array:
+    result, angle = snap_rotation(rotation, snap)
+    if angle > ROUNDING:
+        snaps.append(Snap(where, angle, segment))
+    return result
+
+
+def _parameters(row: DhJoint) -> Array:
+    """(11,) parameters about the link's frame; zeros that the file states are applied before unknown values."""
+    mass, com, inertia = _body_of(row.link)
+    drive = 0.0 if row.drive_inertia is None else row.drive_inertia
+    return np.append(standard_parameters(mass, com, inertia), drive)
+
+
+def _body_of(link: DhLink) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass, and inertia about the centre of mass of a link. Values that the `zero` list of the
+    file names are zero."""
+    zero = canonical(link.zero)
+    com_and_inertia = [
+        0.0 if name in zero else value
+        for name, value in zip(COM_NAMES, (*link.com, *link.inertia_com), strict=True)
+    ]
+    mass = 0.0 if "m" in zero else link.mass
+    return mass, np.array(com_and_inertia[:3]), np.array(com_and_inertia[3:])
+
+
+def _faults(robot: DhRobot) -> tuple[str, ...]:
+    """A note for each link whose inertia no body could have; assumed zeros are not judged."""
+    notes = []
+    for number, row in enumerate(robot.joints, start=1):
+        mass, _, inertia = _body_of(row.link)
+        judged = not any(name.startswith("I") for name in row.link.zero)
+        fault = physical_fault(mass, inertia) if judged else None
+        if fault:
+            notes.append(f"link '{link_name(number)}': {fault}: not physical")
+    return tuple(notes)
 
 
 def write_new_robot(path: Path) -> None:
