@@ -417,7 +417,7 @@ def test_joints_without_limits_are_named_with_the_options_that_give_them(tmp_pat
         {"draw": "sobol", "states": 2**32},
         {"real": "half"},
     ]
-    + [{"given": {"speed": value}} for value in (-1.0, float("nan"), float("inf"))],
+    + [{"given": {"speed": value}} for value in (-1.0, 0.0, float("nan"), float("inf"))],
     ids=str,
 )
 def test_options_without_a_meaning_are_refused(change: dict[str, object]) -> None:
@@ -514,6 +514,18 @@ def test_the_command_says_what_it_wrote(arm: DynamicsModel, tmp_path: Path) -> N
         assert message in refused.stderr
     refused = typed(*words[:4], "--states", "1e3.5", cwd=tmp_path)
     assert (refused.returncode, refused.stderr.splitlines()[0]) == (2, "error: --states is '1e3.5'")
+
+
+def test_the_command_refuses_a_speed_of_zero(arm: DynamicsModel, tmp_path: Path) -> None:
+    psdmc.save(arm, tmp_path / "arm.npz")
+    ranges = ["--position", 3, "--speed", 0, "--acceleration", 5]
+    done = typed("sample", "arm.npz", "-o", "states", "--states", 10, *ranges, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "error: --speed is 0, so the robot would move in no state",
+        "hint: give a number above 0; for a robot at rest, sample functions of q alone, such as gravity",
+    ]
+    assert not (tmp_path / "states").exists()
 
 
 @pytest.mark.slow

@@ -43,6 +43,7 @@ from psdmc.files import (
     system_errors_at,
     write_together,
 )
+from psdmc.robot.limits import shown
 from psdmc.target.native import NATIVE
 
 
@@ -52,6 +53,7 @@ class Changes(list[str]):
     removed  files of the earlier package that the new package does not have
     kept     foreign files that were in the way, and the new names under which they are kept
     renamed  C names in the earlier package, and their new names
+    replaced if the earlier package was of another robot: descriptions of that robot and of the new one; else None
     """
 
     def __init__(
@@ -60,8 +62,10 @@ class Changes(list[str]):
         removed: Iterable[str],
         kept: Mapping[str, str],
         renamed: Iterable[tuple[str, str]],
+        replaced: tuple[str, str] | None,
     ) -> None:
         self.removed, self.kept, self.renamed = tuple(removed), dict(kept), tuple(renamed)
+        self.replaced = replaced
         super().__init__([*written, *self.removed])
 
 
@@ -117,8 +121,25 @@ def _write(root: Path, files: Mapping[str, str], force: bool) -> Changes:
     if changed or stale:
         _replace(root, changed, stale, journal)
     _tidy(root, files)
-    symbols = renamed(before, json.loads(files[MANIFEST])) if before and MANIFEST in files else []
-    return Changes(changed, stale, kept, symbols)
+    after = json.loads(files[MANIFEST]) if MANIFEST in files else {}
+    symbols = renamed(before, after) if before and after else []
+    return Changes(changed, stale, kept, symbols, _robots(before, after) if before and after else None)
+
+
+def _robots(before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[str, str] | None:
+    """The robots of two manifests if these differ: in their joints, or in name and model. The first may be forged."""
+    joints = [
+        [joint.get("name") for joint in found if isinstance(joint, dict)] if isinstance(found, list) else []
+        for found in (before.get("joints"), after["joints"])
+    ]
+    differ = [before.get(key) != after[key] for key in ("name", "model_hash")]
+    if joints[0] == joints[1] and not all(differ):
+        return None
+    was, now = (
+        f"{shown(content.get('name'))} ({len(names)} joint{'' if len(names) == 1 else 's'})"
+        for content, names in zip((before, after), joints, strict=True)
+    )
+    return was, now
 
 
 def _copied(root: Path, path: str) -> str:

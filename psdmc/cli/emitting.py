@@ -196,6 +196,9 @@ def emit(
         if changed
         else f"{folder}: nothing changed"
     )
+    if changed.replaced is not None:
+        was, now = changed.replaced
+        print(f"note: the package of robot {one_line(was)} is replaced by that of {one_line(now)}")
     if changed.removed:
         print(f"{folder}: removed, because the package no longer has them: {', '.join(changed.removed)}")
     for path, name_now in changed.kept.items():

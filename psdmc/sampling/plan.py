@@ -91,6 +91,11 @@ class Sampling:
             )
         for word, value in self.given.items():
             _range(f"--{word}", value, 0.0, 1e6)
+        if self.given.get("speed") == 0.0:
+            raise InputError(
+                "--speed is 0, so the robot would move in no state",
+                "give a number above 0; for a robot at rest, sample functions of q alone, such as gravity",
+            )
         if self.draw not in ("uniform", "sobol"):
             raise InputError(f"--draw is {self.draw!r}", "choose uniform or sobol")
         if self.real not in ("float64", "float32"):

@@ -16,7 +16,7 @@ from psdmc.backends.manifest import edited_files
 from psdmc.errors import InputError, ToolchainError
 from psdmc.files import make_folder, refuse_foreign_folder, system_errors_at
 from psdmc.progress import Progress, Step, silent
-from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
+from psdmc.toolchain.compiler_command import attempt, failure, find_compiler
 
 FAILED = ": FAILED"
 SHOWN = 3
@@ -97,14 +97,22 @@ def _with_cmake(root: Path) -> str:
         ["cmake", "-S", source, "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
         ["cmake", "--build", build, "--parallel"],
     ]
-    built = "".join(run(step, str(root)) for step in steps)
+    built = "".join(_output(step, root) for step in steps)
     return built + _self_test(["ctest", "--test-dir", build, "--output-on-failure", "--verbose"], root)
 
 
 def _with_make(root: Path, compiler: tuple[str, ...]) -> str:
     command = shlex.join(compiler).replace("$", "$$")
     make = ["make", "-C", str(root), f"CC={command}"]
-    return run([*make, "all"], str(root)) + _self_test([*make, "check"], root)
+    return _output([*make, "all"], root) + _self_test([*make, "check"], root)
+
+
+def _output(words: list[str], root: Path) -> str:
+    """The output of a program that writes into the package's folder. ToolchainError if it fails."""
+    done = attempt(words, str(root))
+    if done.returncode != 0:
+        raise failure(words, str(root), done, root)
+    return done.stdout
 
 
 def _self_test(words: list[str], root: Path) -> str:
@@ -115,7 +123,7 @@ def _self_test(words: list[str], root: Path) -> str:
     lines = (re.sub(r"^\d+: ", "", line.strip()) for line in done.stdout.splitlines())
     failed = list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))
     if not failed:
-        raise failure(words, str(root), done)
+        raise failure(words, str(root), done, root)
     first = "; ".join(failed[:SHOWN]) + ("; ..." if len(failed) > SHOWN else "")
     plural = "check" if len(failed) == 1 else "checks"
     raise ToolchainError(

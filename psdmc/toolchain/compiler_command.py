@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shlex
 import shutil
 import signal
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 from psdmc.errors import ToolchainError
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
@@ -23,6 +26,10 @@ SHOWN = 3
 """Missing CPU features that a message names."""
 SECONDS = 600
 """Longest time in seconds of one run of the compiler."""
+FULL = tuple(os.strerror(code) for code in (errno.ENOSPC, errno.EDQUOT))
+"""What programs print when a disk is full, or the user's share of it."""
+LEAST_ROOM = 1 << 20
+"""Bytes. If less is free on its disk, a program failed for lack of space: CMake often does not print that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +151,7 @@ def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
     """Run a program and return its output. Raises ToolchainError with a line of errors if it fails."""
     done = attempt(words, what, cwd)
     if done.returncode != 0:
-        raise failure(words, what, done)
+        raise failure(words, what, done, cwd)
     return done.stdout
 
 
@@ -161,14 +168,29 @@ def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subproce
         ) from error
 
 
-def failure(words: Sequence[str], what: str, done: subprocess.CompletedProcess[str]) -> ToolchainError:
-    """Return the error for a program that was killed or ended with a status other than 0."""
+def failure(
+    words: Sequence[str], what: str, done: subprocess.CompletedProcess[str], folder: str | Path | None
+) -> ToolchainError:
+    """Return the error for a program that was killed or ended with a status other than 0.
+
+    folder  where the program writes its files; None: unknown. The error says so if its disk is full
+    """
+    lines = [
+        line.strip() for text in (done.stderr, done.stdout) for line in text.splitlines() if line.strip()
+    ]
+    no_space = [line for line in lines if any(text in line for text in FULL)]
+    errors = [line for line in lines if "error" in line.lower()]
+    complaint = [*no_space, *errors, *lines[-1:], "no message"][0]
+    if no_space or (folder is not None and shutil.disk_usage(folder).free < LEAST_ROOM):
+        return ToolchainError(
+            f"{what}: no space left on the disk: {words[0]}: {complaint}",
+            f"make room there and in {tempfile.gettempdir()}, then try again",
+        )
     if done.returncode < 0:
         return ToolchainError(
             f"{what}: {words[0]} was killed by {_signal_name(-done.returncode)}",
             "is there memory enough? run it to see: " + shlex.join(words),
         )
-    complaint = _complaint(done.stderr, done.stdout)
     return ToolchainError(
         f"{what}: {words[0]} failed with status {done.returncode}: {complaint}",
         f"run it to see everything: {shlex.join(words)}",
@@ -180,10 +202,3 @@ def _signal_name(number: int) -> str:
         return signal.Signals(number).name
     except ValueError:
         return f"signal {number}"
-
-
-def _complaint(*texts: str) -> str:
-    """The first line of the output that contains 'error', else the last line."""
-    lines = [line.strip() for text in texts for line in text.splitlines() if line.strip()]
-    errors = [line for line in lines if "error" in line.lower()]
-    return (errors or lines[-1:] or ["no message"])[0]

@@ -78,6 +78,18 @@ def test_what_a_second_emission_removes_and_renames_is_said(tmp_path: Path) -> N
     assert (tmp_path / "arm" / "notes.txt").read_text() == "mine"
 
 
+def test_a_package_of_another_robot_is_replaced_with_a_line_about_it(tmp_path: Path) -> None:
+    saved(tmp_path)
+    bundled_model("scara").save(tmp_path / "other.npz")
+    models = (["arm.npz"], ["arm.npz", "--name", "elbow"], ["arm.npz"], ["other.npz"], ["other.npz"])
+    words = ["-o", "c", "--functions", "gravity"]
+    said = [typed("emit-c", *model, *words, cwd=tmp_path).stdout for model in models]
+
+    line = "note: the package of robot 'two_link' (2 joints) is replaced by that of 'scara' (4 joints)\n"
+    assert [text.count("is replaced by") for text in said] == [0, 0, 0, 1, 0]
+    assert line in said[3]
+
+
 @pytest.mark.parametrize("given", ["", ",", " "])
 def test_no_function_is_not_the_default_set(given: str, tmp_path: Path) -> None:
     done = typed("emit-c", saved(tmp_path), "--functions", given, cwd=tmp_path)

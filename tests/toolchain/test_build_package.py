@@ -6,7 +6,9 @@ import os
 import re
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -139,6 +141,45 @@ def test_a_self_test_that_dies_is_not_called_failed_checks(tmp_path: Path) -> No
     source.write_text(text)
     with pytest.raises(ToolchainError, match=r"(ctest|make) failed with status"):
         build_package(folder, edited=True)
+
+
+CMAKES_LINES = (
+    "CMake Error at CMakeDetermineCompilerId.cmake:312 (file):\n"
+    "  file failed to open for writing (No space left on device):\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("said", "free", "message"),
+    [
+        (CMAKES_LINES, 10**9, "cmake: file failed to open for writing (No space left on device):"),
+        (
+            "as: can't close a.o: Disk quota exceeded",
+            10**9,
+            "cmake: as: can't close a.o: Disk quota exceeded",
+        ),
+        ("gmake: No rule to make target 'Makefile'", 4096, "cmake: gmake: No rule to make target 'Makefile'"),
+    ],
+)
+def test_a_full_disk_is_said_with_its_folder(
+    said: str, free: int, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CMake calls it by name in a later line, or not at all."""
+    cmake = tmp_path / "bin" / "cmake"
+    cmake.parent.mkdir()
+    cmake.write_text(f"#!/bin/sh\ncat >&2 << 'END'\n{said}\nEND\nexit 1\n")
+    cmake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{cmake.parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=free))
+    folder = _emit(tmp_path / "arm")
+
+    with pytest.raises(ToolchainError) as caught:
+        build_package(folder)
+
+    assert caught.value.message == f"{folder}: no space left on the disk: {message}"
+    assert str(caught.value.hint).startswith(
+        f"make room there and in {tempfile.gettempdir()}, then try again"
+    )
 
 
 @pytest.mark.usefixtures("unoptimised")

@@ -174,6 +174,27 @@ def test_renamed_symbols_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize(
+    ("old", "replaced"),
+    [
+        ({"model_hash": "0"}, None),
+        ({"name": "swing"}, None),
+        ({"name": "swing", "model_hash": "0"}, ("'swing' (1 joint)", "'pendulum' (1 joint)")),
+        ({"joints": [{"name": "a"}, {"name": "b"}]}, ("'pendulum' (2 joints)", "'pendulum' (1 joint)")),
+        ({"joints": 3, "name": ["\n"]}, ("['\\n'] (0 joints)", "'pendulum' (1 joint)")),
+    ],
+    ids=str,
+)
+def test_another_robots_package_is_told_from_the_same_robots(
+    old: dict[str, object], replaced: tuple[str, str] | None, tmp_path: Path
+) -> None:
+    """A robot that was calibrated, or is called otherwise in C, is the same robot."""
+    manifest = json.dumps({**json.loads(FILES["manifest.json"]), **old})
+    write_package(tmp_path, {**FILES, "manifest.json": manifest})
+    assert write_package(tmp_path, FILES).replaced == replaced
+    assert write_package(tmp_path, FILES).replaced is None
+
+
+@pytest.mark.parametrize(
     "forged",
     ['"robot": "a\\nb"', '"robot": 7', '"robot": "pendulum", "functions": {"name": [[]]}',
      '"robot": "pendulum", "functions": [{"kernels": 3}, {"kernels": [[], {"name": []}]}, 1]'],
