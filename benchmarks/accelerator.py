@@ -35,9 +35,8 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import Quantity, Signature, Sizes
 from psdmc.progress import silent
-from psdmc.toolchain.cuda_driver import DEFAULT_STREAM, Driver
-from psdmc.toolchain.device_arrays import DeviceArray
-from psdmc.toolchain.nvrtc import machine_code
+from psdmc.toolchain.cuda_libraries import DEFAULT_STREAM, Driver, machine_code
+from psdmc.toolchain.cuda_robot import DeviceArray
 
 KR6 = Path(__file__).resolve().parents[1] / "examples" / "robots" / "kr6.toml"
 FUNCTIONS = (*DEFAULT, "inverse_dynamics_derivatives", "forward_dynamics_derivatives", "forward_dynamics_vjp")

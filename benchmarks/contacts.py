@@ -26,11 +26,10 @@ import numpy as np
 from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import EmitOptions, package_info
-from psdmc.bench.build import built, cxx, native_flags
 from psdmc.bench.case import robot_as_numbers
 from psdmc.bench.cases import LEGGED, robot_data
 from psdmc.bench.contestant import source
-from psdmc.bench.machine import this_machine, version_of
+from psdmc.bench.machine import built, cxx, native_flags, this_machine, version_of
 from psdmc.bench.rivals.pinocchio_cpp import DEFINES, includes, pinocchio_prefix
 from psdmc.derivation.derive import derive_model
 from psdmc.lower.kernels import lower, wanted

@@ -6,10 +6,10 @@ from functools import cache
 
 import pytest
 
-from psdmc.bench.build import native_flags
 from psdmc.bench.case import Case
 from psdmc.bench.cases import standard_cases
 from psdmc.bench.contestant import Contestant, Runner
+from psdmc.bench.machine import native_flags
 from psdmc.bench.rivals import pinocchio_cpp, psdmc_c
 from psdmc.bench.run import CHECKED, disagreement, tolerance
 from psdmc.bench.states import COUNT, States

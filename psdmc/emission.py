@@ -73,7 +73,7 @@ def cuda_robot(
 ) -> CudaRobot:
     """Return the robot of a target "cuda", the first GPU, or "cuda:N". Raises InputError if the caller chose one of the
     options that are absent there."""
-    from psdmc.toolchain.cuda_driver import Driver
+    from psdmc.toolchain.cuda_libraries import Driver
     from psdmc.toolchain.cuda_robot import CudaRobot
 
     if refused := [name for name, given in absent.items() if given]:

@@ -7,8 +7,7 @@ from dataclasses import replace
 from psdmc.bench.contestant import Unavailable
 from psdmc.bench.machine import Machine
 from psdmc.bench.measure import Spread, Tail, Times
-from psdmc.bench.results import BenchResult, CaseResult, Measurement
-from psdmc.bench.threads import ThreadTime
+from psdmc.bench.results import BenchResult, CaseResult, Measurement, ThreadTime
 
 
 def times(ns: float) -> Times:

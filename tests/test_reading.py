@@ -155,8 +155,7 @@ READS_ALL = {"read_text", "read_bytes"}
 """Methods that read a file to its end."""
 
 OWN = {
-    "bench/measure.py": "the kernel's figures",
-    "bench/callgrind.py": "valgrind's output",
+    "bench/measure.py": "the kernel's figures, and valgrind's output",
     "bench/contestant.py": "psdmc's own sources",
     "bench/cases.py": "the kernel's figures",
     "bench/machine.py": "the kernel's figures",

@@ -173,8 +173,8 @@ def with_psdmc(model: psdmc.DynamicsModel, folder: Path) -> Dynamics:
 
 def with_pinocchio(model: psdmc.DynamicsModel) -> Dynamics:
     """Pinocchio's rnea and forwardKinematics on CasADi's symbols, at q with its quaternion divided by its length."""
-    from psdmc.bench.build import built
     from psdmc.bench.case import robot_as_numbers
+    from psdmc.bench.machine import built
     from psdmc.bench.rivals.casadi_c import program_on_symbols
 
     file = Path(__file__).with_name("pinocchio_symbols.cpp")
@@ -196,7 +196,7 @@ def with_pinocchio(model: psdmc.DynamicsModel) -> Dynamics:
 def compiled(dynamics: Dynamics) -> Dynamics:
     """The same functions and their derivatives as C that CasADi generates: one function each, compiled at -O1, as compilers
     take too long for such long functions at -O3."""
-    from psdmc.bench.build import built
+    from psdmc.bench.machine import built
     from psdmc.toolchain.compiler_command import find_compiler
 
     code = casadi.CodeGenerator("generated", {"casadi_int": "long long int"})

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.bench import ROUNDS
 from psdmc.bench.case import Case, generic_chain
 from psdmc.bench.cases import bundled_chain, derive_fresh, first_joints, standard_cases
-from psdmc.bench.defaults import ROUNDS
 from psdmc.bench.results import as_text
 from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import Settings, run

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from psdmc.bench.build import counted_flags
-from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import Case
 from psdmc.bench.cases import standard_cases
+from psdmc.bench.machine import counted_flags
+from psdmc.bench.measure import instructions
 from psdmc.bench.rivals import psdmc_c
 from psdmc.errors import InputError, ToolchainError, exit_status_of
 from psdmc.files import make_folder, read_file, write_whole

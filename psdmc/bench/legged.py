@@ -11,9 +11,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from psdmc.bench import ROUNDS
 from psdmc.bench.case import Case
 from psdmc.bench.cases import LEGGED, legged_cases
-from psdmc.bench.defaults import ROUNDS
 from psdmc.bench.results import BenchResult, CaseResult
 from psdmc.bench.run import Settings, run
 from psdmc.errors import exit_status_of

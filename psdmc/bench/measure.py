@@ -1,9 +1,14 @@
-"""Time all compared functions in turn, round by round, and count only rounds in which the machine was otherwise idle."""
+"""Time all compared functions in turn, round by round, and count only rounds in which the machine was otherwise idle.
+
+Also measure the sizes of machine code, and count instructions.
+"""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -11,10 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.bench.contestant import Runner
-from psdmc.bench.machine import IDLE_SHARE, others_share
+from psdmc.bench.contestant import Contestant, Runner, source
+from psdmc.bench.machine import IDLE_SHARE, built, counted_flags, cxx, others_share
+from psdmc.bench.states import States
+from psdmc.errors import ToolchainError
 from psdmc.progress import Step
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import Array, Mechanism
+from psdmc.toolchain.compiler_command import run
 
 PATIENCE = 3
 """Rounds tried for each that must count; after that busy ones count too, and the result says so."""
@@ -205,3 +213,76 @@ def code_bytes(sizes: Mapping[str, int], belongs: Callable[[str], bool]) -> int 
     """Return the size in bytes of all C functions that belong to one function; None if none is known."""
     own = [size for name, size in sizes.items() if belongs(name)]
     return sum(own) if own else None
+
+
+# Instructions per state, as callgrind counts them. Other work on the machine does not change the counts.
+
+
+COUNTED_STATES = 512
+"""Some angles take glibc's slow paths, the others are alike."""
+
+COUNTED_SEED = 512
+
+
+def valgrind() -> str:
+    """Return the command of valgrind. Raise ToolchainError if it is not installed."""
+    if shutil.which("valgrind") is None:
+        raise ToolchainError("valgrind was not found", "install it (Debian: apt install valgrind)")
+    return "valgrind"
+
+
+def instructions(contestants: Sequence[Contestant], chain: Mechanism) -> dict[tuple[str, str], float]:
+    """Count the instructions per state of each compared function, and return the counts by (library, C name). The few
+    instructions of the loop that calls the function are included.
+
+    contestants  the compared functions, compiled with counted_flags(); valgrind runs once for each of their libraries
+    """
+    states = States.random(chain, COUNTED_STATES, COUNTED_SEED)
+    found: dict[tuple[str, str], float] = {}
+    for library in dict.fromkeys(c.library for c in contestants):
+        own = [c for c in contestants if c.library == library]
+        totals = _counted(library, own, states)
+        found |= {
+            (str(library), c.symbol): total / COUNTED_STATES for c, total in zip(own, totals, strict=True)
+        }
+    return found
+
+
+def _counted(library: Path, contestants: Sequence[Contestant], states: States) -> list[int]:
+    command = [cxx(), "-std=c++17", *counted_flags(), "counter.cpp", "-o", "counter", "-ldl"]
+    counter = built("counter", command, {name: source(name) for name in ("counter.cpp", "loops.hpp")})
+    with tempfile.TemporaryDirectory() as folder:
+        jobs = [_job(c, states, Path(folder)) for c in contestants]
+        (Path(folder) / "jobs.txt").write_text("\n".join(jobs) + "\n")
+        (Path(folder) / "robot.txt").write_text(contestants[0].robot or "")
+        watched = (
+            "--toggle-collect=*_throughput",
+            "--dump-after=*_throughput",
+            "--callgrind-out-file=counts",
+        )
+        given = (str(counter), str(library), "robot.txt", "jobs.txt")
+        run([valgrind(), "--tool=callgrind", *watched, *given], "callgrind", folder)
+        return [_total(Path(folder) / f"counts.{k + 1}") for k in range(len(contestants))]
+
+
+def _job(contestant: Contestant, states: States, folder: Path) -> str:
+    """One line for counter.cpp, and the file of states that it names."""
+    name = f"{contestant.function}_{contestant.lanes}_{contestant.convention}.bin"
+    (folder / name).write_bytes(
+        np.concatenate(states.inputs(contestant.function, contestant.lanes, contestant.convention)).tobytes()
+    )
+    more = states.more(contestant.function)
+    sizes = (states.nq, states.nv, more, contestant.outputs, COUNTED_STATES, COUNTED_STATES)
+    return f"{contestant.symbol} {' '.join(map(str, sizes))} {name}"
+
+
+def _total(dump: Path) -> int:
+    """Instructions between two dumps."""
+    found = (
+        re.search(r"^(?:totals|summary): (\d+)", dump.read_text(), re.MULTILINE) if dump.is_file() else None
+    )
+    if found is None:
+        raise ToolchainError(
+            f"callgrind wrote no counts to {dump.name}", "try it by hand: valgrind --tool=callgrind"
+        )
+    return int(found[1])

@@ -13,7 +13,6 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 from psdmc.bench.contestant import Unavailable
 from psdmc.bench.machine import Machine
 from psdmc.bench.measure import Times
-from psdmc.bench.threads import ThreadTime
 from psdmc.errors import InputError
 
 SCHEMA = 1
@@ -48,6 +47,16 @@ class Measurement:
     @property
     def label(self) -> str:
         return f"{self.rival} {self.variant}".strip()
+
+
+@dataclass(frozen=True, slots=True)
+class ThreadTime:
+    """The time of a batch function on several threads, ns per state, all threads together."""
+
+    function: str
+    layout: str
+    threads: int
+    ns: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 
-from psdmc.bench.build import counted_flags
-from psdmc.bench.callgrind import instructions
+from psdmc.bench import ROUNDS, SEED
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
-from psdmc.bench.defaults import ROUNDS, SEED
-from psdmc.bench.machine import this_machine, versions
-from psdmc.bench.measure import Times, measure
-from psdmc.bench.results import BenchResult, CaseResult, Measurement
+from psdmc.bench.machine import counted_flags, this_machine, versions
+from psdmc.bench.measure import Times, instructions, measure
+from psdmc.bench.results import BenchResult, CaseResult, Measurement, ThreadTime
 from psdmc.bench.rivals import EVERYONE, Entrant, psdmc_c
 from psdmc.bench.states import COUNT, States, output_sizes
-from psdmc.bench.threads import measure_threads
 from psdmc.errors import ToolchainError
 from psdmc.functions import RECIPES
 from psdmc.progress import Progress, silent, within
@@ -117,7 +116,7 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
         wrong=wrong,
         rounds=measured.rounds,
         idle=measured.idle,
-        threads=measure_threads(right, states) if settings.threads else (),
+        threads=_measure_threads(right, states) if settings.threads else (),
     )
 
 
@@ -217,6 +216,41 @@ def _sorted(
     contestants = [e for e in entries if isinstance(e, Contestant)]
     wanted = [c for c in contestants if functions is None or c.function in functions]
     return Assembled(case, tuple(wanted), tuple(e for e in entries if isinstance(e, Unavailable)))
+
+
+# Batch calls on several threads at once, to show how speed grows with the number of cores
+
+
+THREADS = (1, 2)
+TRIALS = 5
+PASSES = 30
+"""How often each thread goes through all states in a trial: some 20 ms, long compared with starting threads."""
+
+
+def _measure_threads(contestants: Sequence[Contestant], states: States) -> tuple[ThreadTime, ...]:
+    """Time psdmc's batch functions on one and two threads, which share the inputs and have own outputs."""
+    return tuple(
+        ThreadTime(c.function, c.layout, threads, _ns_per_state(c, states, threads))
+        for c in contestants
+        if c.layout != "state" and c.rival == "psdmc factored" and c.function in SCALED
+        for threads in THREADS
+    )
+
+
+def _ns_per_state(contestant: Contestant, states: States, threads: int) -> float:
+    runners = [Runner(contestant, states) for _ in range(threads)]
+    with ThreadPoolExecutor(threads) as pool:
+        seconds = []
+        for _ in range(TRIALS):
+            start = time.perf_counter()
+            list(pool.map(_passes, runners))
+            seconds.append(time.perf_counter() - start)
+    return 1e9 * float(np.median(seconds)) / (PASSES * threads * states.count)
+
+
+def _passes(runner: Runner) -> None:
+    for _ in range(PASSES):
+        runner.throughput()
 
 
 # Compared before anything is timed

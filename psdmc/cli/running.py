@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from psdmc.bench.defaults import ROUNDS
+from psdmc.bench import ROUNDS
 from psdmc.cli.arguments import check_output, names
 from psdmc.cli.console import say_next, steps
 from psdmc.cli.pipeline import ModelFile

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.bench.build import native_flags
 from psdmc.bench.contestant import SEVERAL_SHARE, Contestant, Runner, Unavailable
+from psdmc.bench.machine import native_flags
 from psdmc.bench.rivals import cppadcg_c, psdmc_c
 from psdmc.bench.run import checked, disagreement
 from psdmc.bench.states import States

@@ -7,7 +7,7 @@ import shutil
 import pytest
 from tiny_contestants import tiny
 
-from psdmc.bench.callgrind import instructions
+from psdmc.bench.measure import instructions
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")

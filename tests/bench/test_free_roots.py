@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from psdmc.bench.build import native_flags
-from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import LONGEST_INPUT, Case, generic_chain, robot_as_numbers
 from psdmc.bench.cases import LEGGED, TREES, legged_cases, robot_data, standard_chains
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
 from psdmc.bench.legged import THEIRS
+from psdmc.bench.machine import native_flags
+from psdmc.bench.measure import instructions
 from psdmc.bench.rivals import mujoco_c, psdmc_c
 from psdmc.bench.rivals.pinocchio_cpp import SYMBOLS, outputs_of, ways_of
 from psdmc.bench.run import Settings, checked, run

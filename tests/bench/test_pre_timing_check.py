@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psdmc.bench.build import native_flags
 from psdmc.bench.contestant import Runner
+from psdmc.bench.machine import native_flags
 from psdmc.bench.rivals import psdmc_c
 from psdmc.bench.run import checked, relative_error, tolerance
 from psdmc.bench.states import States

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from psdmc.bench.build import built, cxx
 from psdmc.bench.contestant import Contestant, source
+from psdmc.bench.machine import built, cxx
 
 BODIES = {
     # What inverse dynamics of the two-link arm would be if it were this simple.

@@ -287,7 +287,7 @@ BESIDE = ("matplotlib", "psdmc.calibration.calibrate", "psdmc.bench.run", "psdmc
 """What commands beside the pipeline are made of."""
 
 DEFAULTS = {
-    *("psdmc.bench", "psdmc.bench.defaults"),
+    "psdmc.bench",
     *("psdmc.calibration", "psdmc.calibration.motions", "psdmc.calibration.motions.excite_options"),
 }
 """Of which the command line loads what its help says."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from psdmc.bench.build import native_flags
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
+from psdmc.bench.machine import native_flags
 from psdmc.bench.rivals import casadi_c, cppadcg_c, mujoco_c, pinocchio_cpp, psdmc_c
 from psdmc.errors import PsdmcError
 

@@ -9,10 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from psdmc.bench.build import built, cxx
 from psdmc.bench.case import MOST_DIFFERENTIATED, Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
-from psdmc.bench.machine import version_of
+from psdmc.bench.machine import built, cxx, version_of
 from psdmc.bench.measure import code_sizes
 from psdmc.bench.rivals.pinocchio_cpp import (
     DEFINES,

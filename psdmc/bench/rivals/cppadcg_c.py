@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, source
-from psdmc.bench.machine import version_of
+from psdmc.bench.machine import built, cxx, version_of
 from psdmc.bench.measure import code_sizes
 from psdmc.bench.rivals.pinocchio_cpp import (
     DEFINES,

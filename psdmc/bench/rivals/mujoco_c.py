@@ -9,10 +9,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, refuse_unlike
 from psdmc.bench.contestant import Contestant, Unavailable, source
-from psdmc.bench.machine import version_of
+from psdmc.bench.machine import built, cxx, version_of
 from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
 from psdmc.errors import InputError, ToolchainError
 from psdmc.robot.limits import shown

@@ -11,10 +11,9 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
-from psdmc.bench.machine import version_of
+from psdmc.bench.machine import built, cxx, version_of
 from psdmc.bench.states import output_sizes
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError

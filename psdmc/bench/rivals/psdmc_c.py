@@ -11,9 +11,9 @@ from pathlib import Path
 from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import EmitOptions, package_info
-from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
 from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.machine import built, cxx, produced
 from psdmc.bench.measure import code_bytes, code_sizes
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import Lowering, lower

@@ -22,10 +22,9 @@ import psdmc
 from psdmc.errors import InputError, ToolchainError
 from psdmc.lower import kernels
 from psdmc.robot.reference import reference
-from psdmc.toolchain import cuda_driver, nvrtc
-from psdmc.toolchain.cuda_driver import Driver
-from psdmc.toolchain.cuda_robot import CudaRobot
-from psdmc.toolchain.device_arrays import DeviceArray
+from psdmc.toolchain import cuda_libraries
+from psdmc.toolchain.cuda_libraries import Driver
+from psdmc.toolchain.cuda_robot import CudaRobot, DeviceArray
 
 pytestmark = pytest.mark.needs("g++")
 
@@ -47,15 +46,15 @@ def gpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FAKE_CUDA_FOLDER", str(folder))
         patch.setenv("FAKE_CUDA_CXX", " ".join(["g++", *FLAGS, "-O0", "-shared", "-fPIC", "-xc++"]))
-        patch.setattr(cuda_driver, "NAMES", (str(library),))
-        patch.setattr(nvrtc, "_candidates", lambda: iter([str(library)]))
+        patch.setattr(cuda_libraries, "DRIVERS", (str(library),))
+        patch.setattr(cuda_libraries, "_candidates", lambda: iter([str(library)]))
         forget()
         yield
     forget()
 
 
 def forget() -> None:
-    for opened in (cuda_driver.opened, nvrtc.opened):
+    for opened in (cuda_libraries.driver_library, cuda_libraries.compiler):
         opened.cache_clear()
 
 
@@ -327,8 +326,8 @@ def test_wrong_targets_are_refused(gpus: None, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("missing", ["driver", "NVRTC"])
 def test_what_is_not_installed_is_said(gpus: None, missing: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cuda_driver, "NAMES", () if missing == "driver" else cuda_driver.NAMES)
-    monkeypatch.setattr(nvrtc, "_candidates", lambda: iter(["libnone.so"]))
+    monkeypatch.setattr(cuda_libraries, "DRIVERS", () if missing == "driver" else cuda_libraries.DRIVERS)
+    monkeypatch.setattr(cuda_libraries, "_candidates", lambda: iter(["libnone.so"]))
     forget()
     message = {"driver": '^target "cuda" needs an NVIDIA GPU', "NVRTC": '^target "cuda" needs NVRTC'}[missing]
     with pytest.raises(ToolchainError, match=message) as caught:

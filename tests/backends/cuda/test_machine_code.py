@@ -17,7 +17,7 @@ from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import ToolchainError
 from psdmc.functions import DEFAULT, DEFAULT_WHERE_WIDE
 from psdmc.progress import silent
-from psdmc.toolchain import nvrtc
+from psdmc.toolchain import cuda_libraries
 
 pytestmark = pytest.mark.skipif(
     not machine_code.are_installed(), reason="the extra cuda (NVRTC and ptxas) is not installed"
@@ -75,10 +75,10 @@ def test_compile_at_run_time(arch: int, begin: bytes) -> None:
         bundled_model("two_link"), EmitRequest("auto", names, EmitOptions("float32")), silent
     )
 
-    code = nvrtc.machine_code(source.text, f"{source.robot}_KERNELS", arch)
+    code = cuda_libraries.machine_code(source.text, f"{source.robot}_KERNELS", arch)
 
     assert code.startswith(begin)
     for name in source.interface.kernels:
         assert f"two_link_{name}_rows".encode() in code
     with pytest.raises(ToolchainError, match=r"no GPU as old as compute capability 2\.0"):
-        nvrtc.machine_code(source.text, "x", 20)
+        cuda_libraries.machine_code(source.text, "x", 20)

@@ -1,19 +1,24 @@
-"""Calls the driver of NVIDIA's GPUs: memory, machine code and launches on one GPU. It uses the GPU's primary context, as
-CuPy, PyTorch and JAX do."""
+"""Calls NVIDIA's libraries: the driver, for memory, machine code and launches on one GPU, and the compiler NVRTC.
+
+The driver uses the GPU's primary context, as CuPy, PyTorch and JAX do.
+"""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.errors import InputError, ToolchainError
+from psdmc.errors import InputError, InternalError, ToolchainError
 
-NAMES = ("libcuda.so.1", "nvcuda.dll")
+DRIVERS = ("libcuda.so.1", "nvcuda.dll")
 """Names of the driver's library on Linux and Windows."""
 
 MAJOR, MINOR = 75, 76
@@ -33,7 +38,7 @@ class Driver:
     """One GPU. Raises ToolchainError if the driver is missing or fails, InputError if there is no GPU of this number."""
 
     def __init__(self, ordinal: int) -> None:
-        self.ordinal, self._cuda = ordinal, opened()
+        self.ordinal, self._cuda = ordinal, driver_library()
         count, device = ctypes.c_int(), ctypes.c_int()
         self._context = ctypes.c_void_p()
         self._check("cuInit", 0)
@@ -134,12 +139,81 @@ class Driver:
 
 
 @cache
-def opened() -> Any:
+def driver_library() -> Any:
     """Return the library of the driver. Raises ToolchainError if it is not installed."""
-    for name in NAMES:
-        try:
+    fault = 'target "cuda" needs an NVIDIA GPU: its driver (libcuda) is not installed'
+    return _opened(DRIVERS, fault, "psdmc emit --backend cuda writes the source without a GPU")
+
+
+def _opened(names: Iterable[str], fault: str, hint: str) -> Any:
+    """The first of these libraries that the system has."""
+    for name in names:
+        with suppress(OSError):
             return ctypes.CDLL(name)
-        except OSError:
-            continue
-    hint = "psdmc emit --backend cuda writes the source without a GPU"
-    raise ToolchainError('target "cuda" needs an NVIDIA GPU: its driver (libcuda) is not installed', hint)
+    raise ToolchainError(fault, hint)
+
+
+# NVRTC, which compiles CUDA source to machine code for one kind of GPU; it needs no GPU
+
+
+COMPILERS = ("libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so")
+"""Names of the library that the system may have; those of pip's wheels come first."""
+
+
+def machine_code(source: str, definition: str, arch: int) -> bytes:
+    """Return the machine code of a source without includes, compiled for one kind of GPU. If NVRTC is older than the GPU,
+    the result is PTX (code of a virtual GPU), which the driver translates.
+
+    definition  name of a macro that is defined
+    arch        kind of GPU, ten times its compute capability: 90 for an H100
+
+    Raises ToolchainError if NVRTC is not installed, or knows no GPU so old.
+    """
+    count, program = ctypes.c_int(), ctypes.c_void_p()
+    _nvrtc("GetNumSupportedArchs", ctypes.byref(count))
+    known = (ctypes.c_int * count.value)()
+    _nvrtc("GetSupportedArchs", known)
+    usable = [each for each in known if each <= arch]
+    if not usable:
+        raise ToolchainError(
+            f"NVRTC knows no GPU as old as compute capability {arch / 10}", "install an older NVRTC"
+        )
+    kind, what = ("sm", "CUBIN") if arch in usable else ("compute", "PTX")
+    given = (f"--gpu-architecture={kind}_{max(usable)}".encode(), f"-D{definition}".encode())
+    _nvrtc("CreateProgram", ctypes.byref(program), source.encode(), b"robot.cuh", 0, None, None)
+    try:
+        words = (ctypes.c_char_p * len(given))(*given)
+        if compiler().nvrtcCompileProgram(program, len(given), words):
+            log = _read(program, "ProgramLog").decode(errors="replace")
+            raise InternalError(f"NVRTC refuses generated code: {' '.join(log.split())[:500]}")
+        return _read(program, what)
+    finally:
+        compiler().nvrtcDestroyProgram(ctypes.byref(program))
+
+
+@cache
+def compiler() -> Any:
+    """Return the library NVRTC. Raises ToolchainError if it is not installed."""
+    fault = 'target "cuda" needs NVRTC, which is not installed'
+    return _opened(_candidates(), fault, "pip install 'psdmc[cuda]', or install CUDA")
+
+
+def _candidates() -> Iterator[str]:
+    """Paths and names of the library, pip's wheels first."""
+    spec = find_spec("nvidia")
+    for folder in (spec and spec.submodule_search_locations) or ():
+        yield from map(str, sorted(Path(folder).glob("*/lib/libnvrtc.so.1?")))
+    yield from COMPILERS
+
+
+def _read(program: ctypes.c_void_p, what: str) -> bytes:
+    size = ctypes.c_size_t()
+    _nvrtc(f"Get{what}Size", program, ctypes.byref(size))
+    text = ctypes.create_string_buffer(size.value)
+    _nvrtc(f"Get{what}", program, text)
+    return text.raw
+
+
+def _nvrtc(name: str, *given: Any) -> None:
+    if status := getattr(compiler(), f"nvrtc{name}")(*given):
+        raise ToolchainError(f"nvrtc{name} failed with status {status}", "install NVRTC again")
