@@ -15,26 +15,16 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import random_parameters, states_of
-from psdmc.recipes.recipe import Needs
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import BASE, PARAMETERS_PER_LINK, Array, Mechanism, Placement
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import OnCoordinates, Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
-from psdmc.verification.functions import function_errors
+from psdmc.verification.functions import SINGULAR, TORQUE_LIMIT, function_errors, solved_limit
 
 STATES = 200
 SEED = 14_630
-TORQUE_LIMIT = 1e-10
-"""Largest relative error that passes: a hundred times what rounding leaves, a million times less than any mistake."""
-
-CONDITION_LIMIT = 1e-12
-"""Forward dynamics passes within this times the mass matrix's condition number, and always within TORQUE_LIMIT."""
-
-SINGULAR = 1e15
-"""Condition number from which a mass matrix cannot be inverted: that of a last link without inertia, for example."""
-
 PLACEMENT_LIMIT = 1e-11
 """rad, or share of the robot's reach: rounding leaves 1e-15, and what snapping cleans as noise 1e-13."""
 
@@ -154,15 +144,8 @@ def _functions(
         remark = "a base parameter has no standard parameter of its own"
         yield CheckRow("base parameters", "their equations", np.inf, TORQUE_LIMIT, remark)
         return
-    for recipe, error, lack in function_errors(model, theta, robot, condition < SINGULAR):
-        limit = _solved_limit(condition) if recipe.needs is Needs.POSITIVE_MASS else TORQUE_LIMIT
-        remark = lack and f"not compared: {lack}"
-        yield CheckRow(recipe.title, recipe.against, error, None if lack else limit, remark)
-
-
-def _solved_limit(condition: float) -> float:
-    """Limit for functions that divide by the mass matrix, which lose digits with its condition number."""
-    return max(TORQUE_LIMIT, CONDITION_LIMIT * condition)
+    for recipe, error, limit, remark in function_errors(model, theta, robot, condition):
+        yield CheckRow(recipe.title, recipe.against, error, limit, remark)
 
 
 def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, condition: float) -> CheckRow:
@@ -171,7 +154,7 @@ def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, 
     if not condition < SINGULAR:
         return CheckRow(name, "aba", np.nan, None, "not compared: the mass matrix is singular")
     error = relative_error(robot.forward_dynamics(q, qd, tau), qdd)
-    return CheckRow(name, "aba", error, _solved_limit(condition))
+    return CheckRow(name, "aba", error, solved_limit(condition))
 
 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
