@@ -137,7 +137,7 @@ def _read_time(value: object, reading: Reading) -> TimeEntry:
             reading.faults.append("time: `rate` is given with `column` or `unit`, expected one or the other")
         return TimeEntry(rate=table.number("rate", LOWEST_RATE, HIGHEST_RATE))
     unit = table.word("unit", (*TIME_UNITS, DATE), "s")
-    column = column_of(table, "column") if table.has("column") else "time_s"
+    column = column_of(table) if table.has("column") else "time_s"
     return TimeEntry(column, 1.0 if unit == DATE else TIME_UNITS[unit].size, dates=unit == DATE)
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar, cast
+from typing import Any, Generic, Literal, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -201,7 +201,7 @@ def _entry_of(value: object, what: What, where: str, faults: list[str], *, with_
     """The entry of a quantity, such as [position], from its TOML table. With a column, the value may also be its name or
     number alone."""
     if with_column and _is_column(value):
-        return Entry(column=cast("str | int", value))
+        return Entry(column=value)
     if with_column and not isinstance(value, dict):
         expected = f"a column's name, its number from 1 to {LARGEST_COLUMN}, or a table"
         faults.append(f"{where}: found {shown(value)}, expected {expected}")
@@ -220,7 +220,7 @@ def _entry_of(value: object, what: What, where: str, faults: list[str], *, with_
         if abs(said["sign"]) != 1.0:
             faults.append(f"{where}: sign: found {said['sign']:g}, expected 1 or -1")
     if table.has("column"):
-        said["column"] = column_of(table, "column")
+        said["column"] = column_of(table)
     if table.has("table"):
         said["table"] = table.text("table")
     if said.get("scale") == 0.0:
@@ -228,17 +228,17 @@ def _entry_of(value: object, what: What, where: str, faults: list[str], *, with_
     return Entry(**said)
 
 
-def column_of(table: TomlTable, key: str) -> str | int:
-    """Return the value of a key that names a column: the name of the column, or its number from 1."""
-    value = table.content[key]
-    if not _is_column(value):
-        expected = f"a column's name, or its number from 1 to {LARGEST_COLUMN}"
-        table.faults.append(f"{table.where}: {key}: found {shown(value)}, expected {expected}")
-        return 1
-    return cast("str | int", value)
+def column_of(table: TomlTable) -> str | int:
+    """Return the value of the key `column`: the name of a column, or its number from 1."""
+    value = table.content["column"]
+    if _is_column(value):
+        return value
+    expected = f"a column's name, or its number from 1 to {LARGEST_COLUMN}"
+    table.faults.append(f"{table.where}: column: found {shown(value)}, expected {expected}")
+    return 1
 
 
-def _is_column(value: object) -> bool:
+def _is_column(value: object) -> TypeGuard[str | int]:
     if isinstance(value, str):
         return bool(value) and value.isprintable()
     return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_COLUMN

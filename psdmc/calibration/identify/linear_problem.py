@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.columns.columns import Columns, read_columns
-from psdmc.calibration.columns.effect import Motion
-from psdmc.calibration.columns.ways import poses
+from psdmc.calibration.columns.effect import Motion, poses
 from psdmc.calibration.identify.estimate import NO_EFFECT, ORDINARY_SPEED, SEED, FitOptions
 from psdmc.calibration.identify.least_squares import KeptRows
 from psdmc.calibration.identify.motor_model import Coupling, Motors, coupling_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite_options import ExciteOptions
-from psdmc.calibration.motions.trajectory import Trajectory
+from psdmc.calibration.motions.trajectory import Trajectory, smooth_step
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
@@ -227,7 +227,7 @@ def ramped(
     middle: Array = np.arange(round(repeats * motion.duration / period) + 1, dtype=np.float64) * period
     length = rows * period
     x: Array = np.arange(rows, dtype=np.float64) / rows
-    gone, rate, bend = _smooth_step(x)
+    gone, rate, bend, _ = smooth_step(x)
     way = gone * length - 0.5 * length
     end = middle[-1]
     path = np.concatenate([way, middle, end - way[::-1]])
@@ -236,12 +236,3 @@ def ramped(
     q, qd, qdd = motion.at(path)
     time: Array = np.arange(len(path), dtype=np.float64) * period
     return Trajectory(joint_names, time, q, qd * pace, qdd * pace**2 + qd * change)
-
-
-def _smooth_step(x: Array) -> tuple[Array, Array, Array]:
-    """Integral, value and slope of 6 x^5 - 15 x^4 + 10 x^3."""
-    return (
-        x**4 * (2.5 + x * (x - 3.0)),
-        x**3 * (10.0 + x * (6.0 * x - 15.0)),
-        30.0 * x**2 * (1.0 - x) ** 2,
-    )

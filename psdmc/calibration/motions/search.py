@@ -141,7 +141,7 @@ def search(
     """
     options = criterion.options
     budget = options.evaluations
-    counted = _Counted(criterion, budget, begin, is_free, progress)
+    counted = _Counted(criterion, begin, is_free, progress)
     best: list[tuple[float, Array]] = []
     descents = max(1, round(budget / PER_START))
     for number, start in enumerate(starts[:descents]):
@@ -160,13 +160,13 @@ def search(
         if counted.is_late:
             break
     if is_free is not None and best and not counted.is_late:
-        nearest = min(best, key=lambda each: each[0])[1]
+        _, nearest = min(best, key=lambda each: each[0])
         rng = np.random.default_rng(options.seed)
         point = walked(criterion.cost, nearest, is_free, counted.steps_left(), rng)
         best.append((criterion.score(point), point))
-    order = sorted(range(len(best)), key=lambda k: best[k][0])
+    best.sort(key=lambda each: each[0])
     history = np.array(counted.history).reshape(-1, 2)
-    return Found(tuple(best[k][1] for k in order), counted.count, history, counted.is_late)
+    return Found(tuple(point for _, point in best), counted.count, history, counted.is_late)
 
 
 class _Counted:
@@ -175,21 +175,20 @@ class _Counted:
     def __init__(
         self,
         criterion: Criterion,
-        budget: int,
         begin: float,
         is_free: Callable[[Array], bool] | None,
         progress: SearchProgress | None,
     ) -> None:
         self.criterion, self.is_free, self.progress = criterion, is_free, progress
-        self.budget, self.until, self.count, self.started = budget, budget, 0, begin
+        self.budget = self.until = criterion.options.evaluations
+        self.count, self.started = 0, begin
         self.power, self.point, self.lowest = 1.0, np.zeros(0), np.inf
         self.best_score = np.inf
         self.history: list[tuple[float, float]] = []
 
     def begin(self, power: float, point: Array) -> None:
         self.power, self.point, self.lowest = power, point, np.inf
-        quarter = (self.until - self.count) // 2
-        self.limit = self.count + max(quarter, 1)
+        self.limit = self.count + max((self.until - self.count) // 2, 1)
 
     @property
     def is_late(self) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints
+from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints, smooth_step
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Joint, Mechanism
 
@@ -191,8 +191,8 @@ def _windowed_sine(amplitude: float, frequency: float, options: SineOptions) -> 
     duration = (options.cycles + 2) / frequency
     time = _times(duration, options.period)[:-1]
     w = 2.0 * np.pi * frequency
-    rise, rise_rate, rise_acceleration = _smooth_step(time * frequency)
-    fall, fall_rate, fall_acceleration = _smooth_step((duration - time) * frequency)
+    _, rise, rise_rate, rise_acceleration = smooth_step(time * frequency)
+    _, fall, fall_rate, fall_acceleration = smooth_step((duration - time) * frequency)
     envelope = rise * fall
     slope = (rise_rate * fall - rise * fall_rate) * frequency
     bend = (rise_acceleration * fall - 2 * rise_rate * fall_rate + rise * fall_acceleration) * frequency**2
@@ -201,16 +201,6 @@ def _windowed_sine(amplitude: float, frequency: float, options: SineOptions) -> 
         amplitude * envelope * sine,
         amplitude * (slope * sine + envelope * w * cosine),
         amplitude * (bend * sine + 2.0 * slope * w * cosine - envelope * w**2 * sine),
-    )
-
-
-def _smooth_step(x: Array) -> tuple[Array, Array, Array]:
-    """6 x^5 - 15 x^4 + 10 x^3 between 0 and 1, with its first two derivatives."""
-    x = np.clip(x, 0.0, 1.0)
-    return (
-        x**3 * (10.0 + x * (6.0 * x - 15.0)),
-        30.0 * x**2 * (1.0 - x) ** 2,
-        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
     )
 
 

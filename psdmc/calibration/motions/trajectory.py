@@ -49,6 +49,17 @@ class Trajectory:
         return float(self.time[-1])
 
 
+def smooth_step(x: Array) -> tuple[Array, Array, Array, Array]:
+    """Return the integral, the value and the first two derivatives of 6 x^5 - 15 x^4 + 10 x^3, with x cut to 0 to 1."""
+    x = np.clip(x, 0.0, 1.0)
+    return (
+        x**4 * (2.5 + x * (x - 3.0)),
+        x**3 * (10.0 + x * (6.0 * x - 15.0)),
+        30.0 * x**2 * (1.0 - x) ** 2,
+        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+    )
+
+
 def write_trajectory(trajectory: Trajectory, path: str | Path) -> None:
     """Write time_s and, per joint, position, velocity and acceleration as .csv, .parquet or .npz."""
     columns = {"time_s": trajectory.time}

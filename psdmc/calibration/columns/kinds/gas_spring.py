@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.calibration.columns.effect import Effect, Kind, Spring, Unknown, flag, push, rub, stretch
-from psdmc.calibration.columns.ways import anchored_way
+from psdmc.calibration.columns.effect import (
+    Effect,
+    Kind,
+    Spring,
+    Unknown,
+    anchored_way,
+    flag,
+    push,
+    rub,
+    stretch,
+)
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism
 

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.calibration.columns.effect import Effect, Kind, Spring, Unknown, flag, pull, rub, stretch
-from psdmc.calibration.columns.ways import anchored_way, jointed_way
+from psdmc.calibration.columns.effect import (
+    Effect,
+    Kind,
+    Spring,
+    Unknown,
+    anchored_way,
+    flag,
+    jointed_way,
+    pull,
+    rub,
+    stretch,
+)
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.calibration.columns.effect import Effect, Kind, Spring, Unknown, joint_of, stretch
-from psdmc.calibration.columns.ways import AlongJoints
+from psdmc.calibration.columns.effect import AlongJoints, Effect, Kind, Spring, Unknown, joint_of, stretch
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism
 
