@@ -22,8 +22,7 @@ from psdmc.functions import OF_TREES, RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import Sizes
-from psdmc.recipes.packed import VALUES
-from psdmc.recipes.recipe import Recipe
+from psdmc.recipes.recipe import VALUES, Recipe
 from psdmc.robot.reference import reference
 
 RANDOM = np.random.default_rng(9)

@@ -24,7 +24,7 @@ from psdmc.program.signature import Q_GUESS, TAU, Q, Quantity, Signature, Sizes
 from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
-from psdmc.recipes.torques import pulled, with_friction, with_gravity_input
+from psdmc.recipes.torques_and_accelerations import pulled, with_friction, with_gravity_input
 from psdmc.reproducible import times
 
 Array = NDArray[np.float64]

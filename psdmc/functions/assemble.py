@@ -15,8 +15,8 @@ from psdmc.functions.passive_motion import completed
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.regions import Column, For, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, Q_GUESS, Q, Signature
+from psdmc.recipes.closed_loops import PASSIVE, closer
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.passive import PASSIVE, closer
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe
 from psdmc.robot.mechanism import Loop, NamedFrame
 

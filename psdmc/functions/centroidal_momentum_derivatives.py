@@ -11,8 +11,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_matrix
 from psdmc.functions.centroidal_momentum import INPUTS, MOMENTUM
 from psdmc.program.signature import Signature, derivative_of
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
 

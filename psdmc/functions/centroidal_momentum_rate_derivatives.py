@@ -10,8 +10,7 @@ from psdmc.dynamics.momentum_and_energy import momentum_rate_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions.centroidal_momentum_rate import INPUTS, RATE
 from psdmc.program.signature import Signature, derivative_of
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
 OUTPUTS = tuple(derivative_of(RATE, quantity) for quantity in INPUTS)

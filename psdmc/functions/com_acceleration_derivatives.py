@@ -7,8 +7,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_rate_derivatives
 from psdmc.functions.com_acceleration import ACCELERATION, INPUTS
 from psdmc.program.signature import Signature, derivative_of
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 OUTPUTS = tuple(derivative_of(ACCELERATION, quantity) for quantity in INPUTS)
 

@@ -7,8 +7,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import centroidal_momentum_derivatives
 from psdmc.functions.com_velocity import INPUTS, VELOCITY
 from psdmc.program.signature import Signature, derivative_of
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 
 def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:

@@ -13,7 +13,6 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_drift, contact_jacobian, loop_drift, loop_error, loop_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import (
     ACTIVE,
     CONTACTS,
@@ -27,7 +26,7 @@ from psdmc.recipes.contacts import (
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, torques
 from psdmc.robot.mechanism import Array
 
 KP = Quantity(

@@ -46,7 +46,7 @@ from psdmc.recipes.directions import along
 from psdmc.recipes.loops import Block, copied
 from psdmc.recipes.on_arrays import matrix
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torque_derivatives
+from psdmc.recipes.torques_and_accelerations import torque_derivatives
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 WITHOUT = constrained_forward_dynamics.RECIPE

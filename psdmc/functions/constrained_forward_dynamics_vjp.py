@@ -13,7 +13,7 @@ from psdmc.functions.constrained_forward_dynamics import ERROR, KD, KP
 from psdmc.program.signature import QD, TAU, Q
 from psdmc.recipes.contact_directions import ContactFunction
 from psdmc.recipes.recipe import Ingredients
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 
 
 def residuals(g: Ingredients, qdd: Sequence[Scalar], forces: Sequence[Scalar]) -> list[Scalar]:

@@ -6,7 +6,7 @@ from psdmc.functions import constrained_forward_dynamics_vjp
 from psdmc.program.signature import PIVOTS
 from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted, with_parameter_gradient
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
-from psdmc.recipes.regressor_rows import rows_on_arrays
+from psdmc.recipes.torques_and_accelerations import rows_on_arrays
 
 STATE = constrained_forward_dynamics_vjp.RECIPE
 """The function without the gradient by theta_b."""

@@ -10,8 +10,7 @@ from psdmc.dynamics.constraints import contact_drift
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
 INPUTS = (Q, QD)

@@ -19,12 +19,12 @@ from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature
 from psdmc.recipes import contacts as held
+from psdmc.recipes.closed_loops import passive_rates
 from psdmc.recipes.contacts import ACTIVE, Held, held_rows, joined
-from psdmc.recipes.least_squares import least_squares
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.passive import passive_rates
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.recipes.torques import torques
+from psdmc.recipes.singular_matrices import least_squares
+from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:

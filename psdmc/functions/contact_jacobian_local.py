@@ -11,8 +11,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import contact_jacobian
 from psdmc.program.signature import Q, Signature
 from psdmc.recipes.contacts import LOCAL_ROW_WORDS
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Outputs, PlacedRobot, Recipe, on_both
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:

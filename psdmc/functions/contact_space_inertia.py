@@ -13,10 +13,10 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.functions import delassus
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import ACTIVE, CONSTRAINT_WORDS, CONTACTS, MU, Held, held_rows
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import moved_by, torques
+from psdmc.recipes.torques_and_accelerations import moved_by, torques
 
 
 def trace(g: Ingredients) -> Outputs:

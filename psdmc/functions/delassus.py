@@ -9,9 +9,9 @@ from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.solve import factorize, projected
 from psdmc.functions import contact_jacobian, loop_jacobian
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import CONSTRAINT_WORDS, joined
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX
 from psdmc.reproducible import solved, times
 
 

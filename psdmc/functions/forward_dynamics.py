@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.recipe import (
     Arrays,
     Given,
@@ -14,6 +13,7 @@ from psdmc.recipes.recipe import (
     Reference,
     RobotOnArrays,
 )
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, accelerations_and_pivots
 
 
 def trace(g: Ingredients) -> Outputs:

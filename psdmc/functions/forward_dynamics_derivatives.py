@@ -14,9 +14,8 @@ from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
 from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_of
 from psdmc.program.thin_products import Thin
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import less_friction, with_friction_slopes
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, less_friction, with_friction_slopes
 from psdmc.reproducible import inverse as inverted
 from psdmc.reproducible import times
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import DQ, DQD, DTAU, along, along_direction, solved, torque_slopes
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, accelerations
 
 
 def trace(g: Ingredients) -> Outputs:

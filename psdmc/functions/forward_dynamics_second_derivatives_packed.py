@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from psdmc.dynamics.structure import acceleration_hessian_places
 from psdmc.functions import forward_dynamics_second_derivatives
-from psdmc.recipes.packed import packed
-from psdmc.recipes.recipe import Packing
+from psdmc.recipes.recipe import Packing, packed
 
 RECIPE = packed(
     forward_dynamics_second_derivatives.RECIPE,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import (
     COTANGENT,
     COTANGENT_OF_QDD,
@@ -15,6 +14,7 @@ from psdmc.recipes.directions import (
     weighted,
 )
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, accelerations
 
 
 def trace(g: Ingredients) -> Outputs:

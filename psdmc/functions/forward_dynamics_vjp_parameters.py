@@ -5,7 +5,7 @@ from __future__ import annotations
 from psdmc.functions import forward_dynamics_vjp
 from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted, with_parameter_gradient
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
-from psdmc.recipes.regressor_rows import rows_on_arrays
+from psdmc.recipes.torques_and_accelerations import rows_on_arrays
 
 STATE = forward_dynamics_vjp.RECIPE
 """The function without the gradient by theta_b."""

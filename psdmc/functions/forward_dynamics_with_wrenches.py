@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.directions import solved
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.wrenches import (
     WRENCHES,
     jacobians_on_arrays,

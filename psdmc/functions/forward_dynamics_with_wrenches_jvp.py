@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from psdmc.functions import forward_dynamics_with_wrenches, forward_dynamics_with_wrenches_derivatives
 from psdmc.program.signature import QDD, Signature
-from psdmc.recipes.accelerations import accelerations
 from psdmc.recipes.directions import DQ, DQD, DTAU, along_direction, torque_slopes
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import accelerations
 from psdmc.recipes.wrenches import DWRENCHES, WRENCHES, along_all, wrenches_on_links
 
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from psdmc.functions import forward_dynamics_with_wrenches, forward_dynamics_with_wrenches_derivatives
 from psdmc.program.signature import Signature
-from psdmc.recipes.accelerations import accelerations
 from psdmc.recipes.directions import (
     COTANGENT,
     COTANGENT_OF_QDD,
@@ -15,6 +14,7 @@ from psdmc.recipes.directions import (
     weighted,
 )
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import accelerations
 from psdmc.recipes.wrenches import GRADIENT_WRENCHES, WRENCHES, wrenches_on_links
 
 ACCELERATIONS = forward_dynamics_with_wrenches.RECIPE

@@ -9,8 +9,7 @@ import numpy as np
 from psdmc.dynamics.kinematics import frame_accelerations
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
 INPUTS = (Q, QD, QDD)

@@ -10,8 +10,7 @@ from psdmc.dynamics.kinematics import frame_acceleration_slopes
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions.frame_acceleration import ACCELERATION, INPUTS
 from psdmc.program.signature import Signature, derivative_of
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
 OUTPUTS = tuple(derivative_of(ACCELERATION, quantity) for quantity in INPUTS)

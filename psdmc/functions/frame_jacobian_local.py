@@ -5,8 +5,7 @@ from __future__ import annotations
 from psdmc.dynamics.kinematics import local_jacobians
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.placed import PlacedRobot, on_both
-from psdmc.recipes.recipe import Arrays, Given, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 INPUTS = (Q,)
 

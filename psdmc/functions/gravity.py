@@ -15,7 +15,7 @@ from psdmc.recipes.recipe import (
     Reference,
     RobotOnArrays,
 )
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 
 
 def trace(g: Ingredients) -> Outputs:

@@ -15,7 +15,6 @@ from psdmc.dynamics.solve import factorize, inner_product
 from psdmc.functions import contact_jacobian, loop_jacobian
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, QD, Q, Quantity, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.contacts import (
     ACTIVE,
     CONTACTS,
@@ -29,6 +28,7 @@ from psdmc.recipes.contacts import (
 )
 from psdmc.recipes.directions import along
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX
 from psdmc.robot.mechanism import Array
 
 BEFORE = replace(QD, name="qd_before", means="joint rates before the impact, rad/s or m/s")

@@ -13,7 +13,7 @@ from psdmc.functions.impulse import BEFORE, RESTITUTION
 from psdmc.program.signature import Q
 from psdmc.recipes.contact_directions import ContactFunction
 from psdmc.recipes.recipe import Ingredients
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 
 
 def residuals(g: Ingredients, after: Sequence[Scalar], impulses: Sequence[Scalar]) -> list[Scalar]:

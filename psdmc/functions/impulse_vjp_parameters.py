@@ -20,7 +20,7 @@ from psdmc.recipes.directions import (
     with_parameter_gradient,
 )
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
-from psdmc.recipes.regressor_rows import rows_on_arrays
+from psdmc.recipes.torques_and_accelerations import rows_on_arrays
 from psdmc.robot.mechanism import Array
 
 STATE = impulse_vjp.RECIPE

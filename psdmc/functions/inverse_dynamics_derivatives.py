@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from psdmc.program.signature import QD, QDD, Q, Signature, jacobian_of
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torque_derivatives
+from psdmc.recipes.torques_and_accelerations import torque_derivatives
 
 
 def trace(g: Ingredients) -> Outputs:

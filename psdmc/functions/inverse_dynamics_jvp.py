@@ -7,7 +7,7 @@ from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import slopes
 from psdmc.recipes.directions import DQ, DQD, DQDD, along, along_direction
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.robot.mechanism import Array
 
 DIRECTIONS = (DQ, DQD, DQDD)

@@ -6,7 +6,7 @@ from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivative
 from psdmc.program.signature import QD, QDD, Q, Signature
 from psdmc.recipes.directions import COTANGENT, hessian_of, weighted
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import on_diagonal
+from psdmc.recipes.torques_and_accelerations import on_diagonal
 from psdmc.robot.mechanism import Array
 
 

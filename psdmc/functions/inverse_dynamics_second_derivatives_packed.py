@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from psdmc.dynamics.structure import torque_hessian_places
 from psdmc.functions import inverse_dynamics_second_derivatives
-from psdmc.recipes.packed import packed
-from psdmc.recipes.recipe import Packing
+from psdmc.recipes.recipe import Packing, packed
 
 RECIPE = packed(
     inverse_dynamics_second_derivatives.RECIPE,

@@ -7,7 +7,7 @@ from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import gradients
 from psdmc.recipes.directions import COTANGENT, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, weighted
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.robot.mechanism import Array
 
 

@@ -11,7 +11,7 @@ from psdmc.recipes.directions import (
     with_parameter_gradient,
 )
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Reference, RobotOnArrays
-from psdmc.recipes.regressor_rows import rows_on_arrays
+from psdmc.recipes.torques_and_accelerations import rows_on_arrays
 
 STATE = inverse_dynamics_vjp.RECIPE
 """The function without the gradient by theta_b."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.recipes.wrenches import (
     WRENCHES,
     wrenches_on_arrays,

@@ -6,7 +6,7 @@ from typing import Any
 
 from psdmc.functions import inverse_dynamics_with_wrenches
 from psdmc.program.signature import TAU, Signature, derivative_of
-from psdmc.recipes import torques
+from psdmc.recipes import torques_and_accelerations
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.wrenches import (
     jacobians_on_arrays,
@@ -21,7 +21,9 @@ OUTPUTS = tuple(derivative_of(TAU, quantity) for quantity in TORQUES.inputs)
 
 
 def trace(g: Ingredients) -> Outputs:
-    by_q, by_qd, by_qdd, _ = torques.torque_derivatives(g, g.inputs["qdd"], wrenches_on_links(g))
+    by_q, by_qd, by_qdd, _ = torques_and_accelerations.torque_derivatives(
+        g, g.inputs["qdd"], wrenches_on_links(g)
+    )
     by_wrenches = [[[-x for x in row] for row in rows] for rows in jacobians_transposed(g)]
     return _named(by_q, by_qd, by_qdd, by_wrenches)
 

@@ -10,11 +10,10 @@ import numpy as np
 
 from psdmc.functions import loop_jacobian, passive_motion
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
-from psdmc.recipes.closed_loops import ROW_WORDS
+from psdmc.recipes.closed_loops import ACCELERATIONS_MEAN, PASSIVE, RATES_MEAN, ROW_WORDS, motion
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.passive import ACCELERATIONS_MEAN, PASSIVE, RATES_MEAN, motion
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference

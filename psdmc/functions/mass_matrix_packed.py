@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from psdmc.dynamics.structure import mass_matrix_places
 from psdmc.functions import mass_matrix
-from psdmc.recipes.packed import packed
-from psdmc.recipes.recipe import Packing
+from psdmc.recipes.recipe import Packing, packed
 
 RECIPE = packed(
     mass_matrix.RECIPE,

@@ -17,10 +17,10 @@ from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
 from psdmc.recipes import contacts
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.pivots import inverse_and_sign
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
+from psdmc.recipes.singular_matrices import inverse_and_sign
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX
 from psdmc.robot.mechanism import Array
 
 MU = replace(contacts.MU, default=None)

@@ -9,8 +9,8 @@ import numpy as np
 
 from psdmc.functions import loop_drift, loop_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, Q, Signature
+from psdmc.recipes.closed_loops import ACCELERATIONS_MEAN, PASSIVE, RATES_MEAN, motion
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.passive import ACCELERATIONS_MEAN, PASSIVE, RATES_MEAN, motion
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 

@@ -13,7 +13,7 @@ from psdmc.recipes.recipe import (
     Reference,
     RobotOnArrays,
 )
-from psdmc.recipes.regressor_rows import rows_on_arrays, traced_rows
+from psdmc.recipes.torques_and_accelerations import rows_on_arrays, traced_rows
 
 
 def trace(g: Ingredients) -> Outputs:

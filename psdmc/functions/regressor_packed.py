@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from psdmc.dynamics.structure import regressor_places
 from psdmc.functions import regressor
-from psdmc.recipes.packed import packed
-from psdmc.recipes.recipe import Packing
+from psdmc.recipes.recipe import Packing, packed
 
 RECIPE = packed(
     regressor.RECIPE,

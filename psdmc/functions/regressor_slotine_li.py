@@ -6,7 +6,7 @@ import numpy as np
 
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.regressor_rows import rows_on_arrays, traced_rows
+from psdmc.recipes.torques_and_accelerations import rows_on_arrays, traced_rows
 
 
 def trace(g: Ingredients) -> Outputs:

@@ -8,10 +8,10 @@ from dataclasses import replace
 from psdmc.dynamics.manifold import coordinate_rates, restored
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, TAU, Q, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.robot.mechanism import Array
 
 MASS_MATRICES = MASS_MATRIX.in_blocks(

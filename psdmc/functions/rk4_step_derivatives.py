@@ -27,10 +27,9 @@ from psdmc.program.regions import (
     straight,
 )
 from psdmc.program.signature import Signature
-from psdmc.recipes.coordinate_maps import CoordinateMaps
 from psdmc.recipes.loops import Block, added, copied, diagonal, filled
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.steps import A, B, step_on_arrays, stepped
+from psdmc.recipes.steps import A, B, CoordinateMaps, step_on_arrays, stepped
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array, NamedFrame
 

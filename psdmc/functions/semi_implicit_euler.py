@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from psdmc.dynamics.manifold import integrated
 from psdmc.program.signature import QD, TAU, Q, Signature
-from psdmc.recipes.accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped, turned
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, accelerations_and_pivots
 from psdmc.robot.mechanism import Array
 
 

@@ -37,7 +37,7 @@ from psdmc.program.theta_rows import kernel_by_rows
 from psdmc.progress import Step
 from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
-from psdmc.recipes.torques import with_friction, with_gravity_input
+from psdmc.recipes.torques_and_accelerations import with_friction, with_gravity_input
 from psdmc.robot.mechanism import Mechanism, require_derivable
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS

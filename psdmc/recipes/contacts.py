@@ -17,7 +17,7 @@ from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import RobotOnArrays, columns, matrix
-from psdmc.recipes.pivots import regular
+from psdmc.recipes.singular_matrices import regular
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from psdmc.program.replay import substituted
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 

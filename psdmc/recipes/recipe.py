@@ -1,5 +1,8 @@
 """The class Recipe, which says how a generated function is computed and with what it is compared. Each file of
-psdmc/functions contains one recipe."""
+psdmc/functions contains one recipe.
+
+`on_both` writes functions of geometry and of the links' own bodies once: on symbols for a trace, on arrays for its
+reference. `packed` makes functions that return only those entries of a matrix that can differ from zero, as a vector."""
 
 from __future__ import annotations
 
@@ -24,6 +27,15 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference as Reference
 else:
     Reference = object  # for annotations alone: its module imports Pinocchio, which takes half a second
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.kinematics import AT_BASE
+from psdmc.dynamics.scalar import scale, transform
+from psdmc.program.signature import Quantity
+from psdmc.recipes.on_arrays import entries
 
 Outputs = Mapping[str, Any]
 """A scalar, or nested sequences of them, for each quantity of a signature that is stored, in the signature's order."""
@@ -228,3 +240,114 @@ class Recipe:
         if touches and signature.theta and not self.closes:
             return "for robots with closed loops, psdmc does not generate it yet"
         return None
+
+
+Rows = Sequence[Sequence[Scalar]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedRobot:
+    """The constants of a robot whose first joint frame is placed in the base frame at `root`.
+
+    solids  gives the links' own bodies about the joint frames
+    """
+
+    frames: Sequence[Frame]
+    named: Sequence[NamedFrame]
+    root: tuple[Matrix, Vector]
+    solids: Callable[[], Sequence[Body]]
+
+    @property
+    def mass(self) -> Scalar:
+        """Return the mass of all links, kg."""
+        return sum(body.mass for body in self.solids())
+
+    def in_base(self, v: Vector) -> Vector:
+        """Convert a vector from the axes that the first joint frame turns from to the base's axes."""
+        return transform(self.root[0], v)
+
+    def rows_in_base(self, rows: Rows, factor: Scalar = 1.0) -> list[list[Scalar]]:
+        """Convert the columns of a matrix likewise, three rows after three, and multiply them by a factor."""
+        columns = [
+            [x for k in range(0, len(column), 3) for x in scale(self.in_base(column[k : k + 3]), factor)]
+            for column in zip(*rows, strict=True)
+        ]
+        return [list(row) for row in zip(*columns, strict=True)]
+
+
+def on_both(
+    values: Callable[..., Outputs], inputs: Sequence[Quantity]
+) -> tuple[Callable[[Ingredients], Outputs], Callable[[RobotOnArrays, Given], Arrays]]:
+    """Return the trace and the reference of a function with these inputs. `values` computes its outputs from a PlacedRobot
+    and each input as a list."""
+
+    def trace(g: Ingredients) -> Outputs:
+        return values(
+            PlacedRobot(g.frames, g.named, g.root, g.link_bodies), *(g.inputs[q.name] for q in inputs)
+        )
+
+    def reference(robot: RobotOnArrays, given: Given) -> Arrays:
+        placed = PlacedRobot(robot.frames, robot.chain.frames, AT_BASE, lambda: robot.solids)
+        found = values(placed, *(list(given[quantity.name].T) for quantity in inputs))
+        return {name: entries(value, len(given["q"])) for name, value in found.items()}
+
+    return trace, reference
+
+
+VALUES = Quantity(
+    "values",
+    ("nonzeros",),
+    means="entries of the matrix; `CompiledRobot.pattern` returns their rows and columns",
+)
+
+
+def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packing) -> Recipe:
+    """Return the recipe of a function that returns the nonzero entries of a matrix as a vector. The function `dense`
+    computes the whole matrix."""
+    function, (matrix,) = dense.signature, dense.signature.outputs
+
+    def reference(robot: RobotOnArrays, given: Given) -> Arrays:
+        rows, columns = _indices(packing, robot)
+        return {VALUES.name: dense.reference(robot, given)[matrix.name][:, rows, columns]}
+
+    return replace(
+        dense,
+        signature=Signature(
+            f"{dense.name}_packed",
+            order,
+            meaning,
+            function.inputs,
+            (VALUES,),
+            theta=function.theta,
+            factorises=function.factorises,
+            calls=function.calls,
+            summary=summary,
+            weighs=function.weighs,
+        ),
+        title=f"{dense.title}, packed",
+        reference=reference,
+        starts=None,
+        polynomials=None,
+        in_limbs=False,
+        default=False,
+        benched=False,
+        packs=packing,
+    )
+
+
+def unpacked(packing: Packing, dense: Recipe, robot: RobotOnArrays, values: Array) -> Arrays:
+    """Return the whole matrices that `dense` would return, from the vectors (k, nonzeros) of their nonzero entries, for
+    k states."""
+    (matrix,) = dense.signature.outputs
+    lengths = {"nv": robot.nv, "nxa": 3 * robot.nv, "nxu": 3 * robot.nv, "l": robot.lift.shape[1]}
+    found = np.zeros((len(values), *(lengths[axis] for axis in matrix.axes)))
+    rows, columns = _indices(packing, robot)
+    found[:, rows, columns] = values
+    if packing.is_triangle:
+        found[:, columns, rows] = values
+    return {matrix.name: found}
+
+
+def _indices(packing: Packing, robot: RobotOnArrays) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    rows, columns = np.array(packing.places(robot.chain, robot.lift), dtype=np.intp).reshape(-1, 2).T
+    return rows, columns

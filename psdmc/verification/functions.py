@@ -17,8 +17,7 @@ from psdmc.model.parameter_checks import lack_of_standard_parameters
 from psdmc.model.random_states import near_closed, on_joints
 from psdmc.program.signature import Q_GUESS, TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.packed import VALUES, unpacked
-from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.recipes.recipe import VALUES, Needs, Recipe, unpacked
 from psdmc.reproducible import in_any_order
 from psdmc.robot.mechanism import Array
 from psdmc.robot.reference import OnCoordinates

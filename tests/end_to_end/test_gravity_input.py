@@ -31,7 +31,7 @@ from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import QDD, TAU, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.torques import with_gravity_input
+from psdmc.recipes.torques_and_accelerations import with_gravity_input
 from psdmc.robot.load import load_robot
 from psdmc.robot.reference import Reference, reference
 from psdmc.toolchain.build_package import build_package

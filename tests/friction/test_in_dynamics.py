@@ -36,7 +36,7 @@ from psdmc.program.interpret import interpret
 from psdmc.program.signature import TAU, Sizes
 from psdmc.recipes.directions import COTANGENT
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.torques import with_friction
+from psdmc.recipes.torques_and_accelerations import with_friction
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import load_robot
 from psdmc.robot.reference import Reference, reference

@@ -23,8 +23,7 @@ from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.packed import VALUES
-from psdmc.recipes.recipe import Recipe
+from psdmc.recipes.recipe import VALUES, Recipe
 from psdmc.robot.reference import Reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of

@@ -19,7 +19,7 @@ from psdmc.dynamics.frames import frames_of
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.model.random_states import near_closed
-from psdmc.recipes.passive import closer
+from psdmc.recipes.closed_loops import closer
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.verification.check import with_passive_joints

@@ -18,7 +18,7 @@ from psdmc.backends.info import EmitOptions, package_info
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
 from psdmc.lower.kernels import lower
-from psdmc.recipes.least_squares import least_squares
+from psdmc.recipes.singular_matrices import least_squares
 
 NAME = "contact_inverse_dynamics"
 ROUNDING = {"float64": 2.2e-16, "float32": 1.2e-7}

@@ -25,7 +25,7 @@ from psdmc.program.operations import Op
 from psdmc.program.signature import QD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients
 from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.robot.coordinates import Coordinate
 
 FUNCTIONS = [name for name, recipe in RECIPES.items() if not recipe.packs]

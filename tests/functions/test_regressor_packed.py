@@ -16,7 +16,7 @@ import psdmc
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
-from psdmc.recipes.packed import unpacked
+from psdmc.recipes.recipe import unpacked
 from psdmc.toolchain.call import CompiledRobot
 
 COUNT = 9

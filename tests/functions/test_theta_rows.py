@@ -27,7 +27,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import OF_ROWS, Signature
 from psdmc.program.theta_rows import THETA_ROWS
-from psdmc.recipes.packed import VALUES
+from psdmc.recipes.recipe import VALUES
 from psdmc.robot.reference import Reference, reference
 from psdmc.toolchain.build_package import build_package, checks_of
 from psdmc.toolchain.call import CompiledRobot

@@ -24,10 +24,8 @@ from psdmc.lower.search import Search
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature, Sizes
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
-from psdmc.recipes.regressor_rows import traced_rows
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, torques, traced_rows
 
 STIFFNESS = 300.0
 """N/m, of a spring between the base and the tip."""

@@ -1,5 +1,6 @@
-"""Records the Newton-Euler algorithm (joint torques) and its derivatives as code, for all generated functions that need
-it. The torques contain joint friction if a package is generated with friction in the dynamics."""
+"""Records inverse dynamics (joint torques), its derivatives and the regressor, and forward dynamics (accelerations) as code,
+for all generated functions that need them. The torques contain joint friction if a package is generated with friction in
+the dynamics."""
 
 from __future__ import annotations
 
@@ -7,14 +8,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import add, sub
 
+import numpy as np
+
+from psdmc.dynamics.arrow import Arrow, eliminated
+from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.coordinates import flat, joints_of_rates, positions
 from psdmc.dynamics.derivatives import Derivatives, Rows, inverse_dynamics_derivatives
+from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.frames import part_of, with_carriers
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
+from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar, Vector, dot
 from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.gravity_input import GRAVITY, pass_gravity_on, takes_gravity
+from psdmc.recipes.on_arrays import columns
 from psdmc.recipes.recipe import Given, Ingredients, Recipe, RobotOnArrays
+from psdmc.reproducible import times
+from psdmc.robot.mechanism import Array
 
 
 def torques(
@@ -149,3 +160,81 @@ def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
         inputs={**g.inputs, "q": flat(own), "qd": [g.inputs["qd"][k] for k in rates]},
     )
     return part, rates
+
+
+MASS_MATRIX = SymmetricMatrix(
+    "the mass matrix",
+    Structure.LIMBS,
+    ("nv",),
+    number="the number of the joint, from 0, at which the mass matrix is not positive definite",
+    failure="the mass matrix is not positive definite in a state",
+    unit="J s^2",
+    powers=(-2,),
+)
+"""M(q), which functions solve or invert."""
+
+
+def accelerations(
+    g: Ingredients, tau: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> tuple[list[Scalar], Arrow]:
+    """Return n accelerations M^-1 (tau - h), and the factors of M. The bias h contains external wrenches on the links.
+
+    M is factorized before h is computed. The divisions of the factorization must wait for each other, and the processor
+    computes h meanwhile.
+    """
+    factors = eliminated(g.frames, mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
+    bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration, external=external)
+    return factors.solved([given - h for given, h in zip(tau, bias, strict=True)]), factors
+
+
+def accelerations_and_pivots(
+    g: Ingredients, tau: Sequence[Scalar], external: Mapping[int, Wrench] = NO_WRENCHES
+) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
+    """Return the nv joint accelerations M^-1 (tau - h), and the nv pivots (divisors in the factorization) of the mass
+    matrix M. Here h is the torque at zero acceleration.
+
+    `choices` selects the algorithm: factorization of M, or articulated bodies.
+    """
+    if not g.choices.articulated:
+        found, factors = accelerations(g, tau, external)
+        return found, factors.pivots
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    moving = less_friction(g, tau)
+    return forward_dynamics(
+        g.frames, g.bodies, g.drives, q, qd, moving, g.base_acceleration, g.choices, external
+    )
+
+
+def traced_rows(
+    g: Ingredients, qdd: Sequence[Scalar], qd_r: Sequence[Scalar] | None = None
+) -> list[list[Scalar]]:
+    """Return the regressor, n rows of l entries: the derivatives of joint torques by the base parameters theta_b. It is
+    recorded as code.
+
+    The torques are M qdd + C(q, qd) qd_r + g, with the Coriolis matrix C and the torque g of gravity. Without qd_r, C
+    multiplies qd.
+    """
+    needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base_acceleration, qd_r)
+    weights = [[(j, x) for j, x in enumerate(column) if x] for column in g.lift.T.tolist()]
+    return [[_entry(column, row) for column in weights] for row in found]
+
+
+def _entry(weights: Sequence[tuple[int, float]], row: dict[int, Scalar]) -> Scalar:
+    total: Scalar = 0.0
+    for j, weight in weights:
+        if j in row:
+            total = total + row[j] * weight
+    return total
+
+
+def rows_on_arrays(robot: RobotOnArrays, q: Array, qd: Array, qdd: Array, qd_r: Array | None = None) -> Array:
+    """Return the regressor (k, n, l) for k states, computed in NumPy. It has the entries of `traced_rows`."""
+    wanted = np.flatnonzero(robot.lift.any(axis=1)).tolist()
+    places = [joint.link_frame for joint in robot.chain.joints]
+    states = (list(q.T), list(qd.T), list(qdd.T))
+    rates = None if qd_r is None else list(qd_r.T)
+    rows = regressor(robot.frames, places, frozenset(wanted), *states, robot.base_acceleration, rates)
+    full = np.stack([columns([row.get(c, 0.0) for c in wanted], len(q)) for row in rows], axis=1)
+    return np.asarray(times(full, robot.lift[wanted]))

@@ -1,8 +1,8 @@
-"""Least-squares solutions of minimal norm, for matrices of any rank.
+"""Tests whether matrices in generated code are singular at a state, from pivots (divisors of a factorization) and from
+their inverses. Computes least-squares solutions of minimal norm, for matrices of any rank.
 
 Source: Bjorck 1996, Numerical Methods for Least Squares Problems, sections 2.4 (modified Gram-Schmidt) and 2.7 (complete
-orthogonal decomposition).
-"""
+orthogonal decomposition)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,38 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import inner_product
+from psdmc.dynamics.solve import factorize, inner_product, inverse
 from psdmc.program.operations import Op
+
+LOST = 64.0
+"""A matrix A is singular if the share of a diagonal entry that its other rows do not explain, 1 / (A_kk (A^-1)_kk), is below
+so many roundings: 7.1e-15 in float64, 3.8e-6 in float32. That of arms with too few joints is up to 10 roundings."""
+
+
+def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], Scalar]:
+    """Return the inverse of a symmetric matrix, and a sign: 1 if the matrix is positive definite, else -1. A matrix
+    that is singular within rounding has the sign -1, too.
+
+    By rounding, the pivots (divisors of the factorization) of a singular matrix can have any sign. So the test also
+    uses the size of the inverse. The comparison x < x + 1 is false if x is so large that the 1 is lost in rounding. All
+    comparisons with NaN are false.
+    """
+    factors = factorize(rows)
+    found, sign = inverse(factors), 1.0
+    for k, pivot in enumerate(factors.pivots):
+        sign = regular(sign, pivot, rows[k][k], found[k][k])
+    return found, sign
+
+
+def regular(sign: Scalar, pivot: Scalar, entry: Scalar, inverse_entry: Scalar) -> Scalar:
+    """Return `sign` unchanged if a matrix passes the test of one row, else -1. The test fails if the pivot (divisor of
+    the factorization) is not positive, or if the matrix is singular within rounding.
+
+    `entry` is the diagonal entry of the matrix, `inverse_entry` that of the inverse.
+    """
+    x = LOST * (entry * inverse_entry)
+    return Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)
+
 
 Row = list[Scalar]
 
@@ -56,15 +86,15 @@ def least_squares(rows: Sequence[Row], right: Sequence[Scalar], shift: Scalar) -
     columns = [[0.0] * j + [row[j] for row in lower[j:]] for j in range(count)]
     down = _orthogonal(columns[::-1], [1.0] * count, across.kept[::-1])
     rest, y = list(right), []
-    for vector, inverse in zip(down.basis, down.inverses, strict=True):
-        y.append(inner_product(vector, rest) * inverse)
+    for vector, factor in zip(down.basis, down.inverses, strict=True):
+        y.append(inner_product(vector, rest) * factor)
         rest = _less(rest, y[-1], vector)
     for k in reversed(range(count)):
         for j, share in enumerate(down.shares[k]):
             y[j] = y[j] - share * y[k]
     x: Row = [0.0] * length
-    for vector, inverse, value in zip(reversed(across.basis), reversed(across.inverses), y, strict=True):
-        x = [entry + value * inverse * part for entry, part in zip(x, vector[:length], strict=True)]
+    for vector, factor, value in zip(reversed(across.basis), reversed(across.inverses), y, strict=True):
+        x = [entry + value * factor * part for entry, part in zip(x, vector[:length], strict=True)]
     return x
 
 
@@ -73,8 +103,8 @@ def _orthogonal(vectors: Sequence[Row], weights: Sequence[Scalar], kept: Row | N
     found = _Orthogonal([], [], [], [])
     for k, vector in enumerate(vectors):
         own, shares = list(vector), []
-        for other, inverse in zip(found.basis, found.inverses, strict=True):
-            shares.append(_weighted(weights, other, own) * inverse)
+        for other, factor in zip(found.basis, found.inverses, strict=True):
+            shares.append(_weighted(weights, other, own) * factor)
             own = _less(own, shares[-1], other)
         size = _weighted(weights, own, own)
         if kept is None:
