@@ -37,7 +37,7 @@ from psdmc.model.random_states import states_of
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Array, Placement
-from psdmc.target.flags import GCC_ONLY
+from psdmc.target.target import GCC_ONLY
 
 CONTACTS = {
     "hyq": ("lf_foot", "rf_foot", "lh_foot", "rh_foot"),

@@ -29,22 +29,20 @@ from psdmc.dynamics.spatial import body_from_parameters
 from psdmc.functions import RECIPES
 from psdmc.lower.expanded import lowering as expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
-from psdmc.lower.geometry import all_feet
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
-from psdmc.lower.scoring import SINGLE
-from psdmc.lower.search import Search
+from psdmc.lower.search import Search, all_feet
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.program.cost import cost
+from psdmc.program.cost import SINGLE, cost
 from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.passes.fuse_sums import cycles, fuse_sums
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import LAST, LONGEST, ROUND, Pass, optimize
 from psdmc.program.program import Op, Program, Slot
+from psdmc.program.slopes import TurnedPairs
 from psdmc.program.trace import Tracer
-from psdmc.program.turned_pairs import TurnedPairs
 from psdmc.robot.mechanism import Mechanism
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
 
 LAST_FOR_ONE_STATE: tuple[Pass, ...] = (fuse_sums, schedule)
 TEN = slice(0, 10)

@@ -29,8 +29,15 @@ from psdmc.backends.package_folder import (
     write_package,
 )
 from psdmc.backends.protocol import back_end
-from psdmc.compile_request import CompileRequest
-from psdmc.emission import EmitRequest, cuda_robot, emission, emit_options, functions_of, listed
+from psdmc.emission import (
+    CompileRequest,
+    EmitRequest,
+    cuda_robot,
+    emission,
+    emit_options,
+    functions_of,
+    listed,
+)
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
@@ -39,7 +46,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.progress import Progress, silent
 from psdmc.robot.load_options import DEFAULT_SNAP
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
 from psdmc.toolchain.compile import lowered_once
 
 

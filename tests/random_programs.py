@@ -7,9 +7,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from psdmc.program.check import check
 from psdmc.program.interpret import interpret
-from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.program import Instr, Op, Program, Slot, check
 
 SEEDS = range(30)
 _SIZES = {"tau": 3}

@@ -9,8 +9,8 @@ from weakref import ref
 import pytest
 
 from psdmc.garbage import RARELY, collecting_rarely
-from psdmc.program.dimensioned import DimensionedTracer
-from psdmc.program.limb_sums import LimbSums
+from psdmc.lower.dimension_check import DimensionedTracer
+from psdmc.program.limb_program import LimbSums
 from psdmc.program.trace import Tracer
 
 

@@ -57,7 +57,7 @@ DECISIONS = {
     "functions/frame_acceleration_derivatives.py": "Pinocchio's side of a comparison",
     "functions/frame_velocity_derivatives.py": "Pinocchio's side of a comparison",
     "lower/carriers.py": "thresholds with margins of decades",
-    "lower/carrier_columns.py": "scales with margins of decades, and an inverse of zeros and ones",
+    "lower/link_parameters.py": "scales with margins of decades, and an inverse of zeros and ones",
     "lower/reframe.py": "thresholds with margins of decades",
     "lower/accuracy.py": "errors that are compared with limits",
     "backends/reference_states.py": "condition numbers, which order states after rounding",

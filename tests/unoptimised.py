@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from psdmc.backends.c.package import PackageView
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 from psdmc.target.target import Target
 from psdmc.toolchain import compile as toolchain
 from psdmc.toolchain.compiler_command import Compiler, find_compiler

@@ -9,7 +9,7 @@ from itertools import accumulate
 from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.program.signature import Signature
 from psdmc.robot.mechanism import BASE_FRAME, POINT, ROW_NAMES
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 from psdmc.target.target import Target
 
 

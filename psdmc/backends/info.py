@@ -18,9 +18,8 @@ from psdmc.program.signature import Sizes
 from psdmc.robot.coordinates import units_of
 from psdmc.robot.inertia import six_of
 from psdmc.robot.mechanism import BASE_FRAME, BODY_PARAMETERS, PARAMETERS_PER_LINK, POINT, Array, Mechanism
-from psdmc.target.native import NATIVE
-from psdmc.target.target import Real, Target, Trig
-from psdmc.target.vectors import LANE_BLOCK_BYTES
+from psdmc.target.presets import NATIVE
+from psdmc.target.target import LANE_BLOCK_BYTES, Real, Target, Trig
 from psdmc.version import psdmc_version
 
 

@@ -44,7 +44,7 @@ from psdmc.files import (
     write_together,
 )
 from psdmc.robot.limits import shown
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 
 
 class Changes(list[str]):

@@ -13,15 +13,14 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.friction.joints import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
 from psdmc.model.bodies import body_parameters, load_parameters
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import for_every_gravity
 from psdmc.model.random_states import near_closed, on_joints, random_parameters
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.kernel import GRAVITY, THETA_ROWS, THETAS, by_rows
 from psdmc.program.signature import Q_GUESS, TAU, Q, Quantity, Signature, Sizes
-from psdmc.program.theta_rows import THETA_ROWS, THETAS, by_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.recipes.torques_and_accelerations import pulled, with_friction, with_gravity_input

@@ -20,7 +20,7 @@ from psdmc.calibration.validation import opened_logs
 from psdmc.calibration.verdict.delivered import Delivered, delivered, linear_torque, predicted_rows
 from psdmc.errors import InputError
 from psdmc.friction.law import At
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 from psdmc.model import evaluate
 from psdmc.model.calibrated import LINEAR, Prediction, Remark
 from psdmc.model.dynamics_model import DynamicsModel

@@ -17,8 +17,7 @@ from psdmc.cli.arguments import check_output, names
 from psdmc.cli.console import quoted, say_next, say_next_line, steps
 from psdmc.cli.pipeline import CHECK_FAILED_STATUS, ModelFile
 from psdmc.errors import InputError
-from psdmc.target.native import NATIVE
-from psdmc.target.presets import PRESETS
+from psdmc.target.presets import NATIVE, PRESETS
 
 if TYPE_CHECKING:
     from psdmc.cli.tables import Table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from psdmc.errors import ToolchainError
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 from psdmc.target.target import Real, Target, Trig
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.kernel import GRAVITY
 from psdmc.program.signature import TAU, Signature
 
 Array = Any

@@ -35,9 +35,8 @@ from psdmc.functions import SIGNATURES, no_function
 from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.kernel import GRAVITY, THETA_ROWS
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
-from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.call_arguments import bound_arguments

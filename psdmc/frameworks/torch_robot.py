@@ -34,10 +34,9 @@ from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.model.parameter_checks import for_every_gravity
-from psdmc.program.gravity_input import GRAVITY, takes_gravity
+from psdmc.program.kernel import GRAVITY, THETA_ROWS, takes_gravity
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
-from psdmc.program.theta_rows import THETA_ROWS
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.call_arguments import with_gravity

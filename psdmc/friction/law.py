@@ -1,4 +1,5 @@
-"""Classes that describe a friction law: its name, the values that are fitted for each joint, and its torque."""
+"""A friction law is described by its name, the values that are fitted for each joint, and its torque, which the elementary
+functions below compute."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.errors import InputError
+from psdmc.program.operations import Op
 
 Scalar = Any
 """A float, an array of states, or a symbol that records what is done to it."""
@@ -302,3 +304,43 @@ def _number(text: str) -> float | None:
     except ValueError:
         return None
     return found if math.isfinite(found) else None
+
+
+# Elementary functions for the formulas of laws: of floats, arrays with one value per state, or symbols
+
+
+def _function(op: Op, of_floats: Callable[..., Any]) -> Callable[..., Scalar]:
+    """An operation; of plain floats the standard library's, which is faster where a simulation calls it once a step."""
+
+    def function(*args: Scalar) -> Scalar:
+        return (of_floats if all(type(x) is float for x in args) else op)(*args)
+
+    return function
+
+
+absolute = _function(Op.ABS, abs)
+exp = _function(Op.EXP, math.exp)
+tanh = _function(Op.TANH, math.tanh)
+sin = _function(Op.SIN, math.sin)
+cos = _function(Op.COS, math.cos)
+sqrt = _function(Op.SQRT, math.sqrt)
+larger = _function(Op.MAX, max)
+smaller = _function(Op.MIN, min)
+select = _function(Op.SELECT, lambda a, b, x, y: x if a < b else y)
+"""select(a, b, x, y): x where a < b, else y."""
+
+_PLAIN: dict[float, Callable[[Scalar], Scalar]] = {
+    0.5: sqrt,
+    1.0: lambda x: x,
+    1.5: lambda x: x * sqrt(x),
+    2.0: lambda x: x * x,
+}
+
+
+def power(x: Scalar, exponent: Scalar) -> Scalar:
+    """Return x to the power `exponent`, for x that is not negative."""
+    plain = _PLAIN.get(exponent) if type(exponent) is float else None
+    return _power(x, exponent) if plain is None else plain(x)
+
+
+_power = _function(Op.POW, math.pow)

@@ -1,12 +1,15 @@
-"""Functions that find the friction term for a name in files and options, such as 'viscous^0.5'."""
+"""Functions that find the friction term for a name in files and options, such as 'viscous^0.5'. Of the law with a state
+they make the PROGRAMs (lists of operations) of one joint."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from psdmc.friction.law import Law, Term
+from psdmc.friction.law import At, Law, Term
 from psdmc.friction.laws import LAWS
+from psdmc.program.program import Program, Slot
+from psdmc.program.trace import Tracer
 
 WORDS = tuple(law for law in LAWS.values() if law.word)
 """Laws that are terms of every joint: words of --friction."""
@@ -109,3 +112,32 @@ def with_present_names(
         else row
         for row in rows
     ]
+
+
+(STATE_LAW,) = WITH_STATE.values()
+"""The one law with a state: what the friction runs of a campaign are fitted with."""
+
+
+def state_programs(law: Law) -> dict[str, tuple[Program, tuple[str, ...]]]:
+    """Return the PROGRAMs (lists of operations) 'step', 'pieces' and 'torque' of a friction law, by name. Each comes
+    with the names of its inputs, apart from the law's fitted values p.
+
+    'step' computes the next state, 'pieces' the number of additional steps, 'torque' the friction torque. Each PROGRAM
+    has one output, `out`.
+    """
+    state = law.state
+    assert state is not None
+    return {
+        "step": _traced(law, state.step, ("v0", "v1", "z", "dt")),
+        "pieces": _traced(law, state.pieces, ("v0", "v1")),
+        "torque": _traced(law, lambda p, v, z: law.torque(p, At(v=v, z=z)), ("v", "z")),
+    }
+
+
+def _traced(
+    law: Law, function: Callable[..., Any], names: tuple[str, ...]
+) -> tuple[Program, tuple[str, ...]]:
+    tracer = Tracer()
+    p = tracer.symbols("p", len(law.values))
+    value = function(p, *(tracer.symbol(Slot(name, 0)) for name in names))
+    return tracer.finish([(Slot("out", 0), value)]), names

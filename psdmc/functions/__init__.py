@@ -9,8 +9,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from psdmc.errors import InternalError
+from psdmc.program.kernel import THETA_ROWS, by_rows
 from psdmc.program.signature import in_order
-from psdmc.program.theta_rows import THETA_ROWS, by_rows
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.robot.mechanism import Mechanism
 

@@ -12,9 +12,8 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import loop_error, loop_jacobian
 from psdmc.functions.passive_motion import completed
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.regions import Column, For, Reader, Regions, straight
-from psdmc.program.signature import PIVOTS, Q_GUESS, Q, Signature
+from psdmc.program.signature import PIVOTS, Q_GUESS, Q, Signature, Structure, SymmetricMatrix
 from psdmc.recipes.closed_loops import PASSIVE, closer
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe

@@ -15,9 +15,8 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import inner_product
 from psdmc.functions import contact_jacobian, loop_jacobian
 from psdmc.functions.constrained_forward_dynamics import FORCES, OF_LOOPS
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
-from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature
+from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, Structure, SymmetricMatrix
 from psdmc.recipes import contacts as held
 from psdmc.recipes.closed_loops import passive_rates
 from psdmc.recipes.contacts import ACTIVE, Held, held_rows, joined

@@ -11,9 +11,8 @@ from psdmc.dynamics.frames import has_floating_base
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
-from psdmc.program.products import Product
+from psdmc.program.products import Product, Thin
 from psdmc.program.signature import QD, QDD, TAU, THIN, Q, Signature, jacobian_of
-from psdmc.program.thin_products import Thin
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques_and_accelerations import MASS_MATRIX, less_friction, with_friction_slopes
 from psdmc.reproducible import inverse as inverted

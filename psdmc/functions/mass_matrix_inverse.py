@@ -8,8 +8,8 @@ from psdmc import reproducible
 from psdmc.dynamics.arrow import any_limbs, eliminated
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.solve import inverse
+from psdmc.program.products import Thin
 from psdmc.program.signature import THIN, Q, Quantity, Signature
-from psdmc.program.thin_products import Thin
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques_and_accelerations import MASS_MATRIX
 

@@ -13,9 +13,8 @@ from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.kinematics import frame_jacobians
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, projected
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
-from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
+from psdmc.program.signature import PIVOTS, Q, Quantity, Signature, Structure, SymmetricMatrix
 from psdmc.recipes import contacts
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference

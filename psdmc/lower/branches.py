@@ -14,11 +14,13 @@ from functools import lru_cache
 
 from psdmc.dynamics.frames import BASE, Frame, part_of, with_carriers
 from psdmc.lower.factored import Arrangement, RobotConstants
-from psdmc.lower.geometry import LARGE
 from psdmc.lower.reframe import Reframed
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.limbs import Limbs
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+
+LARGE = 10
+"""Joints. Each trial of a larger robot takes longer, so that fewer are made, and less of what they can change is tried."""
 
 MANY = 20
 """Joints of a robot with parameters at run time from which on branches are traced first. What an exchange changes in how all

@@ -1,15 +1,14 @@
 """A check that a generated function adds no unlike quantities, such as a mass and a length.
 
-The function is traced (recorded on symbols) once more, with symbols that have dimensions (program/dimensioned.py). Each
-length, mass and so on of the robot is then an input with its dimension, not a constant. Otherwise constants of
-different dimensions could be combined to one number. The search uses traces without dimensions, so the check does not
-slow it down.
+The function is traced (recorded on symbols) once more, with symbols that have dimensions. Each length, mass and so
+on of the robot is then an input with its dimension, not a constant. Otherwise constants of different dimensions could
+be combined to one number. The search uses traces without dimensions, so the check does not slow it down.
 """
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -21,22 +20,25 @@ from psdmc.dynamics.frames import Follows, Frame
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.spatial import Body
 from psdmc.errors import InputError
-from psdmc.lower.factored import RobotConstants, stored_entries
+from psdmc.lower.factored import STANDARD, RobotConstants, dimensions_of_traced, own_axes, stored_entries
 from psdmc.lower.reframe import Reframed, placed_loops
-from psdmc.lower.units import STANDARD, dimensions_of_traced, own_axes
-from psdmc.program.dimensioned import DimensionedTracer, UnlikeArguments
 from psdmc.program.dimensions import (
     ACCELERATION,
     INERTIA,
     LENGTH,
     MASS,
     MOMENT,
+    NUMBER,
     Dimension,
+    Known,
+    Unlike,
     dimension_of,
     in_words,
+    raised,
     times,
 )
-from psdmc.program.program import Slot
+from psdmc.program.program import Op, Slot
+from psdmc.program.trace import Constant, Step, Symbol, Tracer, arguments_of
 from psdmc.recipes.recipe import ByTheta, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Placement
 
@@ -197,3 +199,98 @@ def _theta_dimensions(lift: Array, frames: Sequence[Frame]) -> tuple[list[Dimens
         for name, each in enumerate(STANDARD)
     ]
     return [standard[row] for row in (lift != 0).argmax(axis=0).tolist()], standard
+
+
+# The tracer whose values have dimensions
+
+
+_WORDS = {Op.ADD: "sum", Op.SUB: "difference", Op.MIN: "minimum", Op.MAX: "maximum", Op.SELECT: "choice"}
+
+_append = list.append
+
+
+class UnlikeArguments(Exception):
+    """This error says that an operation has arguments of unlike dimensions. The message has the operation and the units
+    of the arguments."""
+
+
+class DimensionedTracer(Tracer):
+    """A tracer (recorder of operations on symbols) that checks the physical dimensions of each operation. Symbols
+    append each operation to the list `steps`, and this list makes the check."""
+
+    __slots__ = ("_own",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.steps = self._own = _Steps(self.constants)
+
+    def measured(self, slot: Slot, dimension: Known) -> Symbol:
+        """One input of this dimension."""
+        self._own.given[slot] = dimension
+        return self.symbol(slot)
+
+    def dimension(self, value: Symbol | Constant) -> Known:
+        """The dimension of a value."""
+        if isinstance(value, Symbol):
+            return self._own.dimension(value.index)
+        return None if value == 0 else NUMBER
+
+    def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
+        return [self.measured(Slot(vector, i), self.dimension(value)) for i, value in enumerate(values)]
+
+
+class _Steps(list[Step]):
+    """Steps, and beside them the dimensions of their values.
+
+    kinds    by step, the number of its dimension in
+    seen     all dimensions that there are, and their numbers in
+    number   the opposite way
+    results  by an operation and the numbers of its two arguments that of its value: most steps are found here
+    """
+
+    __slots__ = ("constants", "given", "kinds", "number", "results", "seen")
+
+    def __init__(self, constants: Mapping[int, Constant]) -> None:
+        super().__init__()
+        self.constants = constants
+        self.given: dict[Slot, Known] = {}
+        self.kinds: list[int] = []
+        self.seen: list[Known] = []
+        self.number: dict[Known, int] = {}
+        self.results: dict[tuple[Op, int, int], int] = {}
+
+    def dimension(self, index: int) -> Known:
+        return self.seen[self.kinds[index]]
+
+    def append(self, step: Step) -> None:
+        op, a, b = step
+        kinds = self.kinds
+        kind = None if b is None else self.results.get((op, kinds[a], kinds[b]))
+        kinds.append(self._kind(step) if kind is None else kind)
+        _append(self, step)
+
+    def _kind(self, step: Step) -> int:
+        op, a, b = step
+        dimension = self._dimension(step)
+        kind = self.number.setdefault(dimension, len(self.seen))
+        if kind == len(self.seen):
+            self.seen.append(dimension)
+        if b is not None and op is not Op.POW:
+            self.results[op, self.kinds[a], self.kinds[b]] = kind
+        return kind
+
+    def _dimension(self, step: Step) -> Known:
+        op, a, b = step
+        if op is Op.LOAD:
+            return self.given[a]
+        if op is Op.CONST:
+            return NUMBER if a else None
+        own = [self.dimension(argument) for argument in arguments_of(step)]
+        try:
+            return raised(own[0], own[1], self._value(b)) if op is Op.POW else op.operation.dimension(*own)
+        except Unlike as unlike:
+            raise UnlikeArguments(f"{_WORDS.get(op, op.value)} of {unlike}") from None
+
+    def _value(self, exponent: int) -> float | None:
+        value = self.constants.get(exponent)
+        return value if isinstance(value, float) else None

@@ -10,7 +10,7 @@ from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
-from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.friction.joints import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, near_names, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
@@ -18,29 +18,25 @@ from psdmc.lower.dimension_check import check_dimensions
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
-from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbArrangement, LimbSearch
 from psdmc.lower.limbs import have_contacts_alike
-from psdmc.lower.loops import in_loops
-from psdmc.lower.packed import packed
 from psdmc.lower.reframe import Reframed
-from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
-from psdmc.lower.search import Search
+from psdmc.lower.search import Geometry, Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import for_every_gravity
-from psdmc.program.kernel import Kernel
+from psdmc.program.cost import Scoring, for_lanes, for_one_state
+from psdmc.program.kernel import Kernel, kernel_by_rows, packed
 from psdmc.program.pipeline import ordered, shortened
-from psdmc.program.products import written_out
+from psdmc.program.products import in_loops, written_out
 from psdmc.program.program import Program
 from psdmc.program.signature import Signature
-from psdmc.program.theta_rows import kernel_by_rows
 from psdmc.progress import Step
 from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.recipes.torques_and_accelerations import with_friction, with_gravity_input
 from psdmc.robot.mechanism import Mechanism, require_derivable
-from psdmc.target.costs import Costs
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
+from psdmc.target.target import Costs
 
 Lowering = Literal["auto", "expanded", "factored"]
 

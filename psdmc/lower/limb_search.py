@@ -21,7 +21,6 @@ from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.branches import limbs_in
-from psdmc.lower.descent import ROUNDING
 from psdmc.lower.factored import Arrangement, RobotConstants
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limbs import (
@@ -33,19 +32,18 @@ from psdmc.lower.limbs import (
     trace_limbs,
 )
 from psdmc.lower.reframe import Reframed
-from psdmc.lower.scoring import for_lanes, for_one_state
-from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, Search, distinct
-from psdmc.program.limb_cost import StageCost, stage_costs
+from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, ROUNDING, Search, distinct
+from psdmc.program.cost import for_lanes, for_one_state
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
-from psdmc.program.limb_stages import staged
+from psdmc.program.limb_stages import StageCost, stage_costs, staged
 from psdmc.program.passes.free_registers import free_registers
 from psdmc.program.pipeline import ordered, ordered_for_limbs, shortened
+from psdmc.program.products import AT_ONCE
 from psdmc.program.program import Program
-from psdmc.program.thin_products import AT_ONCE
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.limbs import Limbs
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
-from psdmc.target.costs import Costs
+from psdmc.target.target import Costs
 
 WIDTHS = (2, 4, 8)
 """Lanes of the vectors that generated code may have for limbs."""

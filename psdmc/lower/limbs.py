@@ -20,12 +20,11 @@ from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in
 from psdmc.lower.limb_frames import Place, merged_contacts, one_limb, places
 from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
-from psdmc.program.limb_cost import StageCost, traced_stage_costs
-from psdmc.program.limb_program import LimbGroup, Spread
-from psdmc.program.limb_sums import LimbSums
+from psdmc.program.limb_program import LimbGroup, LimbSums, Spread
+from psdmc.program.limb_stages import StageCost, traced_stage_costs
+from psdmc.program.products import Shares, ThinProducts
 from psdmc.program.program import Program, Slot
 from psdmc.program.signature import THIN, Quantity, Signature
-from psdmc.program.thin_products import Shares, ThinProducts
 from psdmc.program.trace import Symbol, Tracer
 from psdmc.recipes.recipe import ByTheta, Recipe
 from psdmc.robot.limbs import Limbs

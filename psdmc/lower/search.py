@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import astuple, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import islice, product
 from operator import ne
 
@@ -22,22 +22,76 @@ from psdmc.dynamics.coordinates import any_follows
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
-from psdmc.lower.branches import Branches
-from psdmc.lower.carrier_columns import every_parameter
+from psdmc.lower.branches import LARGE, Branches
 from psdmc.lower.carriers import CarrierSpace
-from psdmc.lower.descent import Descent
 from psdmc.lower.factored import Arrangement, Recording, RobotConstants, cost_of_dynamics
-from psdmc.lower.geometry import LARGE, Geometry
-from psdmc.lower.link_parameters import PSEUDO_NAMES, WEIGHTS
-from psdmc.lower.reframe import Foot, Reframed
-from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
-from psdmc.program.cost import Cost
+from psdmc.lower.link_parameters import PSEUDO_NAMES, WEIGHTS, carrier_space, every_parameter
+from psdmc.lower.reframe import Foot, Reframed, reframe, unmoved
+from psdmc.program.cost import Cost, Scoring, for_lanes, for_one_state
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
-from psdmc.target.costs import Costs
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
+from psdmc.target.target import Costs
+
+
+class Geometry:
+    """The new joint frames of one model and the possible carriers (nonzero parameters). They depend neither on the
+    generated function, nor on whether theta_b is constant in the code.
+
+    turns_base  whether the base may be turned about the first axis, to align it with gravity
+    """
+
+    def __init__(self, chain: Mechanism, representative: Array, turns_base: bool = True) -> None:
+        self.chain, self.representative, self.turns_base = chain, representative, turns_base
+        self._reframed: dict[tuple[Foot, ...], Reframed] = {}
+        self._spaces: dict[Reframed, CarrierSpace] = {}
+
+    @cached_property
+    def feet(self) -> tuple[tuple[Foot, ...], ...]:
+        """Return the choices of `all_feet` that give different frames. For parallel or crossing axes, both positions on
+        an axis give the same frame."""
+        seen: dict[tuple[Foot, ...], Reframed] = {}
+        for feet in all_feet(self.chain):
+            reframed = self.reframed(feet)
+            if not any(reframed.is_same(other) for other in seen.values()):
+                seen[feet] = reframed
+        return tuple(seen)
+
+    def reframed(self, feet: tuple[Foot, ...]) -> Reframed:
+        """Return the robot's new joint frames, with each origin where a common normal meets the joint's axis.
+
+        feet  for each joint, whether this is the normal to the previous or to the next axis
+        """
+        if feet not in self._reframed:
+            self._reframed[feet] = reframe(self.chain, feet, self.turns_base)
+        return self._reframed[feet]
+
+    @cached_property
+    def unmoved(self) -> Reframed:
+        """The robot's own frames."""
+        return unmoved(self.chain)
+
+    def space(self, reframed: Reframed) -> CarrierSpace:
+        """Return the possible carriers in these frames: sets of link parameters that can represent all others."""
+        if reframed not in self._spaces:
+            self._spaces[reframed] = carrier_space(reframed, self.representative)
+        return self._spaces[reframed]
+
+
+def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
+    """Yield choices of the frames' origins on the joint axes. First, all frames are on the normal to the previous axis.
+    Then each single frame is on the normal to the next axis, and then all frames. Joints without children have no next
+    axis.
+
+    For large robots, only the first choice and the last one are yielded.
+    """
+    n, leaves = len(chain), chain.leaves
+    singly = [(i,) for i in range(n) if i not in leaves] if n <= LARGE else []
+    for moved in [(), *singly, tuple(range(n))]:
+        yield tuple("next" if i in moved else "previous" for i in range(n))
+
 
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
@@ -349,3 +403,43 @@ def _felt(arrangement: Arrangement, choices: Iterable[Choices]) -> Iterator[Choi
     """The choices that make a difference in an arrangement: without parallel neighbours there are no compound turns."""
     parallel = any(frame.is_parallel for frame in arrangement.reframed.frames[1:])
     return (each for each in choices if parallel or not each.compound)
+
+
+ROUNDING = 1e-6
+"""Differences of scores below this are rounding: weights have few decimals."""
+
+
+class Descent:
+    """The state of a search: the cheapest form of the code so far, and how many candidates may still be tried. The form
+    is a choice of link frames, nonzero link parameters and options of the recursion (an arrangement)."""
+
+    arrangement: Arrangement
+
+    def __init__(
+        self,
+        score: Callable[[Arrangement], float],
+        budget: int,
+        is_admitted: Callable[[Arrangement], bool],
+    ) -> None:
+        self._score_of, self._left, self._score = score, budget, math.inf
+        self._is_admitted = is_admitted
+
+    def consider(
+        self, candidates: Iterator[Arrangement], expected: Callable[[Arrangement], float] | None = None
+    ) -> bool:
+        """Try candidates in order, and take each one with a lower score. Return whether any candidate was taken.
+
+        expected  a rough estimate of the score that takes less time; candidates whose estimate is not lower are not
+                  tried
+        """
+        improved = False
+        for candidate in candidates:
+            if self._left == 0:
+                return False
+            self._left -= 1
+            if expected is not None and expected(candidate) > self._score + ROUNDING:
+                continue
+            score = self._score_of(candidate)
+            if score < self._score and self._is_admitted(candidate):
+                self.arrangement, self._score, improved = candidate, score, True
+        return improved

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from psdmc.errors import InputError
-from psdmc.friction.in_dynamics import FrictionInDynamics
-from psdmc.friction.joints import Friction, found_friction
+from psdmc.friction.joints import Friction, FrictionInDynamics, found_friction
 from psdmc.friction.laws import LAWS
 from psdmc.friction.terms import named
 from psdmc.model.calibrated import by_joint

@@ -1,13 +1,17 @@
-"""The cost of a PROGRAM (list of operations): its operations, counted by kind."""
+"""The cost of a PROGRAM (list of operations): its operations, counted by kind. By the costs of a target processor, a
+Scoring makes one number of them, by which a search compares PROGRAMs."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from psdmc.program.operations import Unit
 from psdmc.program.program import Op, Program
+from psdmc.target.presets import COSTS
+from psdmc.target.target import Costs
 
 _ADD, _SUB, _MUL, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.SIN, Op.COS
 
@@ -73,3 +77,39 @@ def counted(others: Iterable[Op], mul: int, add: int, sincos: int, fused: int) -
     units = Counter(op.unit for op in others)
     rest = (units[Unit.DIV], units[Unit.NEG], sincos, fused, units[Unit.CHOICE], units[Unit.CALL])
     return Cost(mul, add, *rest)
+
+
+@dataclass(frozen=True, slots=True)
+class Scoring:
+    """The rules by which a PROGRAM's cost on a target processor is computed. In code for one state, several angles
+    share a vector call of sincos. In code with one state per SIMD lane, each angle has its own call."""
+
+    costs: Costs
+    angles_per_sincos: int
+
+    def score(self, program: Program) -> float:
+        """Weighted operations of the PROGRAM, see `weight`."""
+        return self.weight(cost(program))
+
+    def weight(self, c: Cost) -> float:
+        """Operations with the target's weights, plus trigonometry."""
+        calls, costs = math.ceil(c.sincos / self.angles_per_sincos), self.costs
+        operations = c.total - costs.fused * c.fused + costs.neg * c.neg + costs.div * c.div
+        # States of one vector, which the C library takes one by one.
+        states = costs.angles_per_sincos // self.angles_per_sincos
+        chosen = costs.choice * c.choice + costs.call * states * c.call
+        return operations + costs.sincos * calls + costs.angle * c.sincos + chosen
+
+
+def for_one_state(costs: Costs) -> Scoring:
+    """Return the rules for the cost of code that computes one state per call."""
+    return Scoring(costs, costs.angles_per_sincos)
+
+
+def for_lanes(costs: Costs) -> Scoring:
+    """Return the rules for the cost of code that computes one state per SIMD lane (slot of a vector)."""
+    return Scoring(costs, 1)
+
+
+SINGLE, BATCH = for_one_state(COSTS), for_lanes(COSTS)
+"""The default target's."""

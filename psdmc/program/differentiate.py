@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from psdmc.program.interpret import replayed
 from psdmc.program.program import Program, Slot
-from psdmc.program.replay import replayed
 from psdmc.program.slopes import Value, gradients, slopes
 from psdmc.program.trace import Symbol, Tracer
 

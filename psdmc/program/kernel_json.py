@@ -8,14 +8,13 @@ from dataclasses import asdict
 from typing import Any
 
 from psdmc.errors import InternalError
-from psdmc.program.check import check
 from psdmc.program.kernel import Kernel
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Spread, Stage
 from psdmc.program.operations import BY_WORD
-from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.products import Shares, ThinProducts
+from psdmc.program.program import Instr, Op, Program, Slot, check
 from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight
 from psdmc.program.signature import Signature
-from psdmc.program.thin_products import Shares, ThinProducts
 
 FORMAT = 6
 """Version of the text's form."""

@@ -33,7 +33,7 @@ Scalar = Any
 
 class Unit(StrEnum):
     """The kinds of operations for which a target processor has latencies and costs. The texts are names of fields in
-    psdmc/target/costs.py.
+    psdmc/target/target.py.
 
     CHOICE  a comparison that selects one of two values, without a branch
     CALL    an elementary function of the C library, one real at a time

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 
-from psdmc.program.check import check
 from psdmc.program.cost import cost
 from psdmc.program.passes.absorb_negations import absorb_negations
 from psdmc.program.passes.drop_unused import drop_unused
@@ -15,9 +14,9 @@ from psdmc.program.passes.fold_constants import fold_constants
 from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import beyond_registers, live_values, schedule
-from psdmc.program.program import Op, Program
-from psdmc.target.costs import Costs
-from psdmc.target.native import COSTS
+from psdmc.program.program import Op, Program, check
+from psdmc.target.presets import COSTS
+from psdmc.target.target import Costs
 
 Pass = Callable[[Program], Program]
 

@@ -1,19 +1,18 @@
 """The inputs and outputs of a generated function. Each has a name, a unit and a shape given in words, such as nv for
-the number of joint rates."""
+the number of joint rates. A signature also names the symmetric matrices that the function factorises."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from itertools import pairwise
 from typing import Any
 
 from psdmc.errors import InternalError
 from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
-from psdmc.program.factorisation import SymmetricMatrix
-from psdmc.program.products import Product
-from psdmc.program.thin_products import Thin
+from psdmc.program.products import Product, Thin
 
 OF_ROWS = ("contact_rows", "loop_rows", "constraint_rows")
 """Rows of all contacts, of all loops, and of contacts and loops."""
@@ -113,7 +112,7 @@ class Quantity:
     least    up to `largest`
     means    its description in Python's documentation, with the unit
     unit     SI unit that all entries have in common, such as 'kg m^2/s'; the code generator checks units
-             (lower/units.py)
+             (lower/factored.py)
     powers   for each axis, the power to which the unit of the row or column multiplies `unit`; left out: zero. This
              unit is rad or m along nq and nv, by the joint. Along nx it is that of nv, then that of nv per second.
              Along nxa and nxu it is that of nx, then that of qdd or tau.
@@ -193,6 +192,70 @@ class Joined(Quantity):
         return [each for part in self.parts for each in part.dimensions(axes)]
 
 
+class Structure(StrEnum):
+    """The entries of a symmetric matrix that are zero at every state.
+
+    DENSE   no entry is zero at every state
+    LIMBS   branches (limbs) on a common body: the entry of two joints is zero if neither joint carries the other.
+            Elimination from the last row up keeps these zeros (Featherstone 2008, section 6.5)
+    BLOCKS  square blocks on the diagonal, each factorised separately; the other entries are zero
+    """
+
+    DENSE = "dense"
+    LIMBS = "limbs on a core"
+    BLOCKS = "blocks"
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricMatrix:
+    """A symmetric matrix that a function factorises. If the matrix is not positive definite, the function has no
+    result.
+
+    A matrix A = L^T D L is positive definite if all pivots, the entries of D, are positive. If one is not, the generated
+    C function returns the number of the first such pivot, from 1. Python gives NaN or an error.
+
+    name       the matrix's name in sentences
+    structure  which entries are zero
+    axes       shape of the array of pivots, in words such as nv; for blocks, that of the array with one sign per block
+    number     words for the number, from 0, of the pivot or sign that is not positive; C returns this number plus 1
+    failure    the reason, in Python's documentation: words that follow "if "; several reasons are one line each
+    unit       unit of the pivots
+    powers     how the unit depends on the axes, as in Quantity
+    error      one line that Python raises as an error; {axis} stands for the name of an entry of that axis (such as
+               {frames}), and {input} for a scalar input. Empty: the results of such a state are NaN
+    hint       the remedy that is printed with the error
+    """
+
+    name: str
+    structure: Structure
+    axes: tuple[str, ...]
+    number: str
+    failure: str
+    error: str = ""
+    hint: str = ""
+    unit: str = "1"
+    powers: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.axes or (len(self.axes) > 1 and self.structure is not Structure.BLOCKS):
+            raise ValueError(f"{self.name}: {self.structure} with axes {self.axes}")
+
+    def in_blocks(self, count: str, number: str, failure: str) -> SymmetricMatrix:
+        """Return the block-diagonal matrix whose blocks are several matrices like this one.
+
+        count            name of the number of blocks
+        number, failure  as in SymmetricMatrix, for the new matrix
+        """
+        return replace(
+            self,
+            structure=Structure.BLOCKS,
+            axes=(count, *self.axes),
+            powers=(0, *self.powers) if self.powers else (),
+            number=number,
+            failure=failure,
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Signature:
     """The name, inputs and outputs of one generated function, and how its code computes them.
@@ -208,7 +271,7 @@ class Signature:
     stages    how often the code factorises these matrices, one time after the other
     products  matrix products that compute outputs after the traced arithmetic, in C loops
     thin      matrices that are computed as factors if a robot has equal limbs, such as legs, and multiplied
-              last (thin_products.py)
+              last (products.py)
     normalizes  whether quaternions in q may have any length but zero
     summary   one or two sentences on what it computes, for Python and the table of docs/functions.md
     calls     names of the functions that the C code calls, such as one for each stage of an integration step

@@ -57,7 +57,7 @@ def constants_of(group: int) -> str:
 
 class SumsOverLimbs(Protocol):
     """The interface by which a Tracer (recorder of operations) sums values over limbs, which are equal branches such as
-    legs. The class that implements it is in limb_sums.py."""
+    legs. The class that implements it is in limb_program.py."""
 
     summed: dict[int, int]
 
@@ -91,7 +91,7 @@ class Tracer:
         return [self.symbol(slot) for slot in slots_of(vector, count)]
 
     def stand_ins(self, vector: str, values: Sequence[Symbol | Constant]) -> list[Symbol]:
-        """Return new input symbols for these values, which `substituted` (replay.py) puts in their place."""
+        """Return new input symbols for these values, which `substituted` (interpret.py) puts in their place."""
         if self.limb_sums is None:
             return self.symbols(vector, len(values))
         return self.limb_sums.stand_ins(vector, values)

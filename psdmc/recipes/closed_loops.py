@@ -19,9 +19,8 @@ from psdmc.dynamics.kinematics import AT_BASE, Root
 from psdmc.dynamics.manifold import integrated
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inner_product, inverse_diagonal, solve
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
-from psdmc.program.signature import QD, QDD
+from psdmc.program.signature import QD, QDD, Structure, SymmetricMatrix
 from psdmc.recipes.singular_matrices import regular
 from psdmc.robot.joints.scalars import root as root_of
 from psdmc.robot.mechanism import Array, Loop

@@ -16,9 +16,9 @@ from psdmc.dynamics.constraints import Constraints, of_active
 from psdmc.dynamics.coordinates import first_rates, leading
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize
+from psdmc.program.products import Thin
 from psdmc.program.regions import Column, Reader, Region, Straight, straight
 from psdmc.program.signature import THIN
-from psdmc.program.thin_products import Thin
 from psdmc.recipes.contacts import ACTIVE, MU, Held, dense_solution
 from psdmc.recipes.loops import Block, Product, copied, nonzero
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix

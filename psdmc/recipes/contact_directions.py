@@ -20,7 +20,7 @@ from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors
 from psdmc.program.dimensions import dimension_of, times
-from psdmc.program.replay import substituted
+from psdmc.program.interpret import substituted
 from psdmc.program.signature import PIVOTS, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.contacts import Held, Solved

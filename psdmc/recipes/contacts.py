@@ -13,9 +13,8 @@ from psdmc.dynamics.closed_loops import ANGULAR, loop_jacobian
 from psdmc.dynamics.constraints import Constrained, constrained, contact_jacobian
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inverse, inverse_diagonal
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
-from psdmc.program.signature import Quantity
+from psdmc.program.signature import Quantity, Structure, SymmetricMatrix
 from psdmc.recipes.on_arrays import RobotOnArrays, columns, matrix
 from psdmc.recipes.singular_matrices import regular
 from psdmc.robot.mechanism import Array, Loop, NamedFrame

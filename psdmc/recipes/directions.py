@@ -13,7 +13,7 @@ from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program import dimensions
-from psdmc.program.replay import substituted
+from psdmc.program.interpret import substituted
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays

@@ -18,7 +18,7 @@ from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.second_derivatives import inverse_dynamics_second_derivatives
 from psdmc.dynamics.spatial import Body
-from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.friction.joints import FrictionInDynamics
 from psdmc.reproducible import solved, times
 from psdmc.robot.mechanism import Array, Mechanism
 

@@ -17,7 +17,7 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.spatial import Body
 from psdmc.dynamics.structure import Places
-from psdmc.friction.in_dynamics import FrictionInDynamics
+from psdmc.friction.joints import FrictionInDynamics
 from psdmc.program.regions import Regions
 from psdmc.program.signature import OF_ROWS, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays as RobotOnArrays
@@ -60,7 +60,7 @@ class Ingredients:
     """Everything from which the code of a function is recorded: symbols for the function's inputs, and the constants of
     one robot.
 
-    Each symbol and constant is a quantity with a dimension and a value in units that lowering chooses (lower/units.py).
+    Each symbol and constant is a quantity with a dimension and a value in units that lowering chooses (lower/factored.py).
     Adding quantities with different dimensions is an error.
 
     frames             n joint frames

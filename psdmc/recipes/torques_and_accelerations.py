@@ -19,9 +19,9 @@ from psdmc.dynamics.frames import part_of, with_carriers
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar, Vector, dot
-from psdmc.friction.in_dynamics import FrictionInDynamics
-from psdmc.program.factorisation import Structure, SymmetricMatrix
-from psdmc.program.gravity_input import GRAVITY, pass_gravity_on, takes_gravity
+from psdmc.friction.joints import FrictionInDynamics
+from psdmc.program.kernel import GRAVITY, pass_gravity_on, takes_gravity
+from psdmc.program.signature import Structure, SymmetricMatrix
 from psdmc.recipes.on_arrays import columns
 from psdmc.recipes.recipe import Given, Ingredients, Recipe, RobotOnArrays
 from psdmc.reproducible import times

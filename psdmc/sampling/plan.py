@@ -20,8 +20,8 @@ from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS, RECIPES, SIGNATURES
 from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.kernel import THETA_ROWS
 from psdmc.program.signature import Quantity, Signature, Sizes
-from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.progress import Progress
 from psdmc.reproducible import times
 from psdmc.sampling.states import LIMITS, AlongMotion, Motion, WithinLimits

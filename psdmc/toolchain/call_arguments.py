@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.program.gravity_input import GRAVITY, takes_gravity
+from psdmc.program.kernel import GRAVITY, takes_gravity
 from psdmc.program.signature import Q, Quantity, Signature, Sizes
 from psdmc.real_arrays import AxisNames, real_array
 from psdmc.robot.coordinates import refuse_other_lengths

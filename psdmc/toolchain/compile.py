@@ -16,12 +16,10 @@ from psdmc.backends.c.back_end import library_files
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InternalError, ToolchainError
 from psdmc.functions import BY_ROWS, SIGNATURES
-from psdmc.program.gravity_input import takes_gravity
-from psdmc.program.kernel import Kernel
+from psdmc.program.kernel import THETA_ROWS, Kernel, by_rows, takes_gravity
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
 from psdmc.program.signature import Signature
-from psdmc.program.theta_rows import THETA_ROWS, by_rows
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 from psdmc.target.target import Target
 from psdmc.toolchain.cache import cache_key, cached, found
 from psdmc.toolchain.compiler_command import Compiler, find_compiler, run

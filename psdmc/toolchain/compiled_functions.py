@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.functions import no_function
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.kernel import GRAVITY, THETA_ROWS
 from psdmc.program.signature import Signature
-from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.robot.mechanism import ROW_NAMES
 from psdmc.toolchain.call_arguments import (
     RobotAxes,

@@ -16,9 +16,8 @@ from functools import cache
 from pathlib import Path
 
 from psdmc.errors import ToolchainError
-from psdmc.target.flags import ARITHMETIC, GCC_ONLY
-from psdmc.target.native import NATIVE
-from psdmc.target.target import Target
+from psdmc.target.presets import NATIVE
+from psdmc.target.target import ARITHMETIC, GCC_ONLY, Target
 
 CANDIDATES = ("cc", "gcc", "clang")
 FLAGS = ("-O3", *ARITHMETIC, "-fPIC")

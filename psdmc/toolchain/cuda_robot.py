@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from psdmc.backends.cuda.back_end import BLOCK, symbol_of
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.kernel import GRAVITY, THETA_ROWS, THETAS
 from psdmc.program.signature import Quantity, Signature
-from psdmc.program.theta_rows import THETA_ROWS, THETAS
 from psdmc.toolchain.call_arguments import THETA_B, bound_arguments, with_gravity
 from psdmc.toolchain.compiled_functions import RobotFacts, results
 from psdmc.toolchain.cuda_libraries import DEFAULT_STREAM, Driver, machine_code

@@ -19,7 +19,7 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Signature, Sizes
-from psdmc.target.costs import Costs
+from psdmc.target.target import Costs
 
 Array = np.ndarray
 Made = TypeVar("Made")

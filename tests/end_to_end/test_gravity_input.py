@@ -27,8 +27,8 @@ from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import under_general_gravity
 from psdmc.model.random_states import on_joints
-from psdmc.program.gravity_input import GRAVITY
 from psdmc.program.interpret import interpret
+from psdmc.program.kernel import GRAVITY
 from psdmc.program.signature import QDD, TAU, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.torques_and_accelerations import with_gravity_input

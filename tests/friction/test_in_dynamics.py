@@ -22,9 +22,8 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
-from psdmc.friction.law import Law, Value
+from psdmc.friction.law import Law, Value, cos, sin
 from psdmc.friction.own import data_of
-from psdmc.friction.scalars import cos, sin
 from psdmc.functions import DEFAULT, OF_TREES, RECIPES
 from psdmc.functions.forward_dynamics_second_derivatives import _solved
 from psdmc.lower.kernels import lower

@@ -20,8 +20,7 @@ from psdmc.backends.c.render import environment
 from psdmc.friction.joints import Friction, ordered
 from psdmc.friction.law import At, Term
 from psdmc.friction.laws import LAWS
-from psdmc.friction.state import STATE_LAW, state_programs
-from psdmc.friction.terms import named, options_of
+from psdmc.friction.terms import STATE_LAW, named, options_of, state_programs
 from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Program, Slot

@@ -25,8 +25,8 @@ from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS, OF_TREES, RECIPES, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
+from psdmc.program.kernel import THETA_ROWS
 from psdmc.program.signature import OF_ROWS, Signature
-from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.recipes.recipe import VALUES
 from psdmc.robot.reference import Reference, reference
 from psdmc.toolchain.build_package import build_package, checks_of

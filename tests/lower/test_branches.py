@@ -10,8 +10,8 @@ from limbed import limbed
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.branches import around
-from psdmc.lower.scoring import SINGLE
 from psdmc.lower.search import Search
+from psdmc.program.cost import SINGLE
 
 LARGEST_MISS = 6.0
 """Operations of some 800."""

@@ -11,10 +11,9 @@ from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.scaled import in_unit, parameter_units
-from psdmc.lower.carrier_columns import carrier_space
-from psdmc.lower.carriers import CarrierSpace
+from psdmc.lower.carriers import CarrierSpace, Tableau
+from psdmc.lower.link_parameters import carrier_space
 from psdmc.lower.reframe import reframe
-from psdmc.lower.tableau import Tableau
 from psdmc.robot.mechanism import Mechanism
 
 

@@ -14,15 +14,12 @@ from slow_cases import slow_but_for
 
 from psdmc.dynamics.solve import SingularMatrix, factorize
 from psdmc.functions import RECIPES
-from psdmc.lower.carrier_columns import carrier_space
+from psdmc.lower.carriers import Tableau
 from psdmc.lower.factored import trace_dynamics, trace_geometry
-from psdmc.lower.geometry import all_feet
-from psdmc.lower.link_parameters import link_map
+from psdmc.lower.link_parameters import carrier_space, link_map
 from psdmc.lower.reframe import reframe
-from psdmc.lower.scoring import BATCH, SINGLE
-from psdmc.lower.search import ALL_CHOICES, Search
-from psdmc.lower.tableau import Tableau
-from psdmc.program.cost import cost
+from psdmc.lower.search import ALL_CHOICES, Search, all_feet
+from psdmc.program.cost import BATCH, SINGLE, cost
 from psdmc.program.interpret import interpret
 from psdmc.robot.mechanism import Mechanism, Placement
 

@@ -18,9 +18,8 @@ from psdmc.errors import DerivationError, InputError
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
 from psdmc.lower.kernels import lower
-from psdmc.lower.scoring import SINGLE
 from psdmc.lower.search import Search
-from psdmc.program.cost import cost
+from psdmc.program.cost import SINGLE, cost
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK

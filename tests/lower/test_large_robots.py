@@ -13,10 +13,10 @@ from psdmc.derivation.derive import derive_model
 from psdmc.errors import InternalError
 from psdmc.functions import RECIPES
 from psdmc.lower import search
-from psdmc.lower.carrier_columns import SAMPLED_JOINTS
 from psdmc.lower.kernels import lower
-from psdmc.lower.scoring import SINGLE
+from psdmc.lower.link_parameters import SAMPLED_JOINTS
 from psdmc.lower.search import Search
+from psdmc.program.cost import SINGLE
 from psdmc.program.interpret import interpret
 from psdmc.robot.coordinates import Coordinate, own_coordinates
 

@@ -24,24 +24,21 @@ from psdmc.lower.kernels import lower
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import usable_groups, weight
 from psdmc.lower.limbs import cost_of_limbs, trace_limbs
-from psdmc.lower.scoring import for_one_state
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
-from psdmc.program.cost import Cost
+from psdmc.program.cost import Cost, for_one_state
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
-from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbProgram, unpacked
-from psdmc.program.limb_stages import staged
+from psdmc.program.limb_stages import StageCost, stage_costs, staged
 from psdmc.program.products import written_out
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.coordinates import Coordinate, leaders
 from psdmc.robot.limbs import Limbs
-from psdmc.target.native import COSTS
-from psdmc.target.presets import SCALAR
+from psdmc.target.presets import COSTS, SCALAR
 
 COUNT = 12
 SAME = 1e-13

@@ -12,8 +12,8 @@ from random_chains import Oracle, relative_error, states
 
 from psdmc.derivation.derive import derive_model
 from psdmc.lower import kernels, search
-from psdmc.lower.carrier_columns import carrier_space
 from psdmc.lower.kernels import lower
+from psdmc.lower.link_parameters import carrier_space
 from psdmc.lower.reframe import reframe
 from psdmc.program.interpret import interpret
 from psdmc.robot.mechanism import Placement

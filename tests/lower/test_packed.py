@@ -9,12 +9,11 @@ from limbed import forced, shape
 from psdmc.dynamics.structure import Places
 from psdmc.functions import SIGNATURES
 from psdmc.lower.kernels import lower
-from psdmc.lower.packed import packed
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
-from psdmc.program.kernel import Kernel
+from psdmc.program.kernel import Kernel, packed
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
 from psdmc.program.limb_program import unpacked
 from psdmc.program.program import Program

@@ -10,12 +10,10 @@ import pytest
 from bundled import bundled_model
 
 from psdmc.lower.kernels import lower
-from psdmc.lower.scoring import for_one_state
-from psdmc.program.cost import cost
+from psdmc.program.cost import cost, for_one_state
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
-from psdmc.target.native import COSTS
-from psdmc.target.presets import CORTEX_M4F, PRESETS, X86_64_V4
+from psdmc.target.presets import CORTEX_M4F, COSTS, PRESETS, X86_64_V4
 
 
 def lowered(name: str) -> Mapping[str, Kernel]:

@@ -19,8 +19,8 @@ from psdmc.dynamics.solve import factorize, solve
 from psdmc.functions import RECIPES
 from psdmc.functions.inverse_dynamics_with_wrenches import WRENCHES
 from psdmc.lower.kernels import lower
-from psdmc.lower.scoring import SINGLE
 from psdmc.lower.search import Search
+from psdmc.program.cost import SINGLE
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature, Sizes
 from psdmc.program.slopes import gradients, slopes

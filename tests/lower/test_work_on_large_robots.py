@@ -16,12 +16,12 @@ from psdmc.dynamics.choices import ByChoices, Choices
 from psdmc.functions import RECIPES
 from psdmc.lower import carriers, kernels, limb_search, search
 from psdmc.lower.branches import limbs_in
-from psdmc.lower.carrier_columns import STATES, _sampled_columns
+from psdmc.lower.carriers import Tableau
 from psdmc.lower.factored import Arrangement, Recording, RobotConstants, trace_dynamics
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import LimbSearch
+from psdmc.lower.link_parameters import STATES, _sampled_columns
 from psdmc.lower.search import ALL_CHOICES, Search
-from psdmc.lower.tableau import Tableau
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program import pipeline
 from psdmc.program.cost import cost
@@ -30,7 +30,7 @@ from psdmc.program.text import parse
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
 
 ARM, FINGERS, FINGER = 2, 2, 2
 HAND = FINGERS * FINGER

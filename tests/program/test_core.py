@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from psdmc.errors import InternalError
-from psdmc.program.check import check
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
-from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.program import Instr, Op, Program, Slot, check
 from psdmc.program.text import parse, show
 
 SMALL = """

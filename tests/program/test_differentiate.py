@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from fifty_digits import fifty_digit_jacobian
 
-from psdmc.program.check import check
 from psdmc.program.cost import cost
 from psdmc.program.differentiate import Block, jacobians, jvp, vjp
 from psdmc.program.interpret import interpret
-from psdmc.program.program import Program
+from psdmc.program.program import Program, check
 from psdmc.program.text import parse, show
 
 QUOTIENT = parse("""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from psdmc.errors import InternalError
-from psdmc.program.dimensioned import DimensionedTracer, UnlikeArguments
+from psdmc.lower.dimension_check import DimensionedTracer, UnlikeArguments
 from psdmc.program.dimensions import Dimension, dimension_of
 from psdmc.program.program import Op, Slot
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from psdmc.functions import SIGNATURES
-from psdmc.program.factorisation import Structure, SymmetricMatrix
-from psdmc.program.signature import Q, Quantity, Signature, Sizes
+from psdmc.program.signature import Q, Quantity, Signature, Sizes, Structure, SymmetricMatrix
 
 SIZES = Sizes(n=7, nq=8, nv=7, l=40, frames=3)
 M = SymmetricMatrix("M", Structure.LIMBS, ("nv",), "the joint at which M fails", "M fails")

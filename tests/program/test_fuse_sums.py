@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from psdmc.program.check import check
 from psdmc.program.cost import cost
 from psdmc.program.passes.fuse_sums import fuse_sums
-from psdmc.program.program import Program
+from psdmc.program.program import Program, check
 from psdmc.program.text import parse, show
 
 Outputs = Callable[[Program], np.ndarray]

@@ -13,9 +13,9 @@ from psdmc.lower.reframe import unmoved
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
+from psdmc.program.products import Shares, ThinProducts
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.text import parse
-from psdmc.program.thin_products import Shares, ThinProducts
 
 GRAVITY = parse("""
     a = load q[0]

@@ -10,9 +10,9 @@ from psdmc.program.interpret import interpret
 from psdmc.program.limb_program import LimbGroup, LimbProgram, unpacked
 from psdmc.program.limb_stages import staged
 from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.products import Shares, ThinProducts
 from psdmc.program.program import Slot
 from psdmc.program.text import parse, show
-from psdmc.program.thin_products import Shares, ThinProducts
 
 TWO = LimbGroup(
     number=0,

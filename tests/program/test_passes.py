@@ -10,7 +10,6 @@ from random_programs import SEEDS, random_program
 
 from psdmc.errors import InternalError
 from psdmc.program import pipeline
-from psdmc.program.check import check
 from psdmc.program.cost import cost
 from psdmc.program.passes.absorb_negations import absorb_negations
 from psdmc.program.passes.drop_unused import drop_unused
@@ -21,7 +20,7 @@ from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import optimize
-from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.program import Instr, Op, Program, Slot, check
 from psdmc.program.text import parse, show
 
 Outputs = Callable[[Program], np.ndarray]

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.lower.loops import in_loops
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
-from psdmc.program.products import LARGE, Product, lines, written_out, zero_columns
+from psdmc.program.products import LARGE, Product, in_loops, lines, written_out, zero_columns
 from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Tracer
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
 
 N = 3
 PRODUCT = Product("c", "a", "b")

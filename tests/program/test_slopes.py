@@ -5,12 +5,10 @@ from __future__ import annotations
 import pytest
 
 from psdmc.errors import InternalError
-from psdmc.program.interpret import interpret
-from psdmc.program.limb_program import LimbGroup, LimbProgram, unpacked
+from psdmc.program.interpret import interpret, substituted
+from psdmc.program.limb_program import LimbGroup, LimbProgram, LimbSums, unpacked
 from psdmc.program.limb_stages import staged
-from psdmc.program.limb_sums import LimbSums
 from psdmc.program.program import Slot
-from psdmc.program.replay import substituted
 from psdmc.program.slopes import gradients, slopes
 from psdmc.program.trace import Symbol, Tracer
 

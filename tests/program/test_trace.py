@@ -7,11 +7,10 @@ import random
 import numpy as np
 import pytest
 
-from psdmc.program.check import check
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
 from psdmc.program.passes.drop_unused import drop_unused
-from psdmc.program.program import Program, Slot
+from psdmc.program.program import Program, Slot, check
 from psdmc.program.text import show
 from psdmc.program.trace import Symbol, Tracer
 

@@ -7,15 +7,12 @@ from dataclasses import FrozenInstanceError, replace
 import pytest
 
 from psdmc.errors import InputError
-from psdmc.lower.scoring import for_lanes, for_one_state
-from psdmc.program.cost import Cost
+from psdmc.program.cost import Cost, for_lanes, for_one_state
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
 from psdmc.program.text import parse, show
-from psdmc.target.costs import Costs
-from psdmc.target.native import COSTS, NATIVE
-from psdmc.target.presets import PRESETS, SCALAR, preset
-from psdmc.target.vectors import AVX, SSE2
+from psdmc.target.presets import COSTS, NATIVE, PRESETS, SCALAR, preset
+from psdmc.target.target import AVX, SSE2, Costs
 
 NAMES = ("native", "x86-64-v2", "x86-64-v3", "x86-64-v4", "neon", "scalar", "cortex-m4f", "cortex-m7")
 

@@ -6,9 +6,8 @@ from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import EmitOptions, JointInfo, PackageInfo
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.model.equations import BaseParameter
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.kernel import Kernel
-from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.program.signature import Q, Quantity, Signature, Structure, SymmetricMatrix
 from psdmc.program.trace import Slot, Tracer
 
 N, L, FRAMES = 3, 2, 2

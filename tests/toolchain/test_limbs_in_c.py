@@ -22,8 +22,7 @@ from psdmc.lower.kernels import lower
 from psdmc.model.random_states import states_of
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Sizes
-from psdmc.target.native import COSTS
-from psdmc.target.presets import SCALAR, preset
+from psdmc.target.presets import COSTS, SCALAR, preset
 
 LEGS, FIVE, BOTH = (
     "four legs of a floating body",

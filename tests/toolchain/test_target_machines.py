@@ -25,10 +25,8 @@ from psdmc.errors import InputError, ToolchainError
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
-from psdmc.target.costs import Costs
-from psdmc.target.native import COSTS, NATIVE
-from psdmc.target.presets import CORTEX_M4F, CORTEX_M7, PRESETS, SCALAR, X86_64_V3, preset
-from psdmc.target.target import Target
+from psdmc.target.presets import CORTEX_M4F, CORTEX_M7, COSTS, NATIVE, PRESETS, SCALAR, X86_64_V3, preset
+from psdmc.target.target import Costs, Target
 from psdmc.toolchain import compile, compiler_command
 from psdmc.toolchain.build_package import build_package
 from psdmc.toolchain.compiler_command import find_compiler

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psdmc.backends.c.trig import Far, scalar_trig, trig_preamble, vector_trig
 from psdmc.backends.trig_numbers import Real
-from psdmc.target.vectors import WIDEST_FIRST
+from psdmc.target.target import WIDEST_FIRST
 from psdmc.toolchain.cache import cache_key, cached
 
 TEMPLATES = Path(__file__).parents[2] / "templates"

@@ -11,7 +11,7 @@ from slow_cases import slow_but_for
 
 from psdmc.backends.c.trig import c_number, polynomial
 from psdmc.backends.trig_numbers import NUMBERS, Real
-from psdmc.target.vectors import VectorUnit
+from psdmc.target.target import VectorUnit
 
 EXACT_PARTS = {"double": 2, "float": 3}
 INDEX_DIGITS = {"double": 16, "float": 10}

@@ -13,7 +13,7 @@ from psdmc.backends.c.render import identifier, render
 from psdmc.backends.describe import option_items
 from psdmc.backends.manifest import manifest
 from psdmc.backends.protocol import BackEnd, Emission
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
 
 C_SUFFIXES = (".c", ".cpp", ".h", ".hpp", ".inc", ".cu", ".cuh")
 SPDX = "SPDX-License-Identifier"

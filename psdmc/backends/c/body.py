@@ -32,13 +32,13 @@ from psdmc.backends.c.lines import (
     multiplication,
     spread,
 )
-from psdmc.program.angles import TRIGONOMETRIC, angle_groups, cone
+from psdmc.program.kernel import THETAS
 from psdmc.program.operations import Unit
+from psdmc.program.parts import TRIGONOMETRIC, angle_groups, cone
 from psdmc.program.products import Product
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight, read_late
 from psdmc.program.signature import PIVOTS
-from psdmc.program.theta_rows import THETAS
 
 
 def make_body(

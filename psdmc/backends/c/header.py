@@ -13,8 +13,8 @@ from psdmc.backends.c.kernel_view import FunctionView, KernelView, Prototype
 from psdmc.backends.c.render import c_string
 from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
 from psdmc.backends.info import EmitOptions, PackageInfo
+from psdmc.program.kernel import THETA_ROWS
 from psdmc.program.signature import Signature
-from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.target import Target
 
 # The description in the first lines of the C header

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from psdmc.backends.c.body import RegionsView
 from psdmc.backends.c.limbs import LimbsView
 from psdmc.backends.c.lines import Body, Multiplication
+from psdmc.program.kernel import THETA_ROWS
 from psdmc.program.products import LARGE
 from psdmc.program.signature import Signature
-from psdmc.program.theta_rows import THETA_ROWS
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,9 @@ from psdmc.backends.c.lines import Body
 from psdmc.backends.c.vectors import NamedByCount
 from psdmc.backends.info import EmitOptions
 from psdmc.program.cost import Cost
-from psdmc.program.limb_cost import whole_cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
-from psdmc.program.thin_products import INVERSE, ThinProducts
+from psdmc.program.limb_stages import whole_cost
+from psdmc.program.products import INVERSE, ThinProducts
 
 HELD = 32
 """Values of a core's stage that may wait for its end to be put out. More of them do not fit the registers of any target:

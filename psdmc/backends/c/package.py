@@ -25,8 +25,7 @@ from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
-from psdmc.target.flags import ARITHMETIC, GCC_ONLY
-from psdmc.target.target import Target
+from psdmc.target.target import ARITHMETIC, GCC_ONLY, Target
 
 ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_where_wide)
 """Functions that lead from one q to another."""

@@ -9,7 +9,7 @@ derives the error bounds. tests/trig/minimax.py computes the coefficients, and a
 A generated C file includes these templates of `templates/trig/`. Each gets the result of one function as `trig`:
 
     preamble.jinja         trig_preamble(prefix, real, far)       once per C file
-    #if HAS_VECTORS                                               (psdmc/target/vectors.py)
+    #if HAS_VECTORS                                               (psdmc/target/target.py)
     types.jinja            vector_trig(prefix, real, unit, far)   unless the file has such types itself
     sincos_vector.jinja    the same result                        <symbol>(const vec *x, vec *s, vec *c)
     #else
@@ -23,8 +23,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from psdmc.backends.trig_numbers import NUMBERS, Real
-from psdmc.target.target import Trig
-from psdmc.target.vectors import VectorUnit
+from psdmc.target.target import Trig, VectorUnit
 
 Far = Literal["libm", "nan"]
 """The result for an angle beyond the limit: libm's sine and cosine on a rare branch, or NaN (freestanding)."""

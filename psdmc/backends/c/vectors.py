@@ -18,7 +18,7 @@ from psdmc.backends.c.trig import (
     vector_trig,
 )
 from psdmc.backends.info import EmitOptions
-from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES, VectorUnit
+from psdmc.target.target import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES, VectorUnit
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,9 +19,8 @@ from psdmc.backends.protocol import BackEnd, Emission
 from psdmc.backends.reference_states import given_name
 from psdmc.backends.render import identifier_of
 from psdmc.errors import InternalError
-from psdmc.program.kernel import Kernel
+from psdmc.program.kernel import THETA_ROWS, Kernel
 from psdmc.program.signature import Sizes
-from psdmc.program.theta_rows import THETA_ROWS
 from psdmc.target.presets import SCALAR
 
 LIBRARIES = frozenset(

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from psdmc.backends.render import DEVICE, identifier_of, utf8
-from psdmc.program.angles import angles_first
+from psdmc.program.parts import angles_first
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.signature import Quantity
 

@@ -18,8 +18,8 @@ from psdmc.bench.states import output_sizes
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
 from psdmc.robot.mechanism import DRIVE, Array
-from psdmc.target.flags import GCC_ONLY
-from psdmc.target.native import NATIVE
+from psdmc.target.presets import NATIVE
+from psdmc.target.target import GCC_ONLY
 
 Way = Literal["library", "header-only"]
 

@@ -20,7 +20,7 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
-from psdmc.program.limb_cost import whole_cost
+from psdmc.program.limb_stages import whole_cost
 from psdmc.program.signature import Signature, Sizes
 from psdmc.recipes.recipe import Polynomials
 from psdmc.toolchain.compiler_command import find_compiler, run

@@ -38,7 +38,7 @@ from psdmc.calibration.identify.steps import (
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 from psdmc.links.pseudo_inertias import PhysicalOptions
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress

@@ -31,7 +31,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 from psdmc.model.calibrated import JointQuality, Remark, Sample, StepQuality
 from psdmc.robot.mechanism import DRIVE, Mechanism
 from psdmc.workers import in_processes

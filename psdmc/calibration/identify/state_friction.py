@@ -17,7 +17,7 @@ from psdmc.backends.c.friction import ScalarFunction, calls_in
 from psdmc.backends.c.render import identifier, render
 from psdmc.calibration.logs.log import Array
 from psdmc.errors import InputError
-from psdmc.friction.state import STATE_LAW, state_programs
+from psdmc.friction.terms import STATE_LAW, state_programs
 from psdmc.model.calibrated import Calibrated, by_joint
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import FLAGS, find_compiler, run

@@ -31,8 +31,7 @@ from psdmc.calibration.plant.plant_file import (
     read_plant,
 )
 from psdmc.errors import InputError
-from psdmc.friction.law import At, Term
-from psdmc.friction.scalars import tanh
+from psdmc.friction.law import At, Term, tanh
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 
 RELATIVE_ERROR = 1e-9

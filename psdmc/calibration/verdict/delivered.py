@@ -42,7 +42,7 @@ from psdmc.calibration.logs.parts import each_part
 from psdmc.calibration.logs.smoothed_rows import smoothed_rows
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 from psdmc.model import evaluate
 from psdmc.model.calibrated import WHOLE, Prediction, StepQuality, by_joint
 from psdmc.model.dynamics_model import DynamicsModel

@@ -30,7 +30,7 @@ from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.errors import InternalError
 from psdmc.friction.law import Term
 from psdmc.friction.law import unit_of as own_unit
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 from psdmc.model.calibrated import (
     IDENTIFIED,
     LINEAR,

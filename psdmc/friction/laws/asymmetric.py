@@ -6,8 +6,7 @@ torque only near rest. A fit of an asymmetry and a constant torque therefore det
 
 import math
 
-from psdmc.friction.law import Law, Value
-from psdmc.friction.scalars import absolute
+from psdmc.friction.law import Law, Value, absolute
 
 LAW = Law(
     name="asymmetric",

@@ -1,7 +1,6 @@
 """Load-dependent friction: it grows with the torque that the joint transmits, like the friction of gears."""
 
-from psdmc.friction.law import Law, Value
-from psdmc.friction.scalars import absolute
+from psdmc.friction.law import Law, Value, absolute
 
 LAW = Law(
     name="load",

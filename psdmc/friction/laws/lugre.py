@@ -2,8 +2,20 @@
 
 from collections.abc import Sequence
 
-from psdmc.friction.law import At, Law, Scalar, State, Value
-from psdmc.friction.scalars import absolute, exp, larger, power, select, smaller, tanh
+from psdmc.friction.law import (
+    At,
+    Law,
+    Scalar,
+    State,
+    Value,
+    absolute,
+    exp,
+    larger,
+    power,
+    select,
+    smaller,
+    tanh,
+)
 
 VALUES = (
     Value("coulomb", low=1e-9),

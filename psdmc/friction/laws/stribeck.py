@@ -5,8 +5,7 @@ problem. If you do not know the velocity, give several. The sum of the terms, on
 falling curve.
 """
 
-from psdmc.friction.law import Law, Number, Value
-from psdmc.friction.scalars import exp
+from psdmc.friction.law import Law, Number, Value, exp
 
 LAW = Law(
     name="stribeck",

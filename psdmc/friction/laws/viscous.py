@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from psdmc.friction.law import Law, Number, Value
-from psdmc.friction.scalars import absolute, power
+from psdmc.friction.law import Law, Number, Value, absolute, power
 
 
 def line(p: Sequence[float], exponent: float, top: float) -> tuple[float, float, str]:

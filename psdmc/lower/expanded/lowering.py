@@ -39,8 +39,8 @@ from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.recipes.recipe import Polynomials, Recipe
-from psdmc.target.costs import Costs
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
+from psdmc.target.target import Costs
 
 Outputs = list[tuple[Slot, Symbol | Number]]
 

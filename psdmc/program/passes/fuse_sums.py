@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from psdmc.program.operations import Unit
 from psdmc.program.program import Instr, Op, Program, operation
-from psdmc.target.costs import Latency
-from psdmc.target.native import COSTS
+from psdmc.target.presets import COSTS
+from psdmc.target.target import Latency
 
 SUMS = frozenset((Op.ADD, Op.SUB))
 _VALUE = attrgetter("value")

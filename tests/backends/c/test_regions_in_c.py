@@ -12,11 +12,10 @@ from small import kernel, pendulum_info
 
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import EmitOptions
-from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Program
 from psdmc.program.regions import Call, Column, For, Region, Regions, Slice, run, straight
-from psdmc.program.signature import Quantity, Signature
+from psdmc.program.signature import Quantity, Signature, Structure, SymmetricMatrix
 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-pedantic", "-Werror"]
 NOTHING = Program((), ())

@@ -10,10 +10,8 @@ from small import pendulum, pendulum_references
 
 from psdmc.backends.c.back_end import package_files
 from psdmc.backends.info import EmitOptions
-from psdmc.target.native import NATIVE
-from psdmc.target.presets import CORTEX_M4F, PRESETS, SCALAR, X86_64_V3, preset
-from psdmc.target.target import Target
-from psdmc.target.vectors import AVX
+from psdmc.target.presets import CORTEX_M4F, NATIVE, PRESETS, SCALAR, X86_64_V3, preset
+from psdmc.target.target import AVX, Target
 
 NAMES = tuple(PRESETS)
 

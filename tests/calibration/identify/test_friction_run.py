@@ -10,7 +10,7 @@ from psdmc.calibration.identify.friction import MOST_KEPT, JointRun
 from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.identify.steps import FrictionOptions
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 
 PERIOD = 1e-3
 

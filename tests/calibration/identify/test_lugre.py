@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from psdmc.calibration.identify import state_friction
 from psdmc.calibration.identify.state_friction import ActuatorView, actuator_files, calibrated_actuators
 from psdmc.errors import InputError
-from psdmc.friction.state import STATE_LAW
+from psdmc.friction.terms import STATE_LAW
 from psdmc.model.calibrated_json import from_json
 from psdmc.toolchain.compiler_command import find_compiler
 

@@ -15,8 +15,7 @@ from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
-from psdmc.program.gravity_input import takes_gravity
-from psdmc.program.kernel import Kernel
+from psdmc.program.kernel import Kernel, takes_gravity
 from psdmc.robot.mechanism import Mechanism
 
 ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {

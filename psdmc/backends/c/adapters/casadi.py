@@ -51,7 +51,7 @@ from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Signature, Sizes
 from psdmc.robot.mechanism import Mechanism
-from psdmc.target.costs import Costs
+from psdmc.target.target import Costs
 
 FIRST, BY_THETA, HESSIANS = "casadi", "casadi_theta", "casadi_hessian"
 """The adapters: functions with first derivatives; the same with theta_b as an input; and with second derivatives."""

@@ -20,7 +20,7 @@ from psdmc.backends.c.adapters.casadi_kernels import (
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.info import PackageInfo
 from psdmc.functions import RECIPES
-from psdmc.program.gravity_input import GRAVITY
+from psdmc.program.kernel import GRAVITY
 from psdmc.program.signature import Q, Signature
 from psdmc.recipes.recipe import Polynomials
 

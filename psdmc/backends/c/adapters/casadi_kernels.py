@@ -15,13 +15,13 @@ from math import prod
 
 from psdmc.backends.info import PackageInfo
 from psdmc.program.differentiate import Block, jacobians, vjp
+from psdmc.program.interpret import Value, replayed
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Op, Program, Slot
-from psdmc.program.replay import Value, replayed
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature, Sizes
 from psdmc.program.trace import Tracer
-from psdmc.target.costs import Costs
+from psdmc.target.target import Costs
 
 JACOBIAN, ADJOINT, SECOND = "_jac", "_adj1", "_jac_adj1"
 """Endings of the kernels' names. The first has derivatives of all outputs by all inputs, the second the gradient of the
