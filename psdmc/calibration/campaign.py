@@ -17,11 +17,10 @@ from psdmc.calibration.campaign_plan import CampaignOptions as CampaignOptions
 from psdmc.calibration.campaign_plan import Plan as Plan
 from psdmc.calibration.campaign_plan import PlannedRun as PlannedRun
 from psdmc.calibration.campaign_plan import plan_campaign as plan_campaign
-from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.foreign_bytes import is_folder
 from psdmc.calibration.motions.excite import MEASURES, Excitation
 from psdmc.calibration.motions.formats import FORMATS
-from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
+from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.errors import InputError
 from psdmc.files import make_folder, refuse_foreign_folder, write_whole
 from psdmc.robot.limits import shown
@@ -97,12 +96,21 @@ def write_campaign(
         "",
     ]
     written: dict[int, str] = {}
-    files = _file_names(runs)
-    for run, file in zip(runs, files, strict=True):
+    names = [run.name for run in runs]
+    for k, run in enumerate(runs, start=1):
+        plain = run.name.replace("_", "").replace("-", "").isalnum() and run.name.isascii()
+        is_short = len(run.name) <= LONGEST_NAME and names.count(run.name) == 1
+        file = run.name if plain and is_short else f"{run.step}_{k}"  # a name that every system accepts
         if id(run.motion) not in written:  # loaded and unloaded runs share one motion
             written[id(run.motion)] = f"trajectories/{file}.{table}"
-            write_trajectory(run.motion, root / written[id(run.motion)])
-            _write_formats(run.motion, root / "trajectories" / file, formats)
+            path = root / written[id(run.motion)]
+            write_trajectory(run.motion, path)
+            for name, form in FORMATS.items():
+                other = path.with_name(file + form.ending)
+                if name in formats:
+                    write_whole(other, form.text(run.motion))
+                else:  # it holds an older motion
+                    other.unlink(missing_ok=True)
         lines += ["[[run]]", f"step = {_toml_text(run.step)}", f"name = {_toml_text(run.name)}"]
         if run.joint:
             lines.append(f"joint = {_toml_text(run.joint)}")
@@ -114,28 +122,6 @@ def write_campaign(
     path = root / FILE
     write_whole(path, "\n".join(lines))
     return path
-
-
-def _write_formats(motion: Trajectory, path: Path, chosen: Sequence[str]) -> None:
-    """Write a motion in the chosen formats, beside its table. Delete files in other formats: they hold older motions."""
-    for name, form in FORMATS.items():
-        file = path.with_name(path.name + form.ending)
-        if name in chosen:
-            write_whole(file, form.text(motion))
-        else:
-            file.unlink(missing_ok=True)
-
-
-def _file_names(runs: Sequence[PlannedRun]) -> list[str]:
-    """File names of the runs: the run's name where every system accepts it; else its step and number."""
-    names = [run.name for run in runs]
-    plain = [name.replace("_", "").replace("-", "").isalnum() and name.isascii() for name in names]
-    return [
-        run.name
-        if plain[k] and len(run.name) <= LONGEST_NAME and names.count(run.name) == 1
-        else f"{run.step}_{k + 1}"
-        for k, run in enumerate(runs)
-    ]
 
 
 LONGEST_NAME = 100
@@ -188,45 +174,32 @@ def summary(plan: Plan, folder: str | Path) -> tuple[str, ...]:
     size = sum(path.stat().st_size for path in files) / MIB
     minutes = sum(run.motion.duration for run in runs) / 60.0
     period = runs[0].motion.period
-    return (
+    lines = [
         f"{len(runs)} run{'s' * (len(runs) > 1)}, {minutes:.1f} min of motion; trajectories {size:.1f} MiB, up to"
-        f" {1.0 / period:g} rows a second",
-        *_steps(plan),
-        *(f"mount: {_load(load, plan)} for the runs {_which(plan, load)}" for load in _loads(plan)),
-        _found(plan),
-        f"compared: {plan.found.comparison}",
-        *plan.looked,
-        "not planned: the paths from the end of a run to the start of the next; your controller drives them",
-    )
-
-
-def _steps(plan: Plan) -> Iterator[str]:
+        f" {1.0 / period:g} rows a second"
+    ]
     for step in STEPS:
-        own = [run for run in plan.runs if run.step == step]
+        own = [run for run in runs if run.step == step]
         if own:
             minutes = sum(run.motion.duration for run in own) / 60.0
-            yield f"  {step:<10}{len(own):>3} run{'s' if len(own) > 1 else ' '} {minutes:6.1f} min"
-
-
-def _loads(plan: Plan) -> tuple[Load, ...]:
-    return tuple(dict.fromkeys(run.load for run in plan.runs if run.load is not None))
-
-
-def _load(load: Load, plan: Plan) -> str:
-    place = ", ".join(f"{value:g}" for value in load.com)
-    return f"{load.mass:g} kg with its centre of mass at ({place}) m of {shown(plan.chain.tip_name)}"
-
-
-def _which(plan: Plan, load: Load) -> str:
-    own = [run for run in plan.runs if run.load == load]
-    return f"whose name ends in _loaded ({len(own)}), nothing for the others ({len(plan.runs) - len(own)})"
-
-
-def _found(plan: Plan) -> str:
-    is_whole = all(run.step in ("inertial", "validation") for run in plan.runs)
+            lines.append(f"  {step:<10}{len(own):>3} run{'s' if len(own) > 1 else ' '} {minutes:6.1f} min")
+    for load in dict.fromkeys(run.load for run in runs if run.load is not None):
+        count = sum(run.load == load for run in runs)
+        place = ", ".join(f"{value:g}" for value in load.com)
+        lines.append(
+            f"mount: {load.mass:g} kg with its centre of mass at ({place}) m of {shown(plan.chain.tip_name)} for the runs"
+            f" whose name ends in _loaded ({count}), nothing for the others ({len(runs) - count})"
+        )
+    is_whole = all(run.step in ("inertial", "validation") for run in runs)
     what = (
         "all fitted values: base parameters, friction and offsets"
         if is_whole
         else "the base parameters that torques at rest do not determine"
     )
-    return f"exciting motion: condition number {plan.found.condition:.3g}, of {what}"
+    return (
+        *lines,
+        f"exciting motion: condition number {plan.found.condition:.3g}, of {what}",
+        f"compared: {plan.found.comparison}",
+        *plan.looked,
+        "not planned: the paths from the end of a run to the start of the next; your controller drives them",
+    )

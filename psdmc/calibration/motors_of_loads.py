@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import Estimate, Prior, torque_sizes
-from psdmc.calibration.identify.least_squares import Block, estimate_rows, residual_of
+from psdmc.calibration.identify.least_squares import Block, estimate_rows, residual_of, with_rows
 from psdmc.calibration.identify.linear_fit import linear_prior
 from psdmc.calibration.identify.linear_problem import LinearOptions, LinearProblem, linear_problem
 from psdmc.calibration.identify.motor import MotorResult, negative_warnings
@@ -213,10 +213,8 @@ class LoadedRows:
         )
 
     def __iter__(self) -> Iterator[Block]:
-        first, n = 0, self.torque.shape[1]
-        for block in self.problem.rows:
-            own = slice(first, first + len(block))
-            first = own.stop
+        n = self.torque.shape[1]
+        for block, own in with_rows(self.problem.rows):
             gains = -self.torque[own, :, None] * np.eye(n)
             noise = None if block.noise is None else self._apart(block.noise, own, np.zeros_like(gains))
             yield Block(self._apart(block.columns, own, gains), noise)
@@ -286,7 +284,9 @@ def _settled(
     """
     n, current = len(chain), problem.torque
     kept = np.repeat(~problem.held_out[:, None], n, axis=1)
-    constants = _guessed(known[with_load], current)
+    # first the size of the load's torque over that of the current: right within a factor of a hundred or so
+    sizes, currents = torque_sizes(known[with_load]), torque_sizes(current)
+    constants = np.asarray(sizes / np.where(currents > 0.0, currents, 1.0))
     rows = LoadedRows(problem, with_load, current * constants)
     for step in range(ROUNDS):
         prior = rows.prior(
@@ -303,12 +303,6 @@ def _settled(
         without_gains = np.concatenate([solved.values[:-n], np.zeros(n)])
         rows = LoadedRows(problem, with_load, measured + known - residual_of(rows, measured, without_gains))
     return constants, solved
-
-
-def _guessed(known: Array, current: Array) -> Array:
-    """(n,) N m/A, positive: the size of the load's torque over that of the current, within a factor of a hundred or so."""
-    sizes, currents = torque_sizes(known), torque_sizes(current)
-    return np.asarray(sizes / np.where(currents > 0.0, currents, 1.0))
 
 
 def _require_some(logs: str, constants: Array, found: NDArray[np.bool_]) -> None:
@@ -334,8 +328,12 @@ def _missing(
     options: LinearOptions,
 ) -> list[str]:
     """A sentence for each joint without a constant: why, and what to mount or how to move."""
-    poses = np.concatenate([_poses(log, options) for log in loaded])
-    reasons = unreached(chain, poses, load)
+    poses = []
+    for log in loaded:
+        parts = stretches(log, options.filter, options.check, options.stretch)
+        whole = np.concatenate([part.states.q[part.at] for part in parts])
+        poses.append(whole[:: max(1, len(whole) // MOST_POSES)])
+    reasons = unreached(chain, np.concatenate(poses), load)
     sentences: list[str] = []
     for k, joint in enumerate(chain.joints):
         if found[k]:
@@ -351,13 +349,3 @@ def _missing(
             Remark(f"joint {joint.name}: torque constant not found: {why}; {remedy}", "constant_not_found")
         )
     return sentences
-
-
-def _poses(log: AnyLog, options: LinearOptions) -> Array:
-    """Some of the poses that a log holds, evenly spread."""
-    parts = [
-        stretch.states.q[stretch.at]
-        for stretch in stretches(log, options.filter, options.check, options.stretch)
-    ]
-    whole = np.concatenate(parts)
-    return np.asarray(whole[:: max(1, len(whole) // MOST_POSES)])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from psdmc.calibration.columns.columns import Columns
 from psdmc.calibration.description.description import FitChoice
 from psdmc.calibration.identify.estimate import Estimate, Prior, base_parameter_scale, torque_sizes
-from psdmc.calibration.identify.least_squares import Block, estimate_rows
+from psdmc.calibration.identify.least_squares import Block, estimate_rows, with_rows
 from psdmc.calibration.identify.linear_problem import LinearOptions, LinearProblem, linear_problem, names_of
 from psdmc.calibration.identify.motor_model import Motors, motors_of_logs, one_quantity
 from psdmc.calibration.identify.physical import NotPhysical
@@ -121,7 +121,11 @@ def fit_load(
         each = (stretches(log, options.filter, options.check, options.stretch) for log in logs)
         rigid = rigid + np.concatenate([beside(part.states, part.at) for parts in each for part in parts])
     used = np.flatnonzero(theta_std > 0.0)
-    blocks = _considering(problem, known[:, :, used])
+    consider = known[:, :, used]  # what theta_b's uncertainty does to the torques
+    blocks = [
+        Block(block.columns, block.noise, consider[own] if len(used) else None)
+        for block, own in with_rows(problem.rows)
+    ]
     sizes = torque_sizes(problem.torque[~problem.held_out])
     width = len(problem.friction)
     own = np.zeros((chain.nv, width)) if friction is None else friction
@@ -155,16 +159,6 @@ def _known_columns(regressor: Regressor, logs: Sequence[AnyLog], options: Linear
             "record a motion that turns the load about several axes",
         )
     return np.concatenate(found)
-
-
-def _considering(problem: LinearProblem, consider: Array) -> list[Block]:
-    """The problem's blocks with what theta_b's uncertainty does to their torques."""
-    blocks, first = [], 0
-    for block in problem.rows:
-        own = consider[first : first + len(block)]
-        blocks.append(Block(block.columns, block.noise, own if own.shape[2] else None))
-        first += len(block)
-    return blocks
 
 
 def nearest_load(values: Array, whitening: Array, never_negative: NDArray[np.bool_]) -> Array:
@@ -332,7 +326,10 @@ def _result(
     )
     stds = _standard_deviations(solved, delivered_vector[:LOAD], seen)
     words = dict(zip(LOAD_NAMES, seen.words, strict=False))
-    verdict = _verdict(found, delivered_vector, words, model)
+    std = solved.std[:LOAD]
+    moved = np.abs(vector[:LOAD] - solved.values[:LOAD]) / np.where(
+        np.isfinite(std) & (std > 0.0), std, np.inf
+    )
     return PayloadFound(
         robot=model.mechanism.name,
         frame=frame,
@@ -343,19 +340,9 @@ def _result(
         com_std=stds[1:4],
         inertia_std=stds[4:],
         visible=words,
-        verdict=verdict,
-        notes=_notes(
-            model,
-            words,
-            logs,
-            known,
-            np.abs(vector[:LOAD] - solved.values[:LOAD]) / _finite(solved.std[:LOAD]),
-        ),
+        verdict=_verdict(found, delivered_vector, words, model),
+        notes=_notes(model, words, logs, known, moved),
     )
-
-
-def _finite(std: Array) -> Array:
-    return np.where(np.isfinite(std) & (std > 0.0), std, np.inf)
 
 
 def _standard_deviations(solved: Estimate, load: Array, seen: Visibility) -> Array:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
+from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
-
+from psdmc.backends.c.render import environment
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import SCALED
 from psdmc.errors import InputError, exit_status_of
@@ -31,85 +29,63 @@ LAYOUT_TITLES = {"state": "one state per call", "rows": "batch, rows", "lanes": 
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One row of a robot's table as text: the result of one library. `ours` is true for psdmc."""
-
-    who: str
-    how: str
-    operations: str
-    instructions: str
-    ns: str
-    spread: str
-    latency: str
-    cold: str
-    code: str
-    worst: str
-    ratio: str
-    error: str
-    ours: bool
-
-
-@dataclass(frozen=True, slots=True)
 class FunctionTable:
-    """One function's rows, fastest first."""
+    """One function's rows as text, one for each library, fastest first. `ours` is true in psdmc's."""
 
     title: str
-    rows: tuple[Row, ...]
+    rows: tuple[dict[str, Any], ...]
 
 
 def headlines(result: BenchResult) -> tuple[tuple[str, tuple[Cells, ...]], ...]:
     """Return a row for every robot: its name, then cells for inverse and for forward dynamics. The cells are psdmc's time
     in ns, and how many times faster it is than Pinocchio and than C code of CasADi. Two more cells are for batch calls,
     by rows and lane by lane, over Pinocchio. Pinocchio's faster algorithm counts."""
-    return tuple(
-        (case.name, tuple(_headline(case, function) for function in SCALED)) for case in result.cases
-    )
-
-
-def _headline(case: CaseResult, function: str) -> Cells:
-    ours = case.best(OURS, function)
     batches = (("state", PINOCCHIO), ("state", CASADI), ("rows", PINOCCHIO), ("lanes", PINOCCHIO))
-    ratios = (case.ratio(function, layout, over=rival, rival=OURS) for layout, rival in batches)
-    return (f"{ours.ns:.0f}" if ours else "–", *(f"{ratio:.1f}" if ratio else "–" for ratio in ratios))
+    rows = []
+    for case in result.cases:
+        cells = []
+        for function in SCALED:
+            ours = case.best(OURS, function)
+            ratios = (case.ratio(function, layout, over=rival, rival=OURS) for layout, rival in batches)
+            cells.append((f"{ours.ns:.0f}" if ours else "–", *(f"{r:.1f}" if r else "–" for r in ratios)))
+        rows.append((case.name, tuple(cells)))
+    return tuple(rows)
 
 
 def function_tables(case: CaseResult) -> tuple[FunctionTable, ...]:
     """Return a table of times for each function that was measured on a robot."""
-    functions = dict.fromkeys(m.function for m in case.measurements)
-    return tuple(FunctionTable(FUNCTION_TITLES[f], tuple(_rows(case, f))) for f in functions)
+    tables = []
+    for function in dict.fromkeys(m.function for m in case.measurements):
+        reference = case.best(PINOCCHIO, function)
+        own = sorted((m for m in case.measurements if m.function == function), key=lambda m: m.ns)
+        rows = tuple(_row(m, reference.ns if reference else None) for m in own)
+        tables.append(FunctionTable(FUNCTION_TITLES[function], rows))
+    return tuple(tables)
 
 
-def _rows(case: CaseResult, function: str) -> Iterator[Row]:
-    reference = case.best(PINOCCHIO, function)
-    for m in sorted((m for m in case.measurements if m.function == function), key=lambda m: m.ns):
-        yield _row(m, reference.ns if reference else None)
-
-
-def _row(m: Measurement, reference: float | None) -> Row:
+def _row(m: Measurement, reference: float | None) -> dict[str, Any]:
     times = m.times
-    return Row(
-        who=m.label,
-        how=LAYOUT_TITLES[m.layout],
-        operations="{} + {}".format(*m.operations) if m.operations else "",
-        instructions=f"{m.instructions:.0f}" if m.instructions is not None else "",
-        ns=f"{m.ns:.1f}",
-        spread=f"{times.throughput.low:.1f} – {times.throughput.high:.1f}",
-        latency=f"{times.latency.median:.1f}" if times.latency else "",
-        cold=f"{times.cold.median:,.0f}" if times.cold else "",
-        code=f"{m.code_bytes / 1e3:.1f}" if m.code_bytes is not None else "",
-        worst=f"{times.tail.percentile_99_99:.0f} / {times.tail.worst:.0f}" if times.tail else "",
-        ratio=f"{reference / m.ns:.1f}×" if reference else "",
-        error=f"{m.error:.0e}",
-        ours=m.rival.startswith("psdmc"),
-    )
+    return {
+        "who": m.label,
+        "how": LAYOUT_TITLES[m.layout],
+        "operations": "{} + {}".format(*m.operations) if m.operations else "",
+        "instructions": f"{m.instructions:.0f}" if m.instructions is not None else "",
+        "ns": f"{m.ns:.1f}",
+        "spread": f"{times.throughput.low:.1f} – {times.throughput.high:.1f}",
+        "latency": f"{times.latency.median:.1f}" if times.latency else "",
+        "cold": f"{times.cold.median:,.0f}" if times.cold else "",
+        "code": f"{m.code_bytes / 1e3:.1f}" if m.code_bytes is not None else "",
+        "worst": f"{times.tail.percentile_99_99:.0f} / {times.tail.worst:.0f}" if times.tail else "",
+        "ratio": f"{reference / m.ns:.1f}×" if reference else "",
+        "error": f"{m.error:.0e}",
+        "ours": m.rival.startswith("psdmc"),
+    }
 
 
 def quoted_table() -> tuple[Cells, ...]:
     """Denso-2022's table 5 as printed."""
-    first = DENSO_TABLE_5[0]
-    return tuple(
-        _quoted(row.method, row.inverse, row.forward, first.inverse, first.forward) for row in DENSO_TABLE_5
-    )
+    _, inverse, forward = DENSO_TABLE_5[0]
+    return tuple(_quoted(*row, inverse, forward) for row in DENSO_TABLE_5)
 
 
 def own_table(result: BenchResult) -> tuple[Cells, ...]:
@@ -202,7 +178,6 @@ def thread_rows(result: BenchResult) -> tuple[tuple[str, str, str, Cells, str], 
 class Published:
     """Published times of one robot in ns per call, and of its derivation in s; None if not published."""
 
-    robot: str
     source: str
     inverse: float
     forward: float
@@ -213,27 +188,19 @@ PSDM_2021 = "PSDM-2021 (Mech. Mach. Theory 156)"
 DENSO_2022 = "Denso-2022, table 5"
 
 PUBLISHED = {
-    "Denso": Published("Denso", DENSO_2022, 400.0, 630.0, 3.0),
-    "KR6": Published("KR6", PSDM_2021, 2110.0, 2270.0, 5.3),
-    "LBR7": Published("LBR7", PSDM_2021, 6490.0, 7280.0, 88.0),
+    "Denso": Published(DENSO_2022, 400.0, 630.0, 3.0),
+    "KR6": Published(PSDM_2021, 2110.0, 2270.0, 5.3),
+    "LBR7": Published(PSDM_2021, 6490.0, 7280.0, 88.0),
 }
 """By the benchmark's name of the robot."""
 
 
-@dataclass(frozen=True, slots=True)
-class TableRow:
-    """A row of table 5 of the paper Denso-2022: times in ns per call."""
-
-    method: str
-    inverse: float
-    forward: float
-
-
 DENSO_TABLE_5 = (
-    TableRow("PSDM", 400.0, 630.0),
-    TableRow("RNE", 6000.0, 19900.0),
-    TableRow("RNE, regressive form", 17200.0, 112000.0),
+    ("PSDM", 400.0, 630.0),
+    ("RNE", 6000.0, 19900.0),
+    ("RNE, regressive form", 17200.0, 112000.0),
 )
+"""Rows of table 5 of the paper Denso-2022: method, and times of inverse and forward dynamics in ns per call."""
 
 
 LARGEST_RESULT = 64 << 20
@@ -269,12 +236,13 @@ def page(result: BenchResult, command: str = COMMAND) -> str:
         "own": own_table(result),
         "published": published_rows(result),
         "scaling": scaling_rows(result),
-        "scaling_plots": _scaling_plots(result),
+        "scaling_plots": tuple(scaling(result, f) for f in SCALED) if result.scaling else (),
         "threads": thread_rows(result),
         "colours": COLOURS,
         "busy": [case.name for case in (*result.cases, *result.scaling) if not case.idle],
     }
-    return _environment().get_template("report/bench.html.jinja").render(**view)
+    pages = environment().overlay(autoescape=True, keep_trailing_newline=False)
+    return pages.get_template("report/bench.html.jinja").render(**view)
 
 
 def _section(result: BenchResult, index: int) -> RobotSection:
@@ -285,31 +253,9 @@ def _section(result: BenchResult, index: int) -> RobotSection:
         case.name,
         f"robot{index}",
         f"{case.n} joints, {p}, {case.l} base parameters; {case.note}; {case.rounds} trials",
-        case_plots(case),
+        tuple(bars(case, function) for function in SCALED if any(case.of(function))),
         function_tables(case),
         missing,
-    )
-
-
-def _scaling_plots(result: BenchResult) -> tuple[str, ...]:
-    if not result.scaling:
-        return ()
-    return tuple(scaling(result, f) for f in SCALED)
-
-
-def _environment() -> Environment:
-    """The environment for HTML: text from a robot's file is escaped."""
-
-    def source(name: str) -> str | None:
-        file = resources.files("psdmc.templates").joinpath(name)
-        return file.read_text(encoding="utf-8") if file.is_file() else None
-
-    return Environment(
-        loader=FunctionLoader(source),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
     )
 
 
@@ -373,11 +319,6 @@ def scaling(result: BenchResult, function: str) -> str:
 
 def _colour(measurement: Measurement) -> str:
     return next((c for name, c in COLOURS.items() if measurement.rival.startswith(name)), "#888888")
-
-
-def case_plots(case: CaseResult, functions: Sequence[str] = SCALED) -> tuple[str, ...]:
-    """Draw a bar plot for each of the functions that was measured on a robot."""
-    return tuple(bars(case, function) for function in functions if any(case.of(function)))
 
 
 # The command

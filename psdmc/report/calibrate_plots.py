@@ -40,14 +40,14 @@ def step_panels(step: StepQuality) -> tuple[str, ...]:
     """Draw the measured torque, the predicted torque and their difference for each joint, over time. Parts of the log
     that were kept out of the fit are shaded."""
     return tuple(
-        svg(partial(alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
+        panel(partial(_sample, sample=sample), f"{step.step}: {WHAT} {sample.joint}")
         for sample in step.samples
     )
 
 
-def alone(draw: Callable[[Axes], None], figure: Figure) -> None:
-    """A figure with one drawing."""
-    draw(figure.subplots())
+def panel(draw: Callable[[Axes], None], says: str) -> str:
+    """Return a picture with one drawing as an <svg> element; `says` is the description for screen readers."""
+    return svg(lambda figure: draw(figure.subplots()), PANEL, says)
 
 
 def _sample(axis: Axes, sample: Sample) -> None:
@@ -89,8 +89,7 @@ def excitation_panels(
     """Draw positions, speeds and accelerations of the exciting motion with the joint limits, if known. Compare the
     motion with random motions, too."""
     return tuple(
-        svg(partial(alone, draw), PANEL, f"exciting motion: {says}")
-        for says, draw in _excitation(found, joint_names, limits)
+        panel(draw, f"exciting motion: {says}") for says, draw in _excitation(found, joint_names, limits)
     )
 
 

@@ -16,10 +16,10 @@ from psdmc.calibration.compared import Comparison, Curve
 from psdmc.calibration.validation import JointError, Validation
 from psdmc.calibration.verdict.changes import Change
 from psdmc.files import refuse_foreign_file, write_together
-from psdmc.report.calibrate_plots import MEASURED, PANEL, PREDICTED, RESIDUAL, alone, step_panels
+from psdmc.report.calibrate_plots import MEASURED, PREDICTED, RESIDUAL, panel, step_panels
 from psdmc.report.calibrate_report import FigureView
 from psdmc.report.calibrate_tables import number, r_squared, table
-from psdmc.report.drawing import Axes, legend_below, svg
+from psdmc.report.drawing import Axes, legend_below
 
 Rows = Sequence[Sequence[str]]
 MARK = '"schema": 1,\n "kind": "'
@@ -117,11 +117,7 @@ def validation_page(found: Validation) -> PageView:
     figures = [] if found.quality is None else [FigureView("Torque", step_panels(found.quality), TORQUE)]
     for which, label in (("by_speed", "speed"), ("by_time", "time")):
         panels = tuple(
-            svg(
-                partial(alone, partial(_bins, joint=j, which=which)),
-                PANEL,
-                f"error of joint {j.joint} by {label}",
-            )
+            panel(partial(_bins, joint=j, which=which), f"error of joint {j.joint} by {label}")
             for j in found.joints
         )
         figures.append(FigureView(f"Error against {label}", panels, BINNED))
@@ -214,8 +210,7 @@ def comparison_page(found: Comparison) -> PageView:
     ]
     lines = [("doubt", text) for text in found.doubts] + [("noticed", joint.words) for joint in found.noticed]
     panels = tuple(
-        svg(partial(alone, partial(_curve, curve=curve)), PANEL, f"friction of joint {curve.joint}")
-        for curve in found.curves
+        panel(partial(_curve, curve=curve), f"friction of joint {curve.joint}") for curve in found.curves
     )
     return PageView(
         document="comparison",

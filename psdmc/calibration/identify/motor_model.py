@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.identify.least_squares import Block, Rows
+from psdmc.calibration.identify.least_squares import Block, Rows, with_rows
 from psdmc.calibration.logs.foreign_bytes import first_faults, listed, quoted
 from psdmc.calibration.logs.log import AnyLog, Array, Quantity
 from psdmc.errors import InputError
@@ -95,10 +95,8 @@ class RowsByMotors:
     torque: Array
 
     def __iter__(self) -> Iterator[Block]:
-        first, n = 0, self.torque.shape[1]
-        for block in self.rows:
-            own = slice(first, first + len(block))
-            first = own.stop
+        n = self.torque.shape[1]
+        for block, own in with_rows(self.rows):
             yield Block(block.columns, block.noise, self.torque[own, :, None] * np.eye(n))
 
 

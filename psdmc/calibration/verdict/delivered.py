@@ -246,18 +246,13 @@ def log_parts(
 def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) -> StepQuality:
     chain, step = found.model.mechanism, found.step
     parts = [predicted_rows(found, log, check) for log in logs]
-    time, measured, predicted = (
-        _joined([getattr(part, name) for part in parts]) for name in ("time", "measured", "predicted")
-    )
+    columns = [[getattr(part, name) for part in parts] for name in ("time", "measured", "predicted")]
+    # a single array is not copied, as it may be large
+    time, measured, predicted = (own[0] if len(own) == 1 else np.concatenate(own) for own in columns)
     out = np.concatenate(
         [held_out_of(log, len(part.time), step.split) for log, part in zip(logs, parts, strict=True)]
     )
     return judged("All", chain.v_names, time, measured, predicted, out)
-
-
-def _joined(arrays: list[Array]) -> Array:
-    """All arrays in one; a single one is not copied, as it may be large."""
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def predicted_rows(
@@ -272,7 +267,11 @@ def predicted_rows(
 
     def predicted(part: Stretch) -> Array:
         if friction is None:
-            return smoothed_rows(part.states, part.at, lambda rows: _torque(found, part.states, rows))
+            states = part.states
+            motion = (states.q, states.qd, states.qdd)
+            return smoothed_rows(
+                states, part.at, lambda rows: linear_torque(found, *(values[rows] for values in motion))
+            )
         return _torque_with_state(found, friction, part.states, part.at)
 
     log = checked(log, found.model.mechanism, step.filter.cutoff, check)
@@ -284,11 +283,6 @@ def predicted_rows(
         whole.time[own], whole.qd[own], whole.predicted[own] = states.time[at], states.qd[at], torque
         whole.measured[own] = motors.torque(states.effort)[at]
     return whole
-
-
-def _torque(found: Delivered, states: States, rows: slice) -> Array:
-    """(rows, n) motor torque before the filter: rigid bodies, friction, springs."""
-    return linear_torque(found, states.q[rows], states.qd[rows], states.qdd[rows])
 
 
 def linear_torque(found: Delivered, q: Array, qd: Array, qdd: Array) -> Array:

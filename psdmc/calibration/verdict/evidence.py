@@ -120,9 +120,7 @@ class Evidence:
 
     def thinned(self, most: int) -> Evidence:
         """Return about `most` samples or fewer, evenly spread."""
-        return self._at(slice(None, None, max(1, -(-len(self) // most))))
-
-    def _at(self, rows: slice) -> Evidence:
+        rows = slice(None, None, max(1, -(-len(self) // most)))
         kept = {name: getattr(self, name)[rows] for name in ("q", "qd", "qdd", "sign", "torque")}
         return replace(self, **kept)
 
@@ -144,7 +142,20 @@ class Evidence:
 
         For robots whose motors each drive one joint, the samples stay unchanged.
         """
-        return self if self.coupling is None else _of_motors(self, self.coupling)
+        coupling = self.coupling
+        if coupling is None:
+            return self
+        return _MotorEvidence(
+            self.model,
+            self.regressor,
+            self.q,
+            coupling.to_motors(self.qd),
+            coupling.to_motors(self.qdd),
+            self.sign,
+            coupling.torque_of_motors(self.torque),
+            self.noise,
+            whole=np.einsum("tjl,jk->tkl", self.columns(), coupling.matrix),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,20 +166,6 @@ class _MotorEvidence(Evidence):
 
     def columns(self) -> Array:
         return self.whole
-
-
-def _of_motors(joints: Evidence, coupling: Coupling) -> Evidence:
-    return _MotorEvidence(
-        joints.model,
-        joints.regressor,
-        joints.q,
-        coupling.to_motors(joints.qd),
-        coupling.to_motors(joints.qdd),
-        joints.sign,
-        coupling.torque_of_motors(joints.torque),
-        joints.noise,
-        whole=np.einsum("tjl,jk->tkl", joints.columns(), coupling.matrix),
-    )
 
 
 def evidence_of(

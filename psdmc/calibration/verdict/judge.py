@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from psdmc.calibration.identify.motor_model import Motors, coupling_of
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.residuals import CORRELATED
 from psdmc.calibration.logs.log import AnyLog
-from psdmc.calibration.logs.log_survey import Saturated
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.verdict.couplings import proposed_coupling
 from psdmc.calibration.verdict.delivered import delivered, sprung
@@ -148,30 +146,29 @@ def hidden_errors(found: Findings) -> Iterator[tuple[Ground, bool]]:
 
 def reasons(found: Findings) -> Iterator[Ground]:
     """Yield the reasons why a calibration is not usable; there are none if it is usable."""
-    yield from _saturated(found)
-    yield from _late(found)
-    yield from _unphysical(found)
-    yield from _too_few(found)
+    if any(each.certain for each in found.evidence.saturated):
+        yield _at_a_level("saturated", found)
+    for delay in found.delays:
+        if delay.shown and abs(delay.value) > found.limits.late:
+            yield late(delay)
+    failed = found.record.facts.get(NOT_PHYSICAL)
+    if failed:
+        yield Ground("not_physical", {"why": failed})
+    least = found.limits.fewest_samples
+    for demand in found.demands:
+        if demand.per_unknown < least:
+            yield Ground("starved", {**asdict(demand), "limit": least})
     yield from _wrong_gains(found)
     yield from _powered(found)
     yield from _poor(found)
 
 
-def _saturated(found: Findings) -> Iterator[Ground]:
-    piled = found.evidence.saturated
-    if any(each.certain for each in piled):
-        yield Ground("saturated", {"items": _levels(piled)})
-
-
-def _levels(piled: Sequence[Saturated]) -> list[dict[str, Any]]:
+def _at_a_level(code: str, found: Findings) -> Ground:
+    """The reason or doubt about efforts that stay at an extreme value."""
     names = ("joint", "level", "unit", "share")
-    return [{name: getattr(each, name) for name in names} for each in piled]
-
-
-def _late(found: Findings) -> Iterator[Ground]:
-    for delay in found.delays:
-        if delay.shown and abs(delay.value) > found.limits.late:
-            yield late(delay)
+    return Ground(
+        code, {"items": [{name: getattr(each, name) for name in names} for each in found.evidence.saturated]}
+    )
 
 
 def late(delay: Delay) -> Ground:
@@ -180,19 +177,6 @@ def late(delay: Delay) -> Ground:
     The text of the verdict states the delay and the change of the log that removes it.
     """
     return Ground("late", {"log": delay.log, "seconds": delay.value, "std": delay.std})
-
-
-def _unphysical(found: Findings) -> Iterator[Ground]:
-    failed = found.record.facts.get(NOT_PHYSICAL)
-    if failed:
-        yield Ground("not_physical", {"why": failed})
-
-
-def _too_few(found: Findings) -> Iterator[Ground]:
-    least = found.limits.fewest_samples
-    for demand in found.demands:
-        if demand.per_unknown < least:
-            yield Ground("starved", {**asdict(demand), "limit": least})
 
 
 def _wrong_gains(found: Findings) -> Iterator[Ground]:
@@ -232,50 +216,44 @@ def _poor(found: Findings) -> Iterator[Ground]:
 
 def doubts(found: Findings) -> Iterator[Ground]:
     """Yield all doubts about a calibration."""
-    yield from _odd_logs(found)
-    yield from _drifting(found)
-    yield from _perhaps_saturated(found)
-    yield from _a_little_late(found)
+    yield from _of_logs(found)
     yield from _sampled_slowly(found)
-    yield from _few(found)
+    for demand in found.demands:
+        if found.limits.fewest_samples <= demand.per_unknown < found.limits.few_samples:
+            yield Ground("few_samples", {**asdict(demand), "limit": found.limits.few_samples})
     yield from _fair(found)
     yield from _earlier_steps(found)
     yield from _odd_gains(found)
-    yield from _wrong_file(found)
-    yield from _unjudged(found)
-    yield from _unlike_limits(found)
-    yield from _hardly_moving(found)
+    yield from _of_scales(found)
+    slow = [{"joint": name} for k, name in enumerate(found.names) if found.speed[k] < found.limits.hardly]
+    if slow:
+        yield Ground("hardly_moving", {"items": slow, "limit": found.limits.hardly})
     yield from _lacking(found)
     yield from _not_carried_over(found)
     yield from _open_parameters(found)
-    yield from _indefinite(found)
-    yield from _unchecked(found)
+    mass = found.record.facts.get("mass_matrix", {})  # empty if it was not tested
+    if mass.get("failing"):
+        yield Ground("indefinite", {"failing": mass["failing"], "poses": mass["poses"]})
+    if found.evidence.model.theta_b is None and not found.record.motors:
+        yield Ground("unchecked")
+    turned = [{"joint": row.joint} for row in found.record.motors if row.value < 0]
+    if turned:
+        yield Ground("negative_constants", {"items": turned})
 
 
-def _odd_logs(found: Findings) -> Iterator[Ground]:
-    """Doubts about logs that contradict the other logs of the fit."""
+def _of_logs(found: Findings) -> Iterator[Ground]:
+    """Doubts about logs that contradict the others, over which friction changes, or whose efforts are clipped or late."""
     odd = found.record.facts.get(ODD_LOGS, {"items": []})
     for item in odd["items"]:
         fitted = len(found.record.facts[LOG_INFORMATION]["logs"])
         yield Ground("logs_disagree" if odd["disagree"] else "odd_log", {**item, "logs": fitted})
-
-
-def _drifting(found: Findings) -> Iterator[Ground]:
-    """A doubt about each log over which friction changes."""
     drifts = [each for each in found.record.facts.get(FRICTION_DRIFT, ()) if each["shown"]]
     for log in dict.fromkeys(each["log"] for each in drifts):
         items = [each for each in drifts if each["log"] == log]
         yield Ground("friction_drifts", {"log": log, "seconds": items[0]["seconds"], "items": items})
-
-
-def _perhaps_saturated(found: Findings) -> Iterator[Ground]:
-    """A doubt about efforts that friction of a constant size explains as well as a limit does."""
     piled = found.evidence.saturated
-    if piled and not any(each.certain for each in piled):
-        yield Ground("perhaps_saturated", {"items": _levels(piled)})
-
-
-def _a_little_late(found: Findings) -> Iterator[Ground]:
+    if piled and not any(each.certain for each in piled):  # friction of a constant size explains them as well
+        yield _at_a_level("perhaps_saturated", found)
     for delay in found.delays:
         if delay.shown and found.limits.hardly_late < abs(delay.value) <= found.limits.late:
             yield late(delay)
@@ -316,12 +294,6 @@ def cutoff_for(lost: float) -> float:
     return float(np.sqrt(15.0 - np.sqrt(225.0 - 360.0 * lost)) / (2.0 * np.pi))
 
 
-def _few(found: Findings) -> Iterator[Ground]:
-    for demand in found.demands:
-        if found.limits.fewest_samples <= demand.per_unknown < found.limits.few_samples:
-            yield Ground("few_samples", {**asdict(demand), "limit": found.limits.few_samples})
-
-
 def _fair(found: Findings) -> Iterator[Ground]:
     named = [
         k
@@ -359,23 +331,19 @@ def _odd_gains(found: Findings) -> Iterator[Ground]:
         yield Ground("odd_gains", {"items": found.gained(odd)})
 
 
-def _wrong_file(found: Findings) -> Iterator[Ground]:
-    """A doubt about the robot file, at joints whose effort has the scale of the other joints' efforts."""
+def _of_scales(found: Findings) -> Iterator[Ground]:
+    """Doubts about the robot file, and about the scale of efforts.
+
+    The file is wrong at joints whose effort has the scale of the other joints' efforts. The scale is unknown at joints
+    where nothing shows it. Torques may be far below the file's limits for the motors, or several times as large.
+    """
     scales = found.file_errors
     if scales:
         items = found.gained(list(scales))
         more = [{"scale": scale.value, "scale_std": scale.std} for scale in scales.values()]
         yield Ground("wrong_file", {"items": [a | b for a, b in zip(items, more, strict=True)]})
-
-
-def _unjudged(found: Findings) -> Iterator[Ground]:
-    """A doubt about joints whose effort may have any scale, because nothing shows it."""
     if found.unjudged:
         yield Ground("unjudged_scale", {"items": [{"joint": found.names[k]} for k in found.unjudged]})
-
-
-def _unlike_limits(found: Findings) -> Iterator[Ground]:
-    """Torques that are far below the file's limits for the motors, or several times as large."""
     limits = np.array([joint.limits.effort for joint in found.evidence.model.mechanism.leading_joints])
     known = np.isfinite(limits) & (limits > 0)
     if not known.any():
@@ -384,12 +352,6 @@ def _unlike_limits(found: Findings) -> Iterator[Ground]:
     low, high = found.limits.of_limit
     if share.max() < low or share.max() > high:
         yield Ground("unlike_limits", {"share": float(share.max())})
-
-
-def _hardly_moving(found: Findings) -> Iterator[Ground]:
-    slow = [{"joint": name} for k, name in enumerate(found.names) if found.speed[k] < found.limits.hardly]
-    if slow:
-        yield Ground("hardly_moving", {"items": slow, "limit": found.limits.hardly})
 
 
 def _lacking(found: Findings) -> Iterator[Ground]:
@@ -440,18 +402,3 @@ def _open_parameters(found: Findings) -> Iterator[Ground]:
         yield Ground(
             "known_badly", {"items": [{name: getattr(rows[j], name) for name in names} for j in badly]}
         )
-
-
-def _indefinite(found: Findings) -> Iterator[Ground]:
-    """A mass matrix that is not positive definite, where that was tested."""
-    mass = found.record.facts.get("mass_matrix", {})
-    if mass.get("failing"):
-        yield Ground("indefinite", {"failing": mass["failing"], "poses": mass["poses"]})
-
-
-def _unchecked(found: Findings) -> Iterator[Ground]:
-    if found.evidence.model.theta_b is None and not found.record.motors:
-        yield Ground("unchecked")
-    turned = [{"joint": row.joint} for row in found.record.motors if row.value < 0]
-    if turned:
-        yield Ground("negative_constants", {"items": turned})

@@ -28,8 +28,7 @@ from psdmc.calibration.logs.log import AnyLog, Array
 from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.errors import InternalError
-from psdmc.friction.law import Term
-from psdmc.friction.law import unit_of as own_unit
+from psdmc.friction.law import Term, unit_of
 from psdmc.friction.terms import STATE_LAW
 from psdmc.model.calibrated import (
     IDENTIFIED,
@@ -50,7 +49,6 @@ from psdmc.model.calibrated import (
 from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import check_mass_matrix
-from psdmc.robot.mechanism import Joint
 from psdmc.robot.missing_inertia import massless_words, unknown_option
 from psdmc.version import psdmc_version
 
@@ -195,7 +193,7 @@ def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, .
         for parameter, value, std, unit in values:
             by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
             seen = parameter not in joint.unseen
-            own = _unit_of(joints[name], unit)
+            own = unit_of(joints[name].type.effort_unit, unit)
             rows.append(NumberRow(name, parameter, value, float(np.hypot(std, by_constant)), own, seen))
     return tuple(rows)
 
@@ -240,13 +238,17 @@ def linear_record(
         name: unit for term in problem.terms for name, unit in zip(term.names, term.units(), strict=True)
     }
     friction = [
-        row(k, owner, name, _unit_of(joints[owner], turning[name]))
+        row(k, owner, name, unit_of(joints[owner].type.effort_unit, turning[name]))
         for k, (owner, name) in enumerate(problem.plain, start=model.l)
     ]
     unknowns = enumerate(problem.columns.unknowns, start=problem.first_extra)
     extra = [row(k, unknown.owner, unknown.name, unknown.unit) for k, unknown in unknowns]
     of_springs = problem.columns.of_springs
     step = StepOptions(options.filter, options.split, options.fit)
+    coupled = (
+        "friction is of the motors, which are called like the joints: some of them drive several together"
+    )
+    notes = (coupled,) if options.coupling else ()
     return with_model(
         Calibration(
             robot=model.mechanism.name,
@@ -273,18 +275,10 @@ def linear_record(
                 coupling=options.coupling,
                 columns=problem.columns.content,
             ),
-            notes=(*_coupled_notes(options), *weak_notes("linear fit", names, seen)),
+            notes=(*notes, *weak_notes("linear fit", names, seen)),
             covariance=_covariance((solved.total_covariance + solved.prior_covariance)[: model.l, : model.l]),
         ),
         values[: model.l],
-    )
-
-
-def _coupled_notes(options: LinearOptions) -> tuple[str, ...]:
-    if not options.coupling:
-        return ()
-    return (
-        "friction is of the motors, which are called like the joints: some of them drive several together",
     )
 
 
@@ -331,11 +325,6 @@ def _covariance(found: Array) -> Array:
     return np.clip(found, -largest, largest)
 
 
-def _unit_of(joint: Joint, turning: str) -> str:
-    """The unit of a joint's number, given that of one that turns: for Nms/rad Ns/m where it slides."""
-    return own_unit(joint.type.effort_unit, turning)
-
-
 def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
     """Values (n,) by their joints' names."""
     return dict(zip(model.v_names, values.tolist(), strict=True))
@@ -375,7 +364,7 @@ def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) 
             "torque_constant",
             float(value),
             float(abs(value) * share),
-            _unit_of(joint, "Nm/A"),
+            unit_of(joint.type.effort_unit, "Nm/A"),
             bool(known),
         )
         for joint, value, share, known in own
@@ -405,10 +394,15 @@ def judged_record(
     facts = {**record.facts, "physically_consistent": plain is not None}
     notes, warnings = list(record.notes), list(record.warnings)
     if plain is not None and distance is not None:
-        cost = _cost(plain.steps, steps)
+        cost, of_friction = (_lost(plain.steps, steps, step) for step in (WHOLE, "Friction"))
         facts["physical_cost_r2"] = cost
         facts["physical_distance_std"] = distance
-        notes.append(_price(cost, distance, _cost_of_friction(plain.steps, steps)))
+        words = ", ".join(f"{name} {-price:+.4f}" for name, price in cost.items())
+        worst = f"; of friction runs by {-max(of_friction.values()):+.4f} at worst" if of_friction else ""
+        notes.append(
+            f"physical consistency moved the parameters by {distance:.3g} standard deviations in all and held-out R^2 by "
+            f"{words}{worst}"
+        )
     if mass is not None:
         facts["mass_matrix"] = {"poses": mass.poses, "failing": mass.failing, "smallest": mass.smallest}
         if not mass.passed:
@@ -420,26 +414,7 @@ def judged_record(
     return with_model(whole)
 
 
-def _cost(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> dict[str, float]:
-    """Held-out R^2 of the whole torque that is lost, by joint."""
-    was, now = ({step.step: step for step in steps}[WHOLE].joints for steps in (before, after))
+def _lost(before: Sequence[StepQuality], after: Sequence[StepQuality], step: str) -> dict[str, float]:
+    """Held-out R^2 that a step loses, by joint; empty where there is no such step."""
+    was, now = ({each.step: each.joints for each in steps}.get(step, {}) for steps in (before, after))
     return {name: was[name].held_out.r2 - now[name].held_out.r2 for name in now}
-
-
-def _cost_of_friction(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> float | None:
-    """The largest loss of held-out R^2 in any joint's friction run; None where there are no such runs."""
-    was, now = ({step.step: step for step in steps}.get("Friction") for steps in (before, after))
-    if was is None or now is None:
-        return None
-    return max(
-        (was.joints[name].held_out.r2 - now.joints[name].held_out.r2 for name in now.joints), default=0.0
-    )
-
-
-def _price(cost: dict[str, float], distance: float, of_friction: float | None) -> str:
-    words = ", ".join(f"{name} {-price:+.4f}" for name, price in cost.items())
-    rubbed = "" if of_friction is None else f"; of friction runs by {-of_friction:+.4f} at worst"
-    return (
-        f"physical consistency moved the parameters by {distance:.3g} standard deviations in all and held-out R^2 by "
-        f"{words}{rubbed}"
-    )
