@@ -18,6 +18,7 @@ from psdmc.calibration.campaign_plan import Plan as Plan
 from psdmc.calibration.campaign_plan import PlannedRun as PlannedRun
 from psdmc.calibration.campaign_plan import plan_campaign as plan_campaign
 from psdmc.calibration.logs.foreign_bytes import is_folder
+from psdmc.calibration.logs.toml_tables import toml_text
 from psdmc.calibration.motions.excite import MEASURES, Excitation
 from psdmc.calibration.motions.formats import FORMATS
 from psdmc.calibration.motions.trajectory import write_trajectory
@@ -111,13 +112,13 @@ def write_campaign(
                     write_whole(other, form.text(run.motion))
                 else:  # it holds an older motion
                     other.unlink(missing_ok=True)
-        lines += ["[[run]]", f"step = {_toml_text(run.step)}", f"name = {_toml_text(run.name)}"]
+        lines += ["[[run]]", f"step = {toml_text(run.step)}", f"name = {toml_text(run.name)}"]
         if run.joint:
-            lines.append(f"joint = {_toml_text(run.joint)}")
+            lines.append(f"joint = {toml_text(run.joint)}")
         if run.load is not None:
             lines.append(f"load = {{ mass = {run.load.mass!r}, com = {list(run.load.com)!r} }}")
-        lines.append(f"trajectory = {_toml_text(written[id(run.motion)])}")
-        lines += [f"log = {_toml_text(f'logs/{file}.{table}')}", ""]
+        lines.append(f"trajectory = {toml_text(written[id(run.motion)])}")
+        lines += [f"log = {toml_text(f'logs/{file}.{table}')}", ""]
     write_whole(root / "excitation.json", json.dumps(excitation_json(found), indent=1) + "\n")
     path = root / FILE
     write_whole(path, "\n".join(lines))
@@ -126,11 +127,6 @@ def write_campaign(
 
 LONGEST_NAME = 100
 """Characters of a file's name; file systems take 255 bytes."""
-
-
-def _toml_text(text: str) -> str:
-    """A TOML string: JSON's escapes are TOML's, except that TOML also requires one for DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:

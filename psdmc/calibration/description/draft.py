@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from psdmc.calibration.logs.foreign_bytes import quoted
 from psdmc.calibration.logs.formats import format_of
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
 from psdmc.calibration.logs.log_format import Columns, Opening
+from psdmc.calibration.logs.toml_tables import toml_text
 from psdmc.errors import InputError
 
 WHATS: tuple[What, ...] = ("position", "velocity", "effort", "motor_position")
@@ -74,8 +74,8 @@ def drafted(
         values = _values(columns, guess)
         lines = [HEAD.format(name=_quoted_word(output.name)), *_listing(columns), ""]
         for k, path in enumerate(paths):
-            lines += ["[[log]]", f"file = {_toml_text(_beside(path, output))}"]
-            lines += [f"topic = {_toml_text(topic)}"] if topic else []
+            lines += ["[[log]]", f"file = {toml_text(_beside(path, output))}"]
+            lines += [f"topic = {toml_text(topic)}"] if topic else []
             lines += ['use = "fit"' + ("" if k else '   # or "validate": held out as a whole'), ""]
         lines += _time(columns, guess, values) + _quantities(columns, guess, values)
         lines += _joints(columns, guess, values)
@@ -86,11 +86,6 @@ def drafted(
         if what not in places
     )
     return Draft("\n".join(lines) + "\n", missing)
-
-
-def _toml_text(text: str) -> str:
-    """A text in TOML's quotes. TOML has the escapes of JSON, and also requires one for DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _quoted_word(text: str) -> str:
@@ -185,7 +180,7 @@ def _joints(columns: Columns, guess: Guess, values: dict[int, Array]) -> list[st
             "# the file has no header: numbers of columns are a guess, in the order time, position, velocity, effort"
         )
     for joint, places in guess.joints.items():
-        lines += ["[[joint]]", f"name = {_toml_text(joint)}"]
+        lines += ["[[joint]]", f"name = {toml_text(joint)}"]
         for what in WHATS:
             if what == "motor_position" and what in places:
                 lines.append(_motor(columns, guess, values, places))
@@ -216,4 +211,4 @@ def _reference(columns: Columns, place: int) -> str:
     """A column's name where it is short, printable and the only one of that name; else its number."""
     name = columns.names[place] if columns.names else ""
     plain = 0 < len(name) <= LONGEST_NAME and name.isprintable() and columns.names.count(name) == 1
-    return _toml_text(name) if plain else str(place + 1)
+    return toml_text(name) if plain else str(place + 1)

@@ -78,7 +78,7 @@ class States:
         return self.q + draw, self.qd + rate, self.qdd + acceleration
 
 
-def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
+def filtered(log: Log, options: FilterOptions) -> States:
     """Resample and filter a log in memory, and return positions, speeds, accelerations and efforts of all joints.
 
     A joint that moves by no more than the sensor's noise counts as resting. Its speeds and accelerations are exactly
@@ -86,7 +86,7 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
     """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
-    return _states(grid, low_pass, noticed(grid, low_pass, options, check), options, 0, grid.count)
+    return _states(grid, low_pass, noticed(grid, low_pass, options), options, 0, grid.count)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

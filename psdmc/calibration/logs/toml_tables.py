@@ -1,7 +1,8 @@
-"""Reads TOML files of a calibration key by key. Every fault states its table and key."""
+"""Reads TOML files of a calibration key by key, and quotes texts for them. Every fault states its table and key."""
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from collections.abc import Mapping
@@ -53,6 +54,11 @@ def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
         )
     with decoding(name, "TOML", "correct it where it says"):
         return tomllib.loads(text.replace("\r\n", "\n"))
+
+
+def toml_text(text: str) -> str:
+    """Return a text in TOML's quotes. TOML has the escapes of JSON, and also requires one for DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 class TomlTable:

@@ -240,27 +240,28 @@ def _cleared(space: LimitedSines, point: Array, is_free: Callable[[Array], bool]
     return None
 
 
+MOTOR_POSES = 400
+"""Random poses in which a load's torques are looked at."""
+SWEPT = 0.9
+"""Share of each joint's range in which they are, centred."""
 SWEEP_POINTS = 15
 UNFELT = 1e-6
 """Share of the load's weight times 1 m (of its weight, where a joint slides) that counts as nothing."""
 
 
-def motor_poses(
-    chain: Mechanism, load: Load, *, tries: int = 400, range_share: float = 0.9, seed: int = 0
-) -> tuple[Array, Array]:
-    """Return random poses (tries, n), and the torques (tries, n), N m (N), of a load in them.
+def motor_poses(chain: Mechanism, load: Load) -> tuple[Array, Array]:
+    """Return random poses (MOTOR_POSES, n), and the torques (MOTOR_POSES, n), N m (N), of a load in them.
 
     The torque of joint k in a pose is the RMS value while joint k moves through its range and the other joints rest.
     """
-    rng = np.random.default_rng(seed)
-    low, high = np.array([swept_range(joint, range_share) for joint in chain.joints]).T
-    poses = rng.uniform(low, high, (tries, len(chain)))
-    effect = np.empty((tries, len(chain)))
+    low, high = np.array([swept_range(joint, SWEPT) for joint in chain.joints]).T
+    poses = np.random.default_rng(0).uniform(low, high, (MOTOR_POSES, len(chain)))
+    effect = np.empty_like(poses)
     for k in range(len(chain)):
         q = np.repeat(poses[:, None], SWEEP_POINTS, axis=1)
         q[:, :, k] = np.linspace(low[k], high[k], SWEEP_POINTS)
         torque = payload_torque(chain, q.reshape(-1, len(chain)), load.mass, load.com)[:, k]
-        effect[:, k] = np.sqrt(np.mean(torque.reshape(tries, SWEEP_POINTS) ** 2, axis=1))
+        effect[:, k] = np.sqrt(np.mean(torque.reshape(-1, SWEEP_POINTS) ** 2, axis=1))
     return poses, effect
 
 

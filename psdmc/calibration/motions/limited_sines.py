@@ -167,9 +167,9 @@ class SineSum:
         q, qd, qdd = (self.sine @ s + self.cosine @ c for s, c in basis)
         return q.T + self.centre, qd.T, qdd.T
 
-    def sampled(self, joint_names: tuple[str, ...], period: float, repeats: int = 1) -> Trajectory:
-        """Return the motion at equal time steps, `repeats` periods long."""
-        count = round(repeats * self.duration / period) + 1
+    def sampled(self, joint_names: tuple[str, ...], period: float) -> Trajectory:
+        """Return one period of the motion at equal time steps."""
+        count = round(self.duration / period) + 1
         time: Array = np.arange(count, dtype=np.float64) * period
         return Trajectory(joint_names, time, *self.at(time))
 
@@ -192,14 +192,17 @@ RAMPS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, *(12.0 * 2.0**k for k in range(
 """s, tried in this order until the limits are kept: up to 13 minutes, for a motion that leaves 1 % of an acceleration
 that is a hundredth of its speed."""
 
-Faults = Callable[[Trajectory], list[str]]
-"""What a motion may not do and does, a sentence each."""
-
 
 def from_rest_to_rest(
-    motion: SineSum, chain: Mechanism, period: float, repeats: int, faults: Faults
+    motion: SineSum,
+    chain: Mechanism,
+    period: float,
+    repeats: int,
+    faults: Callable[[Trajectory], list[str]],
 ) -> Trajectory:
     """Return `repeats` periods of the motion with a ramp before and after them, in rows that are `period` (s) apart.
+
+    faults  function that returns a sentence for each limit that a motion violates
 
     Raises InputError if no ramp keeps the limits.
     """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.logs.formats import WRITTEN
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log import Log, date_of
 from psdmc.calibration.logs.log_files import columns_of, log_from_columns, read_log, write_log
 from psdmc.errors import InputError
 
@@ -132,3 +132,12 @@ def test_a_bag_holds_what_was_recorded(tmp_path: Path):
     bare = next((tmp_path / "bag").glob("*.db3")).rename(tmp_path / "bare.db3")
     assert np.array_equal(read_log(bare).position, read_log(bare).position)
     assert read_log(bare).joint_names == ("b", "a")
+
+
+@pytest.mark.parametrize(
+    ("first", "date"),
+    [(1_700_000_000.0, "2023-11-14"), (0.0, ""), (12.5, ""), (5e9, ""), (float("nan"), "")],
+)
+def test_only_time_that_counts_from_1970_has_a_date(first: float, date: str):
+    """A log's date is what its own clock says: a copied file gives the same calibration."""
+    assert date_of(first) == date
