@@ -125,8 +125,7 @@ def derive(
     ('J1', 'J2', 'J3', 'J4')
     """
     # Imported here: Pinocchio and SciPy load slowly, and emission needs neither.
-    from psdmc.derivation.derive import derive_model
-    from psdmc.derivation.provenance import provenance
+    from psdmc.derivation.derive import derive_model, provenance_of
     from psdmc.robot.load import load_robot
 
     if not isinstance(robot, str | Path):
@@ -158,7 +157,7 @@ def derive(
         loaded.mechanism,
         expand=expand,
         progress=progress,
-        provenance=provenance(loaded),
+        provenance=provenance_of(loaded),
         gravity_input=gravity_input,
     )
 

@@ -11,8 +11,7 @@ import pytest
 from bundled import ROBOTS, robot_path
 from random_chains import Oracle, random_chain
 
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, load_robot
 from psdmc.robot.reference import Reference, reference
@@ -60,7 +59,7 @@ def subject(name: str, *, expand: bool = True) -> Subject:
     if name in GENERIC:
         return drawn(*GENERIC[name], expand=expand)
     robot = loaded(name)
-    model = derive_model(robot.chain, provenance=provenance(robot), expand=expand)
+    model = derive_model(robot.chain, provenance=provenance_of(robot), expand=expand)
     return Subject(name, model, reference(robot))
 
 

@@ -14,15 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.derivation.scaled import orthonormal
+from psdmc.dynamics.coordinates import normalized
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
-from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
-from psdmc.dynamics.parameters import bodies_of, drive_inertia_of, moving_map
+from psdmc.dynamics.parameters import moving_map
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.spatial import body_from_parameters
 from psdmc.errors import DerivationError, InternalError
+from psdmc.model import evaluate
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.random_states import states_of
+from psdmc.model.random_states import RANGES, states_of
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import (
     BODY_PARAMETERS,
@@ -106,7 +107,7 @@ def measured(model: DynamicsModel) -> Measured:
         torques = model.torques_for(theta, q, qd, qdd)
         last_digit = last_digit_effect(chain, x, states)
         if not np.any(last_digit > DOUBTFUL):
-            reference = _newton_euler(chain, x, states)
+            reference = evaluate.torques(chain, x, [q, qd, qdd])
             return Measured(model, x, states, reference, relative_errors(torques, reference), none, none)
         reference = extended_torques(chain, x, states)
         plain = replace(model, expansion=None).torques_for(theta, q, qd, qdd)
@@ -130,13 +131,6 @@ def judged(found: Measured) -> Array:
         if found.last_digit.any() and not np.all(known <= PROMISED):
             raise _too_fine(found, known)
     return known
-
-
-def _newton_euler(chain: Mechanism, x: Array, states: States) -> Array:
-    q, qd, qdd = states
-    frames, bodies, drives = frames_of(chain), bodies_of(chain, x), drive_inertia_of(x)
-    torques = newton_euler(frames, bodies, drives, q, qd, qdd, base_acceleration(chain))
-    return np.stack([np.broadcast_to(torque, (SAMPLES,)) for torque in torques], axis=1)
 
 
 def _too_fine(found: Measured, known: Array) -> DerivationError:
@@ -220,8 +214,6 @@ def _parameters(model: DynamicsModel, rng: np.random.Generator) -> tuple[Array, 
     return x, times(model.B, x)
 
 
-"""q, qd and qdd, a list of n arrays each."""
-
 # How much a robot's torques change with the last digits of its numbers: no model can be more accurate. A direction that a
 # file gives to 16 digits is uncertain by 1e-16 rad. That changes the moment about an axis of 100 N that act 3 m away by some
 # 1e-14 N m: negligible, unless that axis itself moves no more than a gram at a micrometre.
@@ -258,7 +250,7 @@ def last_digit_effect(chain: Mechanism, x: Array, states: States) -> Array:
     joint's largest torque, or absolute if that is zero.
     """
     rng = np.random.default_rng(DIGIT_SEED)
-    numbers = _numbers(chain, x, _as_it_is, np.dtype(np.float64))
+    numbers = _numbers(chain, x, np.asarray, np.dtype(np.float64))
     torques = _torques(chain, numbers, states)
     largest = np.abs(torques).max(axis=0)
     changes = [
@@ -275,10 +267,6 @@ def extended_torques(chain: Mechanism, x: Array, states: States) -> Array:
     numbers = _numbers(chain, x, orthonormal, long)
     vectors = [[vector.astype(long) for vector in one] for one in states]
     return _torques(chain, numbers, vectors).astype(np.float64)
-
-
-def _as_it_is(rotation: Array) -> Long:
-    return rotation
 
 
 def _numbers(
@@ -330,3 +318,26 @@ def _torques(chain: Mechanism, numbers: Numbers, states: States) -> Long:
 def _frame(frame: Frame, rotation: Long, translation: Long) -> Frame:
     rows = tuple(tuple(row) for row in rotation)
     return replace(frame, rotation=rows, translation=tuple(translation))  # type: ignore[arg-type]
+
+
+# How much a robot's torques change by snapping.
+SNAP_SEED, SNAP_SAMPLES = 31_416, 256
+
+
+def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
+    """Return (nv,) the largest torque change at random states, N m or N, from replacing rounded angles by exact ones.
+
+    An example is 1.5708 rad, which is replaced by a right angle. The result is None if parameters are unknown.
+    """
+    if np.isnan(snapped.parameters).any() or np.isnan(unsnapped.parameters).any():
+        return None
+
+    def torques(chain: Mechanism) -> Array:
+        rng = np.random.default_rng(SNAP_SEED)
+        q, qd, qdd = (
+            limit * rng.uniform(-1.0, 1.0, (size, SNAP_SAMPLES))
+            for limit, size in zip(RANGES, (chain.nq, chain.nv, chain.nv), strict=True)
+        )
+        return evaluate.torques(chain, chain.parameters, [normalized(frames_of(chain), q).T, qd.T, qdd.T])
+
+    return np.asarray(np.max(np.abs(torques(snapped) - torques(unsnapped)), axis=0))

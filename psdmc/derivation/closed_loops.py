@@ -16,10 +16,9 @@ from psdmc.derivation.scaled import length_unit
 from psdmc.dynamics.closed_loops import loop_error, loop_jacobian
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.manifold import integrated, restored
-from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InputError
+from psdmc.model.evaluate import columns
 from psdmc.model.random_states import states_of
-from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import ROW_NAMES, Array, Loop, Mechanism
 
 STARTS, STEPS, SEED = 256, 60, 29_175
@@ -51,9 +50,8 @@ def require_closable(robot: Mechanism) -> Array:
             f"'{robot.name}': {len(robot.loops)} loops close a robot with {robot.nv} joint rates: some are redundant",
             "describe each closed loop once; a robot has at most one loop per rate",
         )
-    unit = length_unit(robot)
     rows = [row for loop in robot.loops for row in loop.rows]
-    scales = np.array([1.0 / unit if row < 3 else 1.0 for row in rows])
+    scales = _scales(robot)
     q, errors = _assembled(robot, scales)
     sizes = np.abs(errors).max(axis=1)
     found = sizes < CLOSED
@@ -106,8 +104,9 @@ def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
             "leave it out of passive in [[loop]]",
         )
     unit = length_unit(robot)
-    scales = np.array([1.0 / unit if row < 3 else 1.0 for loop in robot.loops for row in loop.rows])
-    units = [unit if order else 1.0 for kind in _types(robot) for order in kind.v_orders]
+    scales = _scales(robot)
+    types = [robot.joints[joint].type for joint in robot.own_joints]
+    units = [unit if order else 1.0 for kind in types for order in kind.v_orders]
     rows = _jacobian(robot, q) * scales[:, None] * np.array(units)
     single = [robot.joints[joint].type.nv == 1 for joint in robot.rate_joints]
     chosen, share = _independent(rows, np.flatnonzero(single))
@@ -142,10 +141,6 @@ def with_passive_joints(robot: Mechanism, q: Array) -> Mechanism:
             hint,
         )
     return robot
-
-
-def _types(robot: Mechanism) -> list[JointType]:
-    return [robot.joints[joint].type for joint in robot.own_joints]
 
 
 def _independent(rows: Array, candidates: NDArray[np.intp]) -> tuple[list[int], float]:
@@ -192,22 +187,23 @@ def _assembled(robot: Mechanism, scales: Array) -> tuple[Array, Array]:
             step[bad] = 0.0
             largest = np.abs(step).max(axis=1, initial=0.0)
             step *= np.minimum(1.0, LONGEST / np.maximum(largest, 1e-300))[:, None]
-            q = _rows(restored(frames, integrated(frames, list(q.T), list(step.T))), q)
+            q = columns(restored(frames, integrated(frames, list(q.T), list(step.T))), len(q))
         return q, _errors(robot, q) * scales
 
 
-def _rows(values: Sequence[Scalar], q: Array) -> Array:
-    """(states, values) from numbers, and from arrays with a value for each state."""
-    return np.stack([np.broadcast_to(value, len(q)) for value in values], axis=1)
+def _scales(robot: Mechanism) -> Array:
+    """(rows,) factors that convert errors of the loops' rows: lengths to shares of the unit of length."""
+    unit = length_unit(robot)
+    return np.array([1.0 / unit if row < 3 else 1.0 for loop in robot.loops for row in loop.rows])
 
 
 def _errors(robot: Mechanism, q: Array) -> Array:
-    return _rows(loop_error(frames_of(robot), robot.loops, list(q.T)), q)
+    return columns(loop_error(frames_of(robot), robot.loops, list(q.T)), len(q))
 
 
 def _jacobian(robot: Mechanism, q: Array) -> Array:
     rows = loop_jacobian(frames_of(robot), robot.loops, list(q.T))
-    return np.stack([_rows(row, q) for row in rows], axis=1)
+    return np.stack([columns(row, len(q)) for row in rows], axis=1)
 
 
 def _refuse_redundant(robot: Mechanism, q: Array, scales: Array) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
+from psdmc.derivation.memory import UNEXPANDED
 from psdmc.derivation.monomials import Integers, Monomials, Terms, times_matrix
 from psdmc.dynamics.frames import Frame
 from psdmc.errors import DerivationError
@@ -124,11 +125,11 @@ def _of_joint(j: int, digit: int, frames: Sequence[Frame], shares: Array, monomi
     leaders = (j,) if follows is None else follows.leaders
     none = (0,) * len(own)
     if any(monomials.types[k].basis is not monomials.types[j].basis for k in leaders):
-        raise DerivationError("E and P: an angle follows a sliding joint", _remedy())
+        raise DerivationError("E and P: an angle follows a sliding joint", UNEXPANDED)
     if monomials.types[j].basis is TRIGONOMETRIC:
         if any(ratio != round(ratio) for ratio in own):
             raise DerivationError(
-                f"E and P: a joint follows with the ratio {max(own, key=abs):g}, no whole number", _remedy()
+                f"E and P: a joint follows with the ratio {max(own, key=abs):g}, no whole number", UNEXPANDED
             )
         return {
             tuple(round(f * ratio) for ratio in own): value * complex(cosine(f * offset), sine(f * offset))
@@ -152,7 +153,7 @@ def _functions(waves: Sequence[tuple[int, ...]], used: Integers, target: Monomia
             if abs(power) > 2:
                 raise DerivationError(
                     f"E and P: sine and cosine of joint {k + 1} occur with the power {abs(power)}, expected two at most",
-                    _remedy(),
+                    UNEXPANDED,
                 )
             parts = FUNCTIONS[power] if joint.basis is TRIGONOMETRIC else {power: 1.0 + 0.0j}
             codes = {
@@ -163,7 +164,3 @@ def _functions(waves: Sequence[tuple[int, ...]], used: Integers, target: Monomia
         entries += [(row, code, value) for code, value in codes.items()]
     rows, columns, values = (np.array(part) for part in zip(*entries, strict=True))
     return sparse.csr_array((values, (rows, columns)), shape=(len(waves), target.codes))
-
-
-def _remedy() -> str:
-    return "derive with --no-expand: base parameters, regressor and generated code then come without E and P"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,17 +11,11 @@ from typing import Any
 import numpy as np
 
 from psdmc.derivation.base_parameters import PIVOT_TOLERANCE, Reduction, reduction_for
-from psdmc.derivation.certify import judged, measured
+from psdmc.derivation.certify import judged, measured, snap_effect
 from psdmc.derivation.closed_loops import require_closable, with_passive_joints
-from psdmc.derivation.expand import (
-    EXTENDED,
-    FINEST,
-    Precision,
-    can_be_finest,
-    expand,
-    precision_for,
-)
-from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, types_along_ways
+from psdmc.derivation.expand import EXTENDED, FINEST, Precision, can_be_finest, precision_for
+from psdmc.derivation.expand import expand as expanded
+from psdmc.derivation.memory import UNEXPANDED, refuse_long, refuse_uncountable, types_along_ways
 from psdmc.derivation.monomials import merged
 from psdmc.derivation.scaled import Scaled, length_unit, parameter_units, scaled
 from psdmc.dynamics.regressor import EFFECT
@@ -29,6 +24,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import under_general_gravity
 from psdmc.progress import Progress, silent
 from psdmc.reproducible import times
+from psdmc.robot.load import LoadedRobot
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, require_derivable
 
 EQUATION_NOISE = 3e-14
@@ -107,7 +103,7 @@ def derive_model(
         # As a model file gives the values back: tuples become lists.
         plain: dict[str, Any] = json.loads(json.dumps(dict(provenance or {}) | used))
         return DynamicsModel(
-            expansion=_expanded(robot, reduction, precision, tell, memory) if expand else None,
+            expansion=expanded(robot, reduction, precision, tell, memory) if expand else None,
             theta_b=theta_b,
             B=B,
             mechanism=chain,
@@ -124,15 +120,12 @@ def derive_model(
     return replace(found.model, certificate=judged(found))
 
 
-_expanded = expand
-
-
 def _refuse_wide(chain: Mechanism) -> None:
     wide = next((joint for joint in chain.joints if not joint.type.about_z), None)
     if wide is not None:
         raise DerivationError(
             f"'{chain.name}': joint '{wide.name}' {wide.type.verb}: E and P are of joints of one coordinate",
-            f"derive with --no-expand: {WITHOUT}",
+            UNEXPANDED,
         )
 
 
@@ -191,3 +184,17 @@ def base_parameters(B: Array, chain: Mechanism) -> Array | None:
         return None
     theta: Array = times(B, np.where(unknown, 0.0, x))
     return theta
+
+
+def provenance_of(loaded: LoadedRobot) -> dict[str, Any]:
+    """Return the model's origin as plain JSON values, with which psdmc can read the robot file again."""
+    effect = snap_effect(loaded.mechanism, loaded.unsnapped().chain) if loaded.snap_report else None
+    return {
+        "source_text": loaded.source_text,
+        "source_sha256": hashlib.sha256(loaded.source_text.encode()).hexdigest(),
+        "source_format": loaded.source_format,
+        "source_name": loaded.source_name,
+        "options": loaded.options.as_json(),
+        "snapped": [{"where": snap.where, "angle_rad": snap.angle} for snap in loaded.snap_report],
+        "snap_torque_change": None if effect is None else effect.tolist(),
+    }

@@ -15,7 +15,10 @@ from psdmc.errors import DerivationError
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import BASE
 
-WITHOUT = "base parameters, regressor and generated code then come without E and P"
+UNEXPANDED = (
+    "derive with --no-expand: base parameters, regressor and generated code then come without E and P"
+)
+"""The remedy where a robot has no E and P."""
 
 BYTES_PER_TERM = 280
 """Peak of the whole expansion per velocity term: 123 to collect, sort and sum it, some 200 with the matrices made of
@@ -55,7 +58,7 @@ def refuse_uncountable(types: Sequence[JointType]) -> None:
         return
     raise DerivationError(
         f"expanding this {len(types)}-joint robot: its monomials are too many to be numbered",
-        "derive with --no-expand: " + WITHOUT,
+        UNEXPANDED,
     )
 
 
@@ -112,7 +115,7 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
     raise DerivationError(
         f"expanding this {n}-joint robot takes up to {monomials:,} monomials and about "
         f"{needed / 2**30:.1f} GiB of memory, but no more than {available / 2**30:.1f} GiB should be taken here",
-        "derive with --no-expand: " + WITHOUT,
+        UNEXPANDED,
     )
 
 
@@ -135,7 +138,7 @@ def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None
         what = f"a grid of {grid:,} points for the mass matrix alone (limit {LARGEST_GRID:,})"
     raise DerivationError(
         f"expanding this {n}-joint robot takes {what}: minutes",
-        "derive with --no-expand: " + WITHOUT,
+        UNEXPANDED,
     )
 
 

@@ -66,14 +66,14 @@ def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:
     q, qd, qdd = (list(array.T) for array in arrays)
     bodies, drives = bodies_of(chain, x), drive_inertia_of(x)
     found = newton_euler(frames_of(chain), bodies, drives, q, qd, qdd, base_acceleration(chain))
-    return _columns(found, len(arrays[0]))
+    return columns(found, len(arrays[0]))
 
 
 def mass_matrix(chain: Mechanism, x: Array, q: Array) -> Array:
     """Compute the mass matrix M(q), (states, n, n), from q (states, n) and the links' standard parameters (11n,), by
     the composite-rigid-body algorithm."""
     rows = composite_bodies(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
-    return np.stack([_columns(row, len(q)) for row in rows], axis=1)
+    return np.stack([columns(row, len(q)) for row in rows], axis=1)
 
 
 def link_regressor(chain: Mechanism, wanted: Sequence[int], arrays: list[Array]) -> Array:
@@ -85,11 +85,11 @@ def link_regressor(chain: Mechanism, wanted: Sequence[int], arrays: list[Array])
         frames_of(chain), placements, frozenset(wanted), q, qd, qdd, base_acceleration(chain)
     )
     count = len(arrays[0])
-    return np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
+    return np.stack([columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
 
 
-def _columns(values: Sequence[Scalar], count: int) -> Array:
-    """(count, len(values)) from scalars or (count,) arrays."""
+def columns(values: Sequence[Scalar], count: int) -> Array:
+    """Return an array (count, len(values)) whose columns are the values: numbers, and arrays (count,)."""
     found = np.empty((count, len(values)))
     for i, value in enumerate(values):
         found[:, i] = value

@@ -14,8 +14,8 @@ from psdmc.dynamics.coordinates import normalized
 from psdmc.dynamics.frames import Frame, frames_of
 from psdmc.dynamics.manifold import integrated
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
-from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, solve
+from psdmc.model.evaluate import columns
 from psdmc.reproducible import times
 from psdmc.robot.inertia import leading_rows
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Loop, Mechanism
@@ -96,10 +96,10 @@ def near_closed(robot: Mechanism, rng: np.random.Generator, count: int) -> Array
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
             q, _, _ = _stepped(frames, loops, q, range(robot.nv), damping=1.0)
-        closed = np.abs(_as_rows(loop_error(frames, loops, list(q.T)), q)).max(axis=1) < CLOSED
+        closed = np.abs(columns(loop_error(frames, loops, list(q.T)), len(q))).max(axis=1) < CLOSED
         displaced = np.zeros((STARTS, robot.nv))
         displaced[:, passive] = away
-        q = back = _as_rows(integrated(frames, list(q.T), list(displaced.T)), q)
+        q = back = columns(integrated(frames, list(q.T), list(displaced.T)), len(q))
         for _ in range(BACK):
             back, size, share = _stepped(frames, loops, back, passive, damping=0.0)
         closed &= (size < SHORT * SHORT) & (share > REGULAR)
@@ -120,15 +120,14 @@ def _stepped(
     shares = solve(factors, errors)
     rest = [pivot / wide[k][k] for k, pivot in enumerate(factors.pivots)]
     step = np.zeros((len(q), sum(frame.joint.nv for frame in frames if frame.follows is None)))
-    step[:, list(moving)] = -_as_rows(
-        [inner_product(column, shares) for column in zip(*rows, strict=True)], q
+    step[:, list(moving)] = -columns(
+        [inner_product(column, shares) for column in zip(*rows, strict=True)], len(q)
     )
     size = np.sum(step * step, axis=1)
     step *= np.minimum(1.0, LONGEST / np.sqrt(size))[:, None]
     step[~np.isfinite(size)] = 0.0
-    return _as_rows(integrated(frames, list(q.T), list(step.T)), q), size, _as_rows(rest, q).min(axis=1)
-
-
-def _as_rows(values: Sequence[Scalar], q: Array) -> Array:
-    """(k, values) from numbers and from arrays (k,), for the k positions q."""
-    return np.stack([np.broadcast_to(value, len(q)) for value in values], axis=1)
+    return (
+        columns(integrated(frames, list(q.T), list(step.T)), len(q)),
+        size,
+        columns(rest, len(q)).min(axis=1),
+    )

@@ -18,7 +18,7 @@ from psdmc.calibration.description.description import is_description
 from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.sources import plain_sources
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import provenance_of
 from psdmc.dynamics.coordinates import neutral
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics
@@ -194,7 +194,7 @@ def _is_judged(chain: Mechanism, k: int) -> bool:
 
 def _own_links(robot: DynamicsModel | LoadedRobot) -> list[Body]:
     """Every link of a URDF that moves, none merged; empty for other files, and for models with a load or without source."""
-    kept = provenance(robot) if isinstance(robot, LoadedRobot) else robot.provenance
+    kept = provenance_of(robot) if isinstance(robot, LoadedRobot) else robot.provenance
     if kept.get("source_format") != "urdf" or not {"source_text", "options"} <= set(kept):
         return []
     name, options = str(kept.get("source_name", "robot")), kept["options"]

@@ -19,7 +19,7 @@ from unoptimised import compiled as library
 
 from psdmc.backends.c.package import package_view
 from psdmc.backends.info import EmitOptions, package_info
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import provenance_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.toolchain.call import CompiledRobot
@@ -85,7 +85,7 @@ def compiled(name: str, model: DynamicsModel, kernels: Mapping[str, Kernel]) -> 
 @pytest.mark.parametrize("name", [*BUNDLED, *FOREIGN])
 def test_snapping_is_stated_and_small(name: str):
     robot = loaded(name)
-    stated = provenance(robot)
+    stated = provenance_of(robot)
 
     assert bool(stated["snapped"]) == bool(robot.snap_report) == (stated["snap_torque_change"] is not None)
     if robot.snap_report:

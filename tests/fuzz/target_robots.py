@@ -11,8 +11,7 @@ from oracle import torque_error
 from oracle_mjcf import mujoco_error
 from outcome import BrokenRule
 
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, SourceFormat, load_robot
@@ -86,7 +85,7 @@ def _derived(loaded: LoadedRobot, source_format: SourceFormat) -> None:
 
 def _model(loaded: LoadedRobot) -> DynamicsModel:
     """Expanded where it is small; a refusal to expand is followed by --no-expand, as its hint says."""
-    kept = provenance(loaded)
+    kept = provenance_of(loaded)
     if len(loaded.chain) <= MOST_EXPANDED:
         try:
             return derive_model(loaded.mechanism, provenance=kept)

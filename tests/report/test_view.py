@@ -14,8 +14,7 @@ import pytest
 from bundled import robot_path
 from command_line import started, typed
 
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.errors import InputError
 from psdmc.report.view import (
     FILE,
@@ -282,7 +281,7 @@ def test_a_floating_robot_at_rest_and_no_log_of_it(tmp_path: Path):
 
 def test_a_model_with_a_load_shows_the_load():
     file = load_robot_text(urdf(SOLID), "urdf")
-    model = derive_model(file.mechanism, provenance=provenance(file))
+    model = derive_model(file.mechanism, provenance=provenance_of(file))
     loaded = model.with_payload(0.5, [0.0, 0.0, 0.02], 1e-4 * np.eye(3))
 
     masses = [[each.mass for each in viewed(one).layers[FILE]] for one in (model, loaded)]

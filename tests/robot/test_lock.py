@@ -10,8 +10,7 @@ import pytest
 from small_robots import LIMIT, joint, largest_difference, link, robot_data, torques, urdf
 
 from psdmc.compiler import derive
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.dependent_joints import parsed
@@ -44,7 +43,7 @@ def reduced(text: str, held: dict[str, float]) -> pin.Model:
 
 
 def model_of(robot: LoadedRobot) -> DynamicsModel:
-    return derive_model(robot.mechanism, expand=False, provenance=provenance(robot))
+    return derive_model(robot.mechanism, expand=False, provenance=provenance_of(robot))
 
 
 def assert_is(robot: LoadedRobot, oracle: pin.Model) -> None:

@@ -10,11 +10,10 @@ import pytest
 from bundled import ROBOTS
 from slow_cases import slow_but_for
 
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.functions import RECIPES
+from psdmc.robot import dh, urdf_chain
 from psdmc.robot import load as robot_load
-from psdmc.robot import urdf_chain
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement
 from psdmc.robot.placement import snap_axis
@@ -77,7 +76,7 @@ def modified() -> LoadedRobot:
 
 def checked(make: Callable[[], LoadedRobot]) -> tuple[CheckRow, ...]:
     loaded = make()
-    return check_model(derive_model(loaded.chain, expand=False, provenance=provenance(loaded)))
+    return check_model(derive_model(loaded.chain, expand=False, provenance=provenance_of(loaded)))
 
 
 ALL = [oblique, rounded, scara, kr6, modified]
@@ -199,7 +198,7 @@ def shifted_row(real):
     return read
 
 
-dh_about = robot_load.about
+dh_about = dh.about
 
 
 @pytest.mark.parametrize("make", slow_but_for([modified], [kr6, modified]))
@@ -214,7 +213,7 @@ def test_a_mistake_in_placing_a_dh_tables_joints_is_noticed(make, mistake: str, 
     elif mistake == "offset":
         monkeypatch.setattr(robot_load, "read_dh", shifted_row(robot_load.read_dh))
     else:
-        monkeypatch.setattr(robot_load, "about", reversed_twist if mistake == "twist" else offset_turn)
+        monkeypatch.setattr(dh, "about", reversed_twist if mistake == "twist" else offset_turn)
 
     assert "placements of links and tip" in [row.name for row in checked(make) if not row.passed]
 

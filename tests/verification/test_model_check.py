@@ -9,8 +9,7 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.provenance import provenance
+from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Expansion
@@ -46,7 +45,7 @@ inertia_com = { xx = 0.02, yy = 0.03, zz = 0.03, xy = 0.0, xz = 0.0, yz = 0.0 }
 
 def derived(text: str) -> DynamicsModel:
     loaded = load_robot_text(text, "dh")
-    return derive_model(loaded.chain, provenance=provenance(loaded))
+    return derive_model(loaded.chain, provenance=provenance_of(loaded))
 
 
 def test_a_gravity_that_is_rounding_alone_is_not_measured_against_itself() -> None:
@@ -137,7 +136,7 @@ link = { mass = 1.3, com = [0.1, 0.2, 0.3], inertia_com = { xx = 0.2, yy = 0.3, 
 def test_what_is_zero_but_for_rounding_passes(what: str) -> None:
     text = OUTPUTS_OF_ROUNDING[what]
     loaded = load_robot_text(text, "urdf" if text.startswith("<") else "dh")
-    rows = check_model(derive_model(loaded.mechanism, provenance=provenance(loaded)))
+    rows = check_model(derive_model(loaded.mechanism, provenance=provenance_of(loaded)))
     assert [row.name for row in rows if not row.passed] == []
 
 
