@@ -84,7 +84,7 @@ def back_end(name: str) -> BackEnd:
     return found
 
 
-def functions_of(kernels: Mapping[str, Kernel], base_frame: str = BASE_FRAME) -> tuple[Function, ...]:
+def functions_of(kernels: Mapping[str, Kernel], base_frame: str) -> tuple[Function, ...]:
     """Return the functions to which the given kernels (variants of generated functions) belong, in the order of the
     function list. `base_frame` is the name of the base frame in the functions' descriptions."""
     wrong = [name for name, kernel in kernels.items() if name != kernel.name]

@@ -84,7 +84,6 @@ class ReferenceStates:
 def reference_states(
     model: DynamicsModel,
     functions: Collection[str] = DEFAULT,
-    count: int = COUNT,
     friction: FrictionInDynamics | None = None,
     gravity_input: bool = False,
 ) -> ReferenceStates:
@@ -103,7 +102,7 @@ def reference_states(
     if model.theta_b is not None:
         robots[""] = RobotOnArrays.of(model, np.asarray(model.theta_b))
     conditions = np.max([_conditions(robot, given["q"]) for robot in robots.values()], axis=0)
-    best = np.sort(np.argsort(np.round(np.log10(conditions), 6), kind="stable")[:count])
+    best = np.sort(np.argsort(np.round(np.log10(conditions), 6), kind="stable")[:COUNT])
     given = {name: array[best] for name, array in given.items()}
     solvable = bool(conditions[best].max() < WORST_CONDITION)
     recipes = [made(recipe) for name, recipe in RECIPES.items() if name in functions]

@@ -245,6 +245,7 @@ def _digest(path: Path) -> str:
 # other user may write, are used.
 VARIABLE = "PSDMC_CACHE_DIR"
 SIZE_VARIABLE = "PSDMC_CACHE_SIZE"
+_CHOOSE = f"set {VARIABLE} to a folder of yours"
 DEFAULT_SIZE = "1G"
 """Some 500 six-joint arms with all functions."""
 
@@ -272,7 +273,7 @@ def _home() -> Path:
     except RuntimeError:
         home = Path()
     if not home.is_absolute():
-        raise ToolchainError("no home folder for the compile cache: HOME is not set", _choose())
+        raise ToolchainError("no home folder for the compile cache: HOME is not set", _CHOOSE)
     return home
 
 
@@ -304,14 +305,14 @@ def check_place(place: Path) -> None:
     status = resolved.stat()
     if not is_private(status):
         owner = "" if _is_ours(status) else f" belongs to user {status.st_uid} and"
-        hint = f"{_choose()}, or: chmod go-w {place}" if _is_ours(status) else _choose()
+        hint = f"{_CHOOSE}, or: chmod go-w {place}" if _is_ours(status) else _CHOOSE
         what = "could hold libraries of theirs" if owner else "may be written by other users"
         raise ToolchainError(f"{place}: not used as compile cache: it{owner} {what}", hint)
     for folder in resolved.parents:
         mode = folder.stat().st_mode
         if os.name == "posix" and mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
             raise ToolchainError(
-                f"{place}: not used as compile cache: everybody may rename folders in {folder}", _choose()
+                f"{place}: not used as compile cache: everybody may rename folders in {folder}", _CHOOSE
             )
 
 
@@ -326,8 +327,4 @@ def _is_ours(status: os.stat_result) -> bool:
 
 def unusable(place: Path, error: OSError) -> ToolchainError:
     """Return the exception to raise for a cache folder that cannot be written."""
-    return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _choose())
-
-
-def _choose() -> str:
-    return f"set {VARIABLE} to a folder of yours"
+    return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _CHOOSE)

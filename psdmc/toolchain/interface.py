@@ -146,36 +146,18 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
         whole = json.loads(text)
         if whole["format"] != FORMAT:
             raise ValueError(f"format {whole['format']}, expected {FORMAT}")
-        plain = whole["interface"]
-        joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
-        coordinates, rates = tuple(plain.pop("q_names")), tuple(plain.pop("v_names"))
-        contacts = tuple((str(name), int(rows)) for name, rows in plain.pop("contacts"))
-        loops = tuple((str(name), tuple(map(int, rows))) for name, rows in plain.pop("loops"))
-        units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
-        kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
-        places = {
-            name: tuple((row, column) for row, column in own) for name, own in plain.pop("patterns").items()
-        }
-        limits, gravity = tuple(map(tuple, plain.pop("limits"))), tuple(plain.pop("gravity"))
-        values = plain.pop("theta_b")
-        found = Interface(
-            joint_names=joints,
-            q_names=coordinates,
-            v_names=rates,
-            frame_names=frames,
-            contacts=contacts,
-            loops=loops,
-            units=units,
-            limits=limits,
-            gravity=gravity,
-            theta_b=None if values is None else tuple(values),
-            kernels=kernels,
-            patterns=places,
-            **plain,
-        )
-        return found, str(whole["library"])
+        plain = _with_tuples(whole["interface"])
+        mappings = {name: dict(plain[name]) for name in ("kernels", "patterns")}
+        return Interface(**{**plain, **mappings}), str(whole["library"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InternalError(f"a kept interface cannot be read: {error}") from error
+
+
+def _with_tuples(value: Any) -> Any:
+    """A value of JSON with tuples in the place of lists."""
+    if isinstance(value, dict):
+        return {name: _with_tuples(each) for name, each in value.items()}
+    return tuple(map(_with_tuples, value)) if isinstance(value, list) else value
 
 
 @dataclass(frozen=True, slots=True)

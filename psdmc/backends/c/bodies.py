@@ -6,15 +6,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psdmc.backends.c.expressions import CReal, c_real, number
+from psdmc.backends.c.expressions import CReal, c_real, number, numbers
 from psdmc.backends.c.kernel_view import FunctionView, Prototype
 from psdmc.backends.c.make_kernel_view import make_kernel_view
 from psdmc.backends.info import BodiesMap, EmitOptions, PackageInfo
 from psdmc.program.kernel import Kernel
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +34,7 @@ class BodiesView:
 
     @property
     def constant(self) -> str:
-        return self._listed(self.map.constant)
+        return numbers(self.map.constant, self.real)
 
     @property
     def entries(self) -> tuple[str, ...]:
@@ -62,22 +60,19 @@ class BodiesView:
 
     @property
     def masses(self) -> str:
-        return self._listed(self.map.masses)
+        return numbers(self.map.masses, self.real)
 
     @property
     def coms(self) -> tuple[str, ...]:
-        return tuple(map(self._listed, self.map.coms))
+        return tuple(numbers(row, self.real) for row in self.map.coms)
 
     @property
     def inertias(self) -> tuple[str, ...]:
-        return tuple(map(self._listed, self.map.inertias))
+        return tuple(numbers(row, self.real) for row in self.map.inertias)
 
     @property
     def theta_b(self) -> str:
-        return self._listed(self.map.theta_b)
-
-    def _listed(self, values: Array) -> str:
-        return ", ".join(number(float(value), self.real) for value in values)
+        return numbers(self.map.theta_b, self.real)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +85,7 @@ class PayloadView:
 
     robot: str
     real: CReal
-    matrices: tuple[NDArray[np.float64], ...]
+    matrices: tuple[Array, ...]
 
     @property
     def prototypes(self) -> tuple[Prototype, Prototype]:
@@ -105,10 +100,7 @@ class PayloadView:
     @property
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """Each matrix's rows as C text."""
-        return tuple(
-            tuple(", ".join(number(value, self.real) for value in row) for row in matrix.tolist())
-            for matrix in self.matrices
-        )
+        return tuple(tuple(numbers(row, self.real) for row in matrix.tolist()) for matrix in self.matrices)
 
 
 # The estimator of a load

@@ -144,7 +144,9 @@ class _Writer:
             sections.append(Section(loads, steps, tuple(self._angle(a) for a in group), number))
         everything = range(len(self.program))
         loads, steps = self._loads(everything), self._steps(everything, self.stores_early)
-        rest = (*steps, *self._late_stores(), *self._zeros(sizes), *self.runs)
+        late = () if self.stores_early else self.program.outputs
+        stores = [line for slot, i in late for line in self._store(slot, i)]
+        rest = (*steps, *stores, *self._zeros(sizes), *self.runs)
         return (*sections, Section(loads, rest, (), len(sections)))
 
     def _loads(self, wanted: range | list[int]) -> tuple[Load, ...]:
@@ -159,27 +161,14 @@ class _Writer:
     def _steps(self, wanted: range | list[int], with_stores: bool) -> tuple[Line, ...]:
         lines: list[Line] = []
         for i in wanted:
-            if not self.done[i] and self._has_own_line(i):
-                lines.append(Step(f"t{i}", self._operation(i).text, self.names.uniform[i]))
+            if not self.done[i] and self.names.named[i]:
+                op, args, _, _ = self.program.body[i]
+                if args and op.unit is not Unit.SINCOS:
+                    lines.append(Step(f"t{i}", self._operation(i).text, self.names.uniform[i]))
             self.done[i] = True
-            if with_stores and i in self.stores:
-                lines += self._stores_of(i)
+            for slot in self.stores.get(i, ()) if with_stores else ():
+                lines += self._store(slot, i)
         return tuple(lines)
-
-    def _has_own_line(self, i: int) -> bool:
-        return self.names.named[i] and self._is_computed(i)
-
-    def _is_computed(self, i: int) -> bool:
-        op, args, _, _ = self.program.body[i]
-        return bool(args) and op.unit is not Unit.SINCOS
-
-    def _stores_of(self, i: int) -> list[Line]:
-        return [line for slot in self.stores[i] for line in self._store(slot, i)]
-
-    def _late_stores(self) -> list[Line]:
-        if self.stores_early:
-            return []
-        return [line for slot, i in self.program.outputs for line in self._store(slot, i)]
 
     def _store(self, slot: Slot, i: int) -> list[Line]:
         text, uniform = self._value(i).text, self.names.uniform[i]

@@ -11,7 +11,7 @@ Numbers that are too small for float32 are rounded without a warning, as in C.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -58,6 +58,11 @@ def number(value: float | None, real: str) -> str:
     if math.isinf(value):
         return f"({real})INFINITY" if value > 0 else f"({real})(-1e300 * 1e300) /* -INFINITY */"
     return f"{float(value)!r}{'' if real == 'double' else 'f'}"
+
+
+def numbers(values: Iterable[float], real: str) -> str:
+    """Return C text of several constants, separated by commas."""
+    return ", ".join(number(value, real) for value in values)
 
 
 # Expressions
@@ -239,24 +244,25 @@ class CallView:
         return ", ".join(f"{kind} {name}" for name in self.parameters)
 
 
-_ALL = (
-    CallView(Op.SQRT, ("value",), "sqrt{suffix}(value)"),
-    CallView(Op.ABS, ("a",), "fabs{suffix}(a)", "({kind})(({bits})a & ~({bits})(-({kind}){{0}}))"),
-    CallView(
-        Op.MIN, ("a", "b"), "a < b || a != a ? a : b", "BLEND({kind}, {bits}, (a < b) | (a != a), a, b)"
-    ),
-    CallView(
-        Op.MAX, ("a", "b"), "a > b || a != a ? a : b", "BLEND({kind}, {bits}, (a > b) | (a != a), a, b)"
-    ),
-    CallView(Op.SELECT, ("a", "b", "x", "y"), "a < b ? x : y", "BLEND({kind}, {bits}, a < b, x, y)"),
-    CallView(Op.EXP, ("a",), "exp{suffix}(a)"),
-    CallView(Op.TANH, ("a",), "tanh{suffix}(a)"),
-    CallView(Op.LOG, ("a",), "log{suffix}(a)"),
-    CallView(Op.POW, ("a", "b"), "pow{suffix}(a, b)"),
-    CallView(Op.ATAN2, ("a", "b"), "atan2{suffix}(a, b)"),
-)
-
-CALLS = {call.op: call for call in _ALL}
+CALLS = {
+    call.op: call
+    for call in (
+        CallView(Op.SQRT, ("value",), "sqrt{suffix}(value)"),
+        CallView(Op.ABS, ("a",), "fabs{suffix}(a)", "({kind})(({bits})a & ~({bits})(-({kind}){{0}}))"),
+        CallView(
+            Op.MIN, ("a", "b"), "a < b || a != a ? a : b", "BLEND({kind}, {bits}, (a < b) | (a != a), a, b)"
+        ),
+        CallView(
+            Op.MAX, ("a", "b"), "a > b || a != a ? a : b", "BLEND({kind}, {bits}, (a > b) | (a != a), a, b)"
+        ),
+        CallView(Op.SELECT, ("a", "b", "x", "y"), "a < b ? x : y", "BLEND({kind}, {bits}, a < b, x, y)"),
+        CallView(Op.EXP, ("a",), "exp{suffix}(a)"),
+        CallView(Op.TANH, ("a",), "tanh{suffix}(a)"),
+        CallView(Op.LOG, ("a",), "log{suffix}(a)"),
+        CallView(Op.POW, ("a", "b"), "pow{suffix}(a, b)"),
+        CallView(Op.ATAN2, ("a", "b"), "atan2{suffix}(a, b)"),
+    )
+}
 
 
 def call_views(calls: frozenset[Op]) -> tuple[CallView, ...]:

@@ -21,6 +21,7 @@ from psdmc.backends.c.expressions import (
     is_call,
     literal,
     number,
+    numbers,
     rounded_out,
 )
 from psdmc.backends.c.kernel_view import Prototype
@@ -179,10 +180,10 @@ class FrictionView:
     def _states(self) -> Array:
         n = len(self.friction.values)
         ramp = np.linspace(0.5, 1.5, n) * np.where(np.arange(n) % 2, -1.0, 1.0)
-        numbers = (term.number for term in self.friction.terms if term.number is not None)
-        shares = (0.0, 0.1 * self.friction.sign_speed, 1.0, -0.7, *numbers)
+        speeds = (term.number for term in self.friction.terms if term.number is not None)
+        shares = (0.0, 0.1 * self.friction.sign_speed, 1.0, -0.7, *speeds)
         rounded = [rounded_out(float(v), self.real) for v in np.outer(shares, ramp).reshape(-1)]
         return np.array(rounded).reshape(len(shares), n)
 
     def _printed(self, rows: Array) -> tuple[str, ...]:
-        return tuple(", ".join(number(float(value), self.real) for value in row) for row in rows)
+        return tuple(numbers(row, self.real) for row in rows)

@@ -6,7 +6,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from psdmc.backends.c.body import calls_of, make_body, regions_view, sections_of, unread, without_products
+from psdmc.backends.c.body import (
+    calls_of,
+    make_body,
+    regions_view,
+    sections_of,
+    unread,
+    without_products,
+    zero_outputs,
+)
 from psdmc.backends.c.expressions import c_real, is_call, uniform_of
 from psdmc.backends.c.kernel_view import (
     FunctionView,
@@ -15,7 +23,7 @@ from psdmc.backends.c.kernel_view import (
     Prototype,
     VectorView,
 )
-from psdmc.backends.c.limbs import LimbsView, limbs_view
+from psdmc.backends.c.limbs import limbs_view
 from psdmc.backends.c.lines import (
     GROUP,
     KEPT,
@@ -38,7 +46,6 @@ from psdmc.program.parts import in_parts
 from psdmc.program.products import LARGE, Product
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Quantity, Signature, Sizes
-from psdmc.robot.mechanism import BASE_FRAME
 
 
 def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
@@ -48,14 +55,17 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
     robot  identifier with which the names of the C functions begin
     """
     function, sizes = _checked(kernel.function), sizes_of(kernel, sizes)
-    has_lanes = options.target.has_batches and not _is_by_state(kernel, sizes)
+    is_by_state = kernel.before is not None and sizes.nv >= LARGE
+    has_lanes = options.target.has_batches and not is_by_state
+    results = {q.name: sizes.size(q) for q in function.outputs}
+    zero = {} if kernel.is_loop_of_calls else zero_outputs(kernel.single, results)
     outputs = tuple(
         OutputView(
             q.name,
-            sizes.size(q),
+            results[q.name],
             sizes.shape(q.axes),
-            has_lanes and kernel.regions is None and _is_direct(q, sizes),
-            () if kernel.is_loop_of_calls else _zero(q, kernel.single, sizes),
+            has_lanes and kernel.regions is None and q.is_matrix and results[q.name] >= GROUP,
+            tuple(zero.get(q.name, ())),
         )
         for q in function.outputs
     )
@@ -65,12 +75,14 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         single_body = lanes_body = Body((), ())
         lengths = {q.name: sizes.size(q) for q in function.inputs}
         lengths |= dict.fromkeys(kernel.inputs[len(lengths) :], sizes.l)
-        names = [q.name for q in function.outputs]
-        regions = regions_view(kernel.regions, lengths, names, robot, suffix)
+        regions = regions_view(kernel.regions, lengths, list(results), robot, suffix)
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body
     positive = _vector(function.pivots, sizes) if function.pivots else None
+    limbs = None
+    if kernel.limbs is not None and options.target.vectors:
+        limbs = limbs_view(kernel.name, kernel.limbs, kernel.inputs, function.sizes(sizes), options)
     return KernelView(
         name=kernel.name,
         function=function,
@@ -90,18 +102,14 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         if kernel.is_loop_of_calls
         else str(cost(kernel.single)),
         lowering=kernel.lowering,
-        limbs=_limbs(kernel, sizes, options),
+        limbs=limbs,
         places=kernel.places,
         regions=regions,
     )
 
 
 def function_views(
-    kernels: Mapping[str, Kernel],
-    sizes: Sizes,
-    robot: str,
-    options: EmitOptions,
-    base_frame: str = BASE_FRAME,
+    kernels: Mapping[str, Kernel], sizes: Sizes, robot: str, options: EmitOptions, base_frame: str
 ) -> tuple[FunctionView, ...]:
     """Return the functions to which the given kernels (variants of generated functions) belong, in the order of the
     function list. `base_frame` is the name of the base frame in the descriptions of the functions."""
@@ -130,16 +138,6 @@ def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
     """Return the sizes of the robot for one kernel (one variant of a generated function). If the kernel stores a matrix
     without zeros, the number of stored entries is included."""
     return replace(sizes, nonzeros=len(kernel.places))
-
-
-def _limbs(kernel: Kernel, sizes: Sizes, options: EmitOptions) -> LimbsView | None:
-    if kernel.limbs is None or not options.target.vectors:
-        return None
-    return limbs_view(kernel.name, kernel.limbs, kernel.inputs, kernel.function.sizes(sizes), options)
-
-
-def _is_by_state(kernel: Kernel, sizes: Sizes) -> bool:
-    return kernel.before is not None and sizes.nv >= LARGE
 
 
 def _bodies(
@@ -203,16 +201,6 @@ def _body(
     in_lines = bool(products) and has_lanes  # lanes' products take values from the lines before them
     make = body_in_parts if is_long(program, sizes) and not in_lines else make_body
     return make(program, kernel.inputs, sizes, suffix, has_matrix, direct, products)
-
-
-def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:
-    """Entries that the PROGRAM does not store, or stores as the constant zero."""
-    values = {slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == output.name}
-    return tuple(index for index in range(sizes.size(output)) if values.get(index, 0.0) == 0.0)
-
-
-def _is_direct(output: Quantity, sizes: Sizes) -> bool:
-    return output.is_matrix and sizes.size(output) >= GROUP
 
 
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:

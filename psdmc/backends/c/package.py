@@ -17,7 +17,7 @@ from psdmc.backends.c.kernel_view import FunctionView, KernelView
 from psdmc.backends.c.lines import Shape
 from psdmc.backends.c.make_kernel_view import function_views
 from psdmc.backends.c.render import identifier
-from psdmc.backends.c.self_test import ReferenceView, SelfTestView, given_vectors, labels, reference_view
+from psdmc.backends.c.self_test import ReferenceView, SelfTestView, reference_view
 from psdmc.backends.c.vectors import VectorsView
 from psdmc.backends.describe import uses_contacts, uses_frames
 from psdmc.backends.info import EmitOptions, PackageInfo
@@ -338,11 +338,7 @@ def package_view(
     package = PackageView(robot, info, options, functions, None, tuple(adapters))
     if references is None:
         return package
-    vectors, takes_theta = (
-        given_vectors(package.kernels, package.dof),
-        any(kernel.theta for kernel in package.kernels),
-    )
-    view = reference_view(references, c_real(options), vectors, labels(package.kernels), takes_theta)
+    view = reference_view(references, c_real(options), package.kernels, package.dof)
     return replace(package, references=view)
 
 
@@ -362,16 +358,16 @@ def _check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) ->
 
     Joint limits are not checked. A limit that is too large for `real` is no limit, and is written as infinite.
     """
-    numbers = [("gravity", value) for value in info.gravity]
-    numbers += [
+    found = [("gravity", value) for value in info.gravity]
+    found += [
         (f"base parameter {parameter.equation!r}", parameter.value)
         for parameter in info.parameters
         if parameter.value is not None
     ]
-    numbers += [
+    found += [
         (f"a constant of {name}", value) for name, kernel in kernels.items() for value in _constants(kernel)
     ]
-    for what, value in numbers:
+    for what, value in found:
         if math.isinf(rounded_out(value, real)):
             raise InputError(
                 f"{info.name}: {what} is {value:.6g}, more than float32's {LARGEST_FLOAT:.6g}",

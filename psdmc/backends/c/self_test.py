@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.expressions import number
+from psdmc.backends.c.expressions import number, numbers
 from psdmc.backends.c.kernel_view import KernelView, Prototype
 from psdmc.backends.info import EmitOptions
 from psdmc.backends.reference_states import (
@@ -79,16 +79,6 @@ class SelfCheck:
         return self.rows * self.columns
 
 
-def self_checks(
-    kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
-) -> tuple[SelfCheck, ...]:
-    """Return one comparison for each output of each kernel (one variant of a generated function). `known` are the names
-    of outputs that have expected values."""
-    return tuple(
-        _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
-    )
-
-
 def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
     """Return the inputs of all kernels, without duplicates, by their names in the reference states."""
     return tuple(
@@ -98,11 +88,6 @@ def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, .
             for v in kernel.inputs
         )
     )
-
-
-def labels(kernels: Iterable[KernelView]) -> tuple[str, ...]:
-    """Labels of all outputs of these kernels."""
-    return tuple(_label(kernel, k) for kernel in kernels for k in range(len(kernel.outputs)))
 
 
 def _label(kernel: KernelView, k: int) -> str:
@@ -117,10 +102,7 @@ def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Coll
     theta = ["theta_b_given"] if kernel.theta else []
     names = [given_name(vector.name, kernel.variant) for vector in kernel.inputs]
     each = [f"{given.name}_rows + row * {given.length}" for given in given_vectors([kernel], n)]
-    batch, lanes = (
-        ["count", *(f"{name}_rows" for name in names)],
-        ["count", *(f"{name}_lanes" for name in names)],
-    )
+    batch, lanes = (["count", *(f"{name}_{kind}" for name in names)] for kind in ("rows", "lanes"))
 
     def found(place: str) -> list[str]:
         return [place if i == k else f"unseen[{i}]" for i in range(len(kernel.outputs))]
@@ -187,22 +169,14 @@ class ReferenceView:
 
 
 def reference_view(
-    references: ReferenceStates,
-    real: str,
-    vectors: Collection[GivenVector],
-    labels: Collection[str],
-    takes_theta: bool,
+    references: ReferenceStates, real: str, kernels: Sequence[KernelView], n: int
 ) -> ReferenceView:
-    """Return the data of the self-test as C text: the inputs of the package's functions at some states, and the
-    expected outputs.
-
-    vectors      inputs that the functions read
-    labels       names of the outputs that the self-test compares
-    takes_theta  whether a function takes the base parameters as an input
+    """Return the data of the self-test as C text: the inputs of these kernels at some states, and the expected outputs.
+    `n` is the length of rates and torques.
 
     Raises ValueError if the states belong to another robot.
     """
-    sizes = {vector.name: vector.size for vector in vectors}
+    sizes = {vector.name: vector.size for vector in given_vectors(kernels, n)}
     given = []
     for name, array in references.given.items():
         if name not in sizes:
@@ -212,30 +186,26 @@ def reference_view(
                 f"reference states have {array.shape[1]} entries of {name}, expected {sizes[name]}"
             )
         given.append(_table(f"{name}_given", array, real))
+    labels = (_label(kernel, k) for kernel in kernels for k in range(len(kernel.outputs)))
     known = tuple(label for label in labels if label in references.expected)
     expected = [_table(f"{label}_expected", references.expected[label], real) for label in known]
+    takes_theta = any(kernel.theta for kernel in kernels)
     theta_b = tuple(number(value, real) for value in references.theta_b.tolist()) if takes_theta else ()
-    load = None if references.load is None else _load_view(references.load, real)
+    load = None
+    if references.load is not None:
+        load = LoadView(
+            number(LOAD_MASS, real),
+            numbers(LOAD_COM, real),
+            numbers(six_of(LOAD_INERTIA), real),
+            tuple(numbers(row, real) for row in references.load.tolist()),
+        )
     count = len(next(iter(references.given.values())))
     return ReferenceView(count, (*given, *expected), known, theta_b, load)
 
 
 def _table(name: str, array: NDArray[np.float64], real: str) -> ReferenceTable:
-    rows: Sequence[Sequence[float]] = np.asarray(array, float).tolist()
-    texts = tuple(", ".join(number(value, real) for value in row) for row in rows)
-    return ReferenceTable(name, array.shape[1], texts)
-
-
-def _load_view(added: NDArray[np.float64], real: str) -> LoadView:
-    """The load as C constants."""
-
-    def listed(values: NDArray[np.float64]) -> str:
-        return ", ".join(number(float(value), real) for value in values)
-
-    inertia = listed(np.asarray(six_of(LOAD_INERTIA)))
-    return LoadView(
-        number(LOAD_MASS, real), listed(np.array(LOAD_COM)), inertia, tuple(listed(row) for row in added)
-    )
+    rows = tuple(numbers(row, real) for row in np.asarray(array, float).tolist())
+    return ReferenceTable(name, array.shape[1], rows)
 
 
 # The data of the templates
@@ -260,7 +230,11 @@ class SelfTestView:
     @property
     def checks(self) -> tuple[SelfCheck, ...]:
         """Return the comparison of each output of each kernel. Outputs without expected values are marked."""
-        return self_checks(self.kernels, self.dof, self.options, self.known)
+        return tuple(
+            _check(kernel, k, self.dof, self.options, self.known)
+            for kernel in self.kernels
+            for k in range(len(kernel.outputs))
+        )
 
     @property
     def functions(self) -> int:

@@ -132,25 +132,14 @@ def scalar_trig(prefix: str, real: Real, far: Far = "libm", short: bool = False)
     )
 
 
-def vector_trig(
-    prefix: str,
-    real: Real,
-    unit: VectorUnit,
-    far: Far = "libm",
-    vec: str | None = None,
-    ivec: str | None = None,
-) -> VectorTrig:
+def vector_trig(prefix: str, real: Real, unit: VectorUnit, far: Far = "libm") -> VectorTrig:
     """Return the data of the template sincos_vector.jinja, for a C function <prefix>_sincos_f64x8 and so on. `unit` is
-    the kind of SIMD registers that the function uses.
-
-    vec, ivec  names of the vector types in the C file; None: <prefix>_f64x8, <prefix>_i64x8 and so on, as in
-               types.jinja
-    """
+    the kind of SIMD registers that the function uses. The vector types are called <prefix>_f64x8, <prefix>_i64x8 and so
+    on, as in types.jinja."""
     bits = NUMBERS[real].bits
     lanes = unit.bytes * 8 // bits
     suffix = f"{_suffix(real)}x{lanes}"
-    vec = vec or f"{prefix}_{suffix}"
-    ivec = ivec or f"{prefix}_i{bits}x{lanes}"
+    vec, ivec = f"{prefix}_{suffix}", f"{prefix}_i{bits}x{lanes}"
     return VectorTrig(
         macro=_macro(prefix),
         symbol=f"{prefix}_sincos_{suffix}",
