@@ -15,12 +15,18 @@ from psdmc.calibration.identify.four_steps import (
     calibrate_four_steps,
     physical_steps,
 )
-from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.joint_elasticity import elastic_joints, joint_elasticity
 from psdmc.calibration.identify.knowledge import Knowledge, knowledge_of, theta_covariance, with_prior
 from psdmc.calibration.identify.linear_fit import LinearResult, calibrate_linear
 from psdmc.calibration.identify.linear_problem import LinearOptions
-from psdmc.calibration.identify.log_information import ALONE, MAIN_SHARE, LogInformation, log_information
+from psdmc.calibration.identify.log_information import (
+    ALONE,
+    MAIN_SHARE,
+    FrictionDrift,
+    LogInformation,
+    friction_drift,
+    log_information,
+)
 from psdmc.calibration.identify.motor_model import motors_of_logs
 from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
@@ -258,11 +264,11 @@ def calibrate_logs(
     """
     linear, by_load = options.linear.for_robot(model.mechanism), None
     elastic_joints([log.ordered(model.v_names) for log in logs], linear)
-    if loaded is None:
-        motors = motors_of_logs(model.v_names, logs, torque_constants)
-    else:
+    if loaded is not None:
         progress("torque constants")
         motors, by_load = motors_with_load(model, regressor, logs, loaded, linear, torque_constants, progress)
+    else:
+        motors = motors_of_logs(model.v_names, logs, torque_constants)
     known = knowledge_of(
         model, linear.tables, linear.tables_from, options.prior_confidence, options.essential
     )

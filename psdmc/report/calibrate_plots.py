@@ -1,4 +1,4 @@
-"""Pictures of a calibration as SVG text, like figures 2 to 5 of Denso-2022 (published_denso.py)."""
+"""Pictures of a calibration as SVG text, like figures 2 to 5 of Denso-2022."""
 
 from __future__ import annotations
 

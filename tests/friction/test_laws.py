@@ -200,8 +200,7 @@ MAY_NAME_LAWS = {
     "calibration/identify/steps.py": "public options of that search",
     "calibration/identify/four_steps.py": "public options of that search",
     "report/calibrate_demo.py": "public options of that search",
-    "report/published_denso.py": "the numbers that the paper printed",
-    "report/truth.py": "the page that compares with the paper",
+    "report/truth.py": "the numbers that the paper printed, and the page that compares with them",
     "cli/calibrating.py": "help of --friction, which must not load laws",
 }
 

@@ -11,9 +11,8 @@ import pytest
 from made_up_denso import OFF, STD, denso, made_up_record, plant
 
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.report import published_denso as published
 from psdmc.report.calibrate_report import report_html
-from psdmc.report.truth import TruthView, truth_view
+from psdmc.report.truth import LINK_NAMES, TABLE_2, TABLE_4, PublishedParameter, TruthView, truth_view
 
 LENGTHS = {"a1": 0.075, "a2": -0.27, "a3": -0.09, "d4": 0.295}
 
@@ -34,13 +33,11 @@ def cells(markup: str) -> list[list[str]]:
     return [[html.unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row)] for row in rows]
 
 
-@pytest.mark.parametrize("line", published.BASE_PARAMETERS, ids=lambda line: line.name)
-def test_the_paper_s_parameters_are_those_of_their_printed_equations(line: published.PublishedParameter):
+@pytest.mark.parametrize("line", TABLE_4, ids=lambda line: line.name)
+def test_the_paper_s_parameters_are_those_of_their_printed_equations(line: PublishedParameter):
     """By Python's own arithmetic on the equation's text, with standard parameters of the virtual robot's links."""
     chain = denso().mechanism
-    known = {
-        f"{name}{k + 1}": chain.parameters[k, c] for k in range(6) for c, name in enumerate(published.NAMES)
-    }
+    known = {f"{name}{k + 1}": chain.parameters[k, c] for k in range(6) for c, name in enumerate(LINK_NAMES)}
     text = re.sub(r"(\d) (?=[A-Za-z])", r"\1*", line.equation)
     text = re.sub(r"([ad]\d) (?=[A-Za-z])", r"\1*", text)
 
@@ -55,7 +52,7 @@ def test_the_virtual_robot_is_like_the_paper_s_where_the_page_says_so():
     """Within 2 %, the worst of small inertias within 7 %; the others are its own."""
     errors = {
         line.name: line.by_base_parameters(denso()) @ denso().known_theta_b() / line.value - 1.0
-        for line in published.BASE_PARAMETERS
+        for line in TABLE_4
         if line.fitted
     }
 
@@ -65,7 +62,7 @@ def test_the_virtual_robot_is_like_the_paper_s_where_the_page_says_so():
 
 def test_the_plant_has_the_paper_s_motors_and_friction_but_for_two_repairs():
     for k, joint in enumerate(plant().joints):
-        for name, values in published.PARAMETERS.items():
+        for name, values in TABLE_2.items():
             repaired = name == "static" and k == 5
             own = {"torque_constant": joint.torque_constant, **joint.friction}
             assert own[name] == pytest.approx(1.76 if repaired else values[k], rel=1e-12)
@@ -122,7 +119,7 @@ def test_table_four_gives_each_line_its_truth_and_a_standard_deviation_of_its_co
     rows = {row[0]: row for row in cells(view.published)}
     truth = denso().known_theta_b()
 
-    second = next(line for line in published.BASE_PARAMETERS if line.name == "θ2").by_base_parameters(denso())
+    second = next(line for line in TABLE_4 if line.name == "θ2").by_base_parameters(denso())
     assert rows["θ2"][1] == "0.566"
     assert float(rows["θ2"][2]) == pytest.approx(second @ truth, rel=1e-3)
     assert float(rows["θ2"][4]) == pytest.approx(STD * np.linalg.norm(second * truth), rel=0.05)

@@ -11,9 +11,9 @@ import pytest
 from scipy import signal
 from worn_arm import COULOMB, VISCOUS, Worn, recorded
 
-from psdmc.calibration.identify.friction_drift import FrictionDrift, friction_drift
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_problem import LinearOptions
+from psdmc.calibration.identify.log_information import FrictionDrift, friction_drift
 from psdmc.calibration.logs.log import Log, StoredLog, without_start
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.cli.boundary import run
