@@ -12,7 +12,7 @@ import pytest
 
 from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION
 from psdmc.robot.mechanism import BASE, PARAMETERS_PER_LINK, Joint, Mechanism, Placement
-from psdmc.robot.urdf_chain import link_rotation
+from psdmc.robot.urdf.urdf_draft import link_rotation
 
 FILES = {
     "anymal_b": "anymal_b_simple_description/robots/anymal.urdf",

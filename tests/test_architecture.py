@@ -99,6 +99,21 @@ OUTSIDE = {
 }
 
 ROOMS = {
+    "robot": {
+        "joints": {"placement"},
+        "urdf": {
+            "coordinates",
+            "draft",
+            "inertia",
+            "joints",
+            "limits",
+            "load_options",
+            "mechanism",
+            "placement",
+            "xml_text",
+        },
+        "mjcf": {"inertia", "limits", "urdf"},  # a compiled MJCF becomes a URDF
+    },
     "calibration": {
         "logs": set(),
         "columns": {"logs"},

@@ -18,13 +18,13 @@ from psdmc.export.elements import (
     origin_element,
     put_on_world,
 )
-from psdmc.robot.dependent_joints import locked
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Placement
-from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
-from psdmc.robot.urdf_chain import place_of
-from psdmc.robot.urdf_words import DRIVE, MJCF
+from psdmc.robot.urdf.dependent_joints import locked
+from psdmc.robot.urdf.read_urdf import UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.urdf.urdf_draft import place_of
+from psdmc.robot.urdf.urdf_words import DRIVE, MJCF
 from psdmc.robot.xml_text import parse_xml
 
 STILL = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")

@@ -13,7 +13,7 @@ from psdmc.model.random_states import states_of
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array
-from psdmc.robot.mujoco_model import kept_warnings
+from psdmc.robot.mjcf.mujoco_model import kept_warnings
 from psdmc.robot.mujoco_reading import NotCompared, force_from_mujoco, mujoco_torques, to_mujoco
 from psdmc.robot.reference import OnCoordinates, reference
 

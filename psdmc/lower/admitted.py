@@ -13,7 +13,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import check_mass_matrix, is_surely_positive, lack_of_standard_parameters
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.limits import shown
-from psdmc.robot.missing_inertia import idle_joints, massless_words, unknown_option
+from psdmc.robot.urdf.missing_inertia import idle_joints, massless_words, unknown_option
 
 REMEDY = {
     Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency; use --unknown for a massless link",

@@ -28,7 +28,6 @@ from psdmc.links.physical_links import physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_tables import table
-from psdmc.robot.dependent_joints import locked
 from psdmc.robot.inertia import about_com, inertia_matrix, physical_fault
 from psdmc.robot.limits import listed, shown
 from psdmc.robot.load import LoadedRobot
@@ -41,8 +40,9 @@ from psdmc.robot.mechanism import (
     Placement,
     require_axes,
 )
-from psdmc.robot.urdf import read_urdf
-from psdmc.robot.urdf_chain import bodies_of, body_parameters, on_free_root
+from psdmc.robot.urdf.dependent_joints import locked
+from psdmc.robot.urdf.read_urdf import read_urdf
+from psdmc.robot.urdf.urdf_draft import bodies_of, body_parameters, on_free_root
 
 MARK = '<meta name="generator" content="psdmc view">'
 """What every page of `psdmc view` holds."""

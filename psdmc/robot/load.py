@@ -18,9 +18,9 @@ from psdmc.robot.draft import Snap, settled
 from psdmc.robot.limits import MAX_BYTES
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import Mechanism
-from psdmc.robot.missing_inertia import with_massless_warning
-from psdmc.robot.urdf_chain import urdf_draft
-from psdmc.robot.urdf_words import with_source_words
+from psdmc.robot.urdf.missing_inertia import with_massless_warning
+from psdmc.robot.urdf.urdf_draft import urdf_draft
+from psdmc.robot.urdf.urdf_words import with_source_words
 from psdmc.robot.xacro_file import checked_packages, expanded
 from psdmc.robot.xml_text import root_tag
 
@@ -80,7 +80,7 @@ def load_robot(
         options["loops"] = loop_tables(tables, robot_text(tables))
     text = robot_text(file)
     text, source_format, found = as_source(file, text, checked_options(**options), checked_packages(packages))
-    _refuse_size(text, file.name)
+    _refuse_size(len(text.encode(errors="replace")), file.name)
     return _loaded(text, source_format, file.name, found, tables.name if tables else None)
 
 
@@ -88,7 +88,7 @@ def load_robot_text(
     text: str, source_format: SourceFormat, *, source_name: str = "robot", **options: Any
 ) -> LoadedRobot:
     """Return the robot in a text, such as a saved model's source. Options and errors: see load_robot."""
-    _refuse_size(text, source_name)
+    _refuse_size(len(text.encode(errors="replace")), source_name)
     return _loaded(text, source_format, source_name, checked_options(**options))
 
 
@@ -105,8 +105,8 @@ def _loaded(
     return LoadedRobot(mechanism, text, source_format, source, draft.snaps, options)
 
 
-def _refuse_size(text: str, source: str) -> None:
-    if len(text.encode(errors="replace")) > MAX_BYTES:
+def _refuse_size(size: int, source: str) -> None:
+    if size > MAX_BYTES:
         raise InputError(
             f"{source}: more than {in_words(MAX_BYTES)}, which is the most that psdmc reads",
             "give a URDF or a DH .toml file",
@@ -174,7 +174,7 @@ def as_source(
 
 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:
-    from psdmc.robot.mjcf import read_mjcf
+    from psdmc.robot.mjcf.read_mjcf import read_mjcf
 
     found = read_mjcf(file, file.name, options.root)
     if found.is_free and (options.base is not None or options.tip is not None):

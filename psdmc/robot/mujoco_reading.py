@@ -9,17 +9,17 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from psdmc.robot.dependent_joints import held_positions
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism
-from psdmc.robot.mujoco_model import kept_warnings
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
+from psdmc.robot.mjcf.mujoco_model import kept_warnings
 from psdmc.robot.placement import from_quaternion
 from psdmc.robot.reference_model import has_assumptions
-from psdmc.robot.urdf import read_urdf
-from psdmc.robot.urdf_chain import STANDARD_GRAVITY
-from psdmc.robot.urdf_words import ATTRIBUTES, MJCF, SPACE
+from psdmc.robot.urdf.dependent_joints import held_positions
+from psdmc.robot.urdf.pinocchio_text import JOINT_PREFIX, dynamics_of
+from psdmc.robot.urdf.read_urdf import read_urdf
+from psdmc.robot.urdf.urdf_draft import STANDARD_GRAVITY
+from psdmc.robot.urdf.urdf_words import ATTRIBUTES, MJCF, SPACE
 from psdmc.robot.xml_text import parse_xml
 
 COMPILER = {

@@ -22,7 +22,6 @@ import numpy as np
 import pinocchio
 
 from psdmc.errors import InputError
-from psdmc.robot.dependent_joints import held_positions
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.load_options import TOOL
 from psdmc.robot.mechanism import (
@@ -34,8 +33,9 @@ from psdmc.robot.mechanism import (
     Placement,
     frozen_array,
 )
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
-from psdmc.robot.urdf import read_urdf
+from psdmc.robot.urdf.dependent_joints import held_positions
+from psdmc.robot.urdf.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
+from psdmc.robot.urdf.read_urdf import read_urdf
 
 
 def reference_model(

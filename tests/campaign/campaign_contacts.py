@@ -32,7 +32,7 @@ from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import Mechanism
 from psdmc.robot.reference import Reference, reference
-from psdmc.robot.urdf_words import SPACE, STANDS_FOR_BALL
+from psdmc.robot.urdf.urdf_words import SPACE, STANDS_FOR_BALL
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
 from psdmc.verification.check import with_passive_joints

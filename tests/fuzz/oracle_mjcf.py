@@ -12,7 +12,7 @@ from oracle import SEED, STATES
 from scipy.spatial.transform import Rotation
 
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.mujoco_model import kept_warnings
+from psdmc.robot.mjcf.mujoco_model import kept_warnings
 
 FORCES = ("dof_damping", "dof_dampingpoly", "dof_frictionloss", "jnt_stiffness", "jnt_stiffnesspoly", "body_gravcomp",
           "actuator_damping", "actuator_dampingpoly")  # fmt: skip

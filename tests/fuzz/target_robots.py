@@ -42,7 +42,7 @@ def mjcf(data: bytes, folder: Path, deep: bool) -> None:
         error = mujoco_error(file, _model(loaded.unsnapped() if loaded.snap_report else loaded))
         if error is not None and not error < TORQUE_LIMIT:
             raise BrokenRule(
-                "WrongTorque", "psdmc/robot/mjcf_text.py", f"off MuJoCo by {error:.2g} of the largest"
+                "WrongTorque", "psdmc/robot/mjcf/to_urdf.py", f"off MuJoCo by {error:.2g} of the largest"
             )
 
 

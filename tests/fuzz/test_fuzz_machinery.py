@@ -157,7 +157,7 @@ def test_minimising_leaves_what_matters():
 
 def test_the_smallest_input_of_a_fault_is_kept(tmp_path: Path):
     recorder = Recorder(tmp_path, "urdf", fresh=True)
-    fault = Outcome("KeyError", "psdmc/robot/urdf.py:_joint", "'a'", "trace")
+    fault = Outcome("KeyError", "psdmc/robot/urdf/read_urdf.py:_joint", "'a'", "trace")
     for data in (b"long input", b"short", b"longer input"):
         recorder.start(data, deep=True)
         recorder.end(data, fault)

@@ -143,7 +143,7 @@ def test_many_messages_are_found():
 
     assert {
         "psdmc/cli/pipeline.py",
-        "psdmc/robot/dependent_joints.py",
+        "psdmc/robot/urdf/dependent_joints.py",
         "psdmc/toolchain/build_package.py",
     } <= files
 

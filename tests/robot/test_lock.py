@@ -13,9 +13,9 @@ from psdmc.compiler import derive
 from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.dependent_joints import parsed
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.reference import reference
+from psdmc.robot.urdf.dependent_joints import parsed
 from psdmc.verification.check import check_model
 
 MIMIC = '<mimic joint="r" multiplier="-2" offset="0.25"/>'

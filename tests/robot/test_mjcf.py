@@ -19,10 +19,10 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.random_states import on_joints
-from psdmc.robot import mjcf_text
 from psdmc.robot.limits import MAX_BYTES
 from psdmc.robot.load import load_robot, load_robot_text
-from psdmc.robot.mjcf_copies import refuse_many_copies
+from psdmc.robot.mjcf import to_urdf
+from psdmc.robot.mjcf.copies import refuse_many_copies
 from psdmc.robot.mujoco_reading import force_from_mujoco, to_mujoco
 from psdmc.verification.check import MUJOCO, check_model
 
@@ -466,7 +466,7 @@ def moved_anchor(real: Callable[..., Any]) -> Callable[..., Any]:
 def test_a_mistake_in_the_translation_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The URDF that psdmc makes of an MJCF is what all others read: MuJoCo's own reading alone tells that it is another
     robot."""
-    monkeypatch.setattr(mjcf_text, "_at_reference", moved_anchor(mjcf_text._at_reference))
+    monkeypatch.setattr(to_urdf, "_at_reference", moved_anchor(to_urdf._at_reference))
 
     rows = check_model(derive(written(tmp_path, ARM)))
 

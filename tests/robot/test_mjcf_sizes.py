@@ -8,7 +8,7 @@ import pytest
 
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot
-from psdmc.robot.mjcf_copies import refuse_many_copies
+from psdmc.robot.mjcf.copies import refuse_many_copies
 
 pytest.importorskip("mujoco")
 

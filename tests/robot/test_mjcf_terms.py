@@ -13,7 +13,7 @@ from psdmc.compiler import derive
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
-from psdmc.robot.mujoco_model import kept_warnings
+from psdmc.robot.mjcf.mujoco_model import kept_warnings
 
 mujoco = pytest.importorskip("mujoco")
 

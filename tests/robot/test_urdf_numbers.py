@@ -8,9 +8,9 @@ import pytest
 from small_robots import INERTIAL, joint, largest_difference, link, load_urdf, robot_data, urdf
 
 from psdmc.errors import InputError
-from psdmc.robot import urdf_chain
 from psdmc.robot.load import load_robot, load_robot_text
-from psdmc.robot.urdf import read_urdf
+from psdmc.robot.urdf import urdf_draft
+from psdmc.robot.urdf.read_urdf import read_urdf
 
 BASE = link("base", "")
 
@@ -160,7 +160,7 @@ def test_merged_bodies_are_the_sum_about_the_links_frame():
 
 @pytest.mark.parametrize("field", ["mass", "inertia"])
 def test_a_body_that_pinocchio_reads_otherwise_is_an_error_that_names_the_link(field: str, monkeypatch):
-    real = urdf_chain.pinocchio_model
+    real = urdf_draft.pinocchio_model
 
     def misreading(*arguments, **options):
         model = real(*arguments, **options)
@@ -173,7 +173,7 @@ def test_a_body_that_pinocchio_reads_otherwise_is_an_error_that_names_the_link(f
             model.inertias[k] = body
         return model
 
-    monkeypatch.setattr(urdf_chain, "pinocchio_model", misreading)
+    monkeypatch.setattr(urdf_draft, "pinocchio_model", misreading)
 
     found = refused(arm())
 
@@ -184,7 +184,7 @@ def test_bodies_come_from_the_files_own_numbers(monkeypatch):
     """Not from Pinocchio: a robot whose bodies are not held against it has the same ones."""
     path = robot_data("tiago.urdf")
     expected = load_robot(path).chain.parameters
-    monkeypatch.setattr("psdmc.robot.urdf_chain.hold_against_pinocchio", lambda *arguments: None)
+    monkeypatch.setattr("psdmc.robot.urdf.urdf_draft.hold_against_pinocchio", lambda *arguments: None)
     monkeypatch.setattr(pinocchio, "buildModelFromXML", None)
 
     assert load_robot(path).chain.parameters.tobytes() == expected.tobytes()

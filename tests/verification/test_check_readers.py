@@ -12,12 +12,12 @@ from slow_cases import slow_but_for
 
 from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.functions import RECIPES
-from psdmc.robot import dh, urdf_chain
-from psdmc.robot import load as robot_load
+from psdmc.robot import dh
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement
 from psdmc.robot.placement import snap_axis
-from psdmc.robot.urdf_chain import placement_of
+from psdmc.robot.urdf import urdf_draft
+from psdmc.robot.urdf.urdf_draft import placement_of
 from psdmc.verification.check import MUJOCO, CheckRow, check_model, readers
 
 BODY = (
@@ -142,7 +142,7 @@ URDF_CASES = [(make, mistake) for make in (oblique, rounded) for mistake in URDF
     slow_but_for([*URDF_CASES[: len(URDF_MISTAKES)], URDF_CASES[-1]], URDF_CASES, spread=True),
 )
 def test_a_mistake_in_placing_a_urdfs_joints_is_noticed(make, mistake: str, monkeypatch) -> None:
-    monkeypatch.setattr(urdf_chain, *URDF_MISTAKES[mistake])
+    monkeypatch.setattr(urdf_draft, *URDF_MISTAKES[mistake])
 
     rows = checked(make)
 
@@ -153,14 +153,14 @@ def test_a_mistake_in_placing_a_urdfs_joints_is_noticed(make, mistake: str, monk
 
 
 def test_a_tip_in_the_wrong_place_is_noticed_though_no_torque_tells(monkeypatch) -> None:
-    real = urdf_chain._placed
+    real = urdf_draft._placed
 
     def misplaced(route, snap):
         placed = real(route, snap)
         tip = replace(placed.tip, placement=shifted(placed.tip.placement, 1e-3))
         return replace(placed, tip=tip)
 
-    monkeypatch.setattr(urdf_chain, "_placed", misplaced)
+    monkeypatch.setattr(urdf_draft, "_placed", misplaced)
 
     for make in (oblique, rounded):
         failed = {row.name for row in checked(make) if not row.passed}
@@ -169,13 +169,13 @@ def test_a_tip_in_the_wrong_place_is_noticed_though_no_torque_tells(monkeypatch)
 
 
 def test_gravity_turned_the_wrong_way_is_noticed(monkeypatch) -> None:
-    real = urdf_chain._base_rotation
+    real = urdf_draft._base_rotation
 
     def transposed(route, snap):
         rotation, snaps = real(route, snap)
         return rotation.T, snaps
 
-    monkeypatch.setattr(urdf_chain, "_base_rotation", transposed)
+    monkeypatch.setattr(urdf_draft, "_base_rotation", transposed)
 
     failed = [row.name for row in checked(oblique) if not row.passed]
     assert {"gravity", "gravity in the base frame"} <= set(failed)
@@ -205,13 +205,13 @@ dh_about = dh.about
 @pytest.mark.parametrize("mistake", ["twist", "turn", "offset", "convention"])
 def test_a_mistake_in_placing_a_dh_tables_joints_is_noticed(make, mistake: str, monkeypatch) -> None:
     if mistake == "convention":
-        real = robot_load.read_dh
+        real = dh.read_dh
         other = {"standard": "modified", "modified": "standard"}
         monkeypatch.setattr(
-            robot_load, "read_dh", lambda *a: replace(real(*a), convention=other[real(*a).convention])
+            dh, "read_dh", lambda *a: replace(real(*a), convention=other[real(*a).convention])
         )
     elif mistake == "offset":
-        monkeypatch.setattr(robot_load, "read_dh", shifted_row(robot_load.read_dh))
+        monkeypatch.setattr(dh, "read_dh", shifted_row(dh.read_dh))
     else:
         monkeypatch.setattr(dh, "about", reversed_twist if mistake == "twist" else offset_turn)
 
@@ -220,19 +220,19 @@ def test_a_mistake_in_placing_a_dh_tables_joints_is_noticed(make, mistake: str, 
 
 def test_a_snap_may_not_excuse_what_it_does_not_say(monkeypatch) -> None:
     """1e-3 rad in the segment after the one that was snapped, and more than --snap allows in that one."""
-    real = urdf_chain._record
+    real = urdf_draft._record
 
     def boast(snaps, where, angle, segment):
         real(snaps, where, max(angle, 1e-2) if segment == 2 else angle, segment)
 
-    monkeypatch.setattr(urdf_chain, "_origin", turned_origin_that_records)
-    monkeypatch.setattr(urdf_chain, "_record", boast)
+    monkeypatch.setattr(urdf_draft, "_origin", turned_origin_that_records)
+    monkeypatch.setattr(urdf_draft, "_record", boast)
 
     assert not all(row.passed for row in checked(rounded))
 
 
 def turned_origin_that_records(joint, snap, snaps, segment):
-    urdf_chain._record(snaps, "boast", 1e-6, segment)
+    urdf_draft._record(snaps, "boast", 1e-6, segment)
     return turned_origin(joint, snap, snaps, segment)
 
 

@@ -18,11 +18,11 @@ from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import forward_kinematics, frame_placement
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.dependent_joints import held_positions
 from psdmc.robot.limits import shown, words
 from psdmc.robot.mechanism import Mechanism
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
-from psdmc.robot.urdf import read_urdf
+from psdmc.robot.urdf.dependent_joints import held_positions
+from psdmc.robot.urdf.pinocchio_text import JOINT_PREFIX, dynamics_of
+from psdmc.robot.urdf.read_urdf import read_urdf
 from psdmc.robot.xml_text import parse_xml
 
 APART = 0.01

@@ -31,8 +31,8 @@ from psdmc.friction.laws import LAWS
 from psdmc.friction.own import laws_of, read_law
 from psdmc.friction.terms import WITH_STATE, named
 from psdmc.robot.dh import read_dh
-from psdmc.robot.tree import default_tip
-from psdmc.robot.urdf import read_urdf
+from psdmc.robot.urdf.read_urdf import read_urdf
+from psdmc.robot.urdf.tree import default_tip
 
 Triple = tuple[float, float, float]
 WHAT = "a plant (.toml), such as examples/plants/denso_virtual.toml"

@@ -32,7 +32,7 @@ from psdmc.calibration.plant.plant_file import (
 )
 from psdmc.errors import InputError
 from psdmc.friction.law import At, Term, tanh
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
+from psdmc.robot.urdf.pinocchio_text import JOINT_PREFIX, pinocchio_model
 
 RELATIVE_ERROR = 1e-9
 """Of the bristle deflection, per step of the stiff integrator."""

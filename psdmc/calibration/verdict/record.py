@@ -49,7 +49,7 @@ from psdmc.model.calibrated import (
 from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import check_mass_matrix
-from psdmc.robot.missing_inertia import massless_words, unknown_option
+from psdmc.robot.urdf.missing_inertia import massless_words, unknown_option
 from psdmc.version import psdmc_version
 
 LIBRARIES = ("numpy", "scipy", "cvxpy", "clarabel")

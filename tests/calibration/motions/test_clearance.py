@@ -22,7 +22,7 @@ from psdmc.calibration.motions.limited_sines import LimitedSines, SineSum
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.compiler import derive
 from psdmc.errors import InputError
-from psdmc.robot.pinocchio_text import JOINT_PREFIX
+from psdmc.robot.urdf.pinocchio_text import JOINT_PREFIX
 
 OPTIONS = CampaignOptions(
     sweep=SweepOptions(seconds=20.0, period=4e-3),

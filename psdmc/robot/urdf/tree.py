@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from psdmc.errors import InputError
 from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.limits import MAX_JOINTS, listed, shown
-from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
+from psdmc.robot.urdf.read_urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
 
 BALLS = ("spherical", "ball")
 """Types that no standard of URDF has, and some writers use."""

@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.limits import TINIEST, free_name
-from psdmc.robot.mjcf_constraints import Follows
-from psdmc.robot.mujoco_model import Names, armatures
-from psdmc.robot.urdf_words import BALL, DRIVE, MJCF, NOTE
+from psdmc.robot.mjcf.constraints import Follows
+from psdmc.robot.mjcf.mujoco_model import Names, armatures
+from psdmc.robot.urdf.urdf_words import BALL, DRIVE, MJCF, NOTE
 
 Array = NDArray[np.float64]
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

@@ -17,7 +17,7 @@ from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.limits import ANGLE, LENGTH, listed, shown
 from psdmc.robot.placement import Placement, link_rotation, snap_axis
-from psdmc.robot.urdf import LOCKABLE, UrdfJoint, UrdfRobot
+from psdmc.robot.urdf.read_urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
 
 class Followed(NamedTuple):

@@ -10,7 +10,6 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.reproducible import times
-from psdmc.robot.dependent_joints import held_positions, locked, mimic_coordinates
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import inertia_matrix, physical_fault, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import FREE, REVOLUTE, URDF_TYPES, JointType
@@ -18,8 +17,6 @@ from psdmc.robot.limits import free_name, listed, shown
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, Limits, NamedFrame, Placement
-from psdmc.robot.missing_inertia import judged_bodies
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.placement import (
     ROUNDING,
     angle_between,
@@ -31,8 +28,11 @@ from psdmc.robot.placement import (
     snap_rotation,
     snap_translation,
 )
-from psdmc.robot.tree import Route, find_route
-from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.urdf.dependent_joints import held_positions, locked, mimic_coordinates
+from psdmc.robot.urdf.missing_inertia import judged_bodies
+from psdmc.robot.urdf.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
+from psdmc.robot.urdf.read_urdf import LOCKABLE, Origin, UrdfInertial, UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.urdf.tree import Route, find_route
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""

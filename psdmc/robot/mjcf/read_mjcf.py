@@ -1,7 +1,7 @@
 """Reads an MJCF file by MuJoCo's own compiler, which resolves defaults, includes, inertias of shapes and reference
 positions.
 
-The compiled model is converted to a URDF of the same tree (psdmc/robot/mjcf_text.py). So all functions for URDFs work.
+The compiled model is converted to a URDF of the same tree (psdmc/robot/mjcf/to_urdf.py). So all functions for URDFs work.
 A model file contains this URDF, which can be read again without MuJoCo and the included files.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import listed, shown
-from psdmc.robot.mjcf_constraints import (
+from psdmc.robot.mjcf.constraints import (
     followers,
     mjcf_loops,
     of_balls,
@@ -25,9 +25,9 @@ from psdmc.robot.mjcf_constraints import (
     refuse_constraints,
     refuse_references,
 )
-from psdmc.robot.mjcf_copies import refuse_many_copies
-from psdmc.robot.mjcf_text import tree_text
-from psdmc.robot.mujoco_model import Names, acting, gravity, is_active, is_odd, kept_warnings, named
+from psdmc.robot.mjcf.copies import refuse_many_copies
+from psdmc.robot.mjcf.mujoco_model import Names, acting, gravity, is_active, is_odd, kept_warnings, named
+from psdmc.robot.mjcf.to_urdf import tree_text
 
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""

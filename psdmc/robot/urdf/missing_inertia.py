@@ -15,8 +15,8 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.robot.limits import listed, shown
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, WARNING, Array, Mechanism, Placement
-from psdmc.robot.tree import Route
-from psdmc.robot.urdf import UrdfRobot
+from psdmc.robot.urdf.read_urdf import UrdfRobot
+from psdmc.robot.urdf.tree import Route
 
 ALL = "all"
 MISSING = "missing"

@@ -193,7 +193,7 @@ BALL = f"{{{SPACE}}}ball"
 STANDS_FOR_BALL = FREE.urdf_words[0]
 """The type that URDF has for it."""
 MJCF = f"{{{SPACE}}}mjcf"
-"""Of the <robot>: the MJCF of the same tree, as MuJoCo compiled it (psdmc/robot/mjcf_text.py)."""
+"""Of the <robot>: the MJCF of the same tree, as MuJoCo compiled it (psdmc/robot/mjcf/to_urdf.py)."""
 NOTE = f"{{{SPACE}}}note"
 """Of the <robot>: text, one sentence for `show`."""
 

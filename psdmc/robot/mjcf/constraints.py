@@ -11,7 +11,7 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import ANGLE, DRIVE_INERTIA, LENGTH, joined, shown
-from psdmc.robot.mujoco_model import (
+from psdmc.robot.mjcf.mujoco_model import (
     Names,
     acting,
     armatures,

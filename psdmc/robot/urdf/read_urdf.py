@@ -14,7 +14,7 @@ from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.limits import listed, name_faults, naming_faults, shown
 from psdmc.robot.mechanism import WARNING, Limits, Placement
-from psdmc.robot.urdf_words import (
+from psdmc.robot.urdf.urdf_words import (
     VERSIONS,
     has_dynamics,
     joint_faults,

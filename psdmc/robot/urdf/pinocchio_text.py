@@ -14,7 +14,7 @@ import pinocchio
 from psdmc.errors import InputError
 from psdmc.robot.limits import words
 from psdmc.robot.mechanism import Array
-from psdmc.robot.urdf_words import ATTRIBUTES, ball_names
+from psdmc.robot.urdf.urdf_words import ATTRIBUTES, ball_names
 from psdmc.robot.xml_text import parse_xml
 
 JOINT_PREFIX = "joint\t"
