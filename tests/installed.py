@@ -1,10 +1,13 @@
-"""Programs that tests need and a machine may lack."""
+"""Programs that tests need and a machine may lack; and how to run one that must succeed."""
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from functools import cache
+
+import pytest
 
 
 @cache
@@ -14,3 +17,19 @@ def is_installed(program: str) -> bool:
     if found is None or program != "cargo":
         return found is not None
     return subprocess.run([found, "--version"], capture_output=True, check=False).returncode == 0
+
+
+def need(*programs: str) -> None:
+    """Skip the test if one of these programs cannot be run."""
+    for program in programs:
+        if not is_installed(program):
+            pytest.skip(f"{program} is not installed")
+
+
+def run(*words: object, **environment: str) -> str:
+    """Standard output of a program, which must succeed."""
+    done = subprocess.run(
+        [*map(str, words)], capture_output=True, text=True, check=False, env=os.environ | environment
+    )
+    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return done.stdout

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -83,7 +82,7 @@ def test_a_wheel_holds_every_folder():
     assert named == found
 
 
-@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+@pytest.mark.needs("make")
 @pytest.mark.parametrize("answer", [None, '{"info": {}}', "<html>a mirror</html>"])
 def test_an_audit_that_reaches_no_advisories_says_so_in_a_line(answer: str | None, tmp_path: Path):
     """No answer, one of an index without advisories, and a page in place of one."""

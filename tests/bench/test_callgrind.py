@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 from tiny_contestants import tiny
 
 from psdmc.bench.measure import instructions
 
 
-@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
+@pytest.mark.needs("valgrind")
 def test_a_thousand_more_instructions_are_counted_as_such(two_link):
     few, many = tiny("few"), tiny("many")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from dataclasses import replace
 
 import pytest
@@ -169,7 +168,7 @@ def test_no_operation_more_than_the_committed_baseline(name):
 
 
 @pytest.mark.skipif(not WHOLE, reason="make test-accuracy takes it")
-@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
+@pytest.mark.needs("valgrind")
 def test_no_instruction_more_than_the_committed_baseline():
     text, passed = compare(committed(), count([case_of("KR6")]))
 

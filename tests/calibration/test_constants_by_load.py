@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import bundled_model
+from command_line import status
 from loaded_kr6 import motor_torques, sines
 
 import psdmc
@@ -22,7 +23,6 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import open_log, write_log
 from psdmc.calibration.motors_of_loads import LoadedLogs, loaded_quality
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -226,10 +226,7 @@ def test_the_command_prints_the_constants_and_writes_the_model(
     ]
     words += ["--loaded", str(folder / "loaded.csv"), "--load", ",".join(map(str, (MASS, *COM)))]
 
-    with pytest.raises(SystemExit) as left:
-        run([*words, "--report", str(tmp_path / "page.html")])
-
-    assert not left.value.code
+    assert status(*words, "--report", tmp_path / "page.html") == 0
     said = capsys.readouterr().out
     assert said.startswith("verdict: usable")
     line = next(line for line in said.splitlines() if line.strip().startswith("joint_2") and "%" in line)

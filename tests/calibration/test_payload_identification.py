@@ -10,13 +10,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import bundled_model
+from command_line import status
 from loaded_kr6 import motor_torques, sines
 
 import psdmc
 from psdmc.calibration.known_load import PayloadFound, read_load
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -153,9 +153,7 @@ def test_the_command_writes_a_load_and_a_loaded_model(
 ) -> None:
     calibrated.save(tmp_path / "empty.npz")
     words = ["payload", str(tmp_path / "empty.npz"), str(with_load), "-o", str(tmp_path / "load.toml")]
-    with pytest.raises(SystemExit) as left:
-        run([*words, "--loaded", str(tmp_path / "loaded.npz")])
-    assert not left.value.code
+    assert status(*words, "--loaded", tmp_path / "loaded.npz") == 0
     said = capsys.readouterr().out
     assert said.startswith("verdict: usable")
     assert "on 'link6' of 'kr6':" in said
@@ -168,9 +166,7 @@ def test_what_is_not_usable_is_not_written(kr6: DynamicsModel, tmp_path: Path) -
     kr6.save(tmp_path / "kr6.npz")
     log = record(tmp_path / "turning.csv", Run(joints=(0,)))
     words = ["payload", str(tmp_path / "kr6.npz"), str(log), "-o", str(tmp_path / "load.toml")]
-    with pytest.raises(SystemExit) as left:
-        run(words)
-    assert left.value.code == 6
+    assert status(*words) == 6
     assert not (tmp_path / "load.toml").exists()
 
 

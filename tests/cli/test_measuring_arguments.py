@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import status
 
 from psdmc.calibration.campaign_plan import ROWS_PER_CUTOFF
 from psdmc.calibration.identify.linear_problem import LinearOptions
@@ -13,7 +14,6 @@ from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.motions.trajectory import read_trajectory
-from psdmc.cli import main
 from psdmc.derivation.derive import derive_model
 from psdmc.model.store import save
 from psdmc.robot.load import load_robot
@@ -37,9 +37,7 @@ def log(folder: Path, quantity: str, rate: float = 250.0) -> Path:
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    with pytest.raises(SystemExit) as left:
-        main([str(word) for word in words])
-    assert left.value.code == 2
+    assert status(*words) == 2
     return " ".join(capsys.readouterr().err.replace("│", " ").split())
 
 
@@ -144,10 +142,7 @@ def test_the_plan_is_printed(capsys: pytest.CaptureFixture[str], model: Path, tm
         0.9,
     ]
 
-    with pytest.raises(SystemExit) as left:
-        main([*map(str, words), "--floor", "-2", "--harmonics", "2", "--seconds", "1"])
-
-    assert left.value.code == 0
+    assert status(*words, "--floor", "-2", "--harmonics", "2", "--seconds", "1") == 0
     said = capsys.readouterr()
     assert said.out.startswith("1 run, 0.1 min of motion; trajectories 0.")
     assert "exciting motion: condition number" in said.out
@@ -166,8 +161,7 @@ def test_the_plan_is_printed(capsys: pytest.CaptureFixture[str], model: Path, tm
 
 
 def test_help_says_the_rates_that_plans_need(capsys: pytest.CaptureFixture[str]):
-    with pytest.raises(SystemExit):
-        main(["excite", "--help"])
+    assert status("excite", "--help") == 0
 
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
     four, one = (

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from bundled import robot_path
+from command_line import typed
 
 HAND = """<robot name="hand">
 <link name="base"/><link name="palm"><inertial><mass value="0.5"/>
@@ -20,11 +19,6 @@ HAND = """<robot name="hand">
 </robot>"""
 
 
-def psdmc(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "psdmc", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
-
-
 @pytest.fixture
 def hand(tmp_path: Path) -> Path:
     path = tmp_path / "hand.urdf"
@@ -33,7 +27,7 @@ def hand(tmp_path: Path) -> Path:
 
 
 def test_a_tree_is_shown_whole_with_the_chains_to_choose(hand: Path) -> None:
-    run = psdmc("show", hand)
+    run = typed("show", hand)
     assert run.returncode == 0, run.stderr
     assert "a tree with 2 ends of 3 joints with 2 coordinates, from base" in run.stdout
     rows = [line.split() for line in run.stdout.splitlines()]
@@ -43,13 +37,13 @@ def test_a_tree_is_shown_whole_with_the_chains_to_choose(hand: Path) -> None:
 
 
 def test_the_chain_that_it_names_is_derived(hand: Path, tmp_path: Path) -> None:
-    run = psdmc("derive", hand, "--tip", "left finger", "-o", tmp_path / "hand.npz")
+    run = typed("derive", hand, "--tip", "left finger", "-o", tmp_path / "hand.npz")
     assert run.returncode == 0, run.stderr
-    assert psdmc("show", tmp_path / "hand.npz").returncode == 0
+    assert typed("show", tmp_path / "hand.npz").returncode == 0
 
 
 def test_a_chain_is_shown_as_one() -> None:
-    run = psdmc("show", robot_path("scara"))
+    run = typed("show", robot_path("scara"))
     assert run.returncode == 0, run.stderr
     assert "a serial chain of 4 joints with 4 coordinates" in run.stdout
     assert "not derived" not in run.stdout
@@ -60,13 +54,13 @@ def test_a_planar_joint_has_three_coordinates(tmp_path: Path) -> None:
     slider.write_text(
         HAND.replace('type="continuous">', 'type="planar"><axis xyz="0 0 1"/>'), encoding="utf-8"
     )
-    run = psdmc("show", slider)
+    run = typed("show", slider)
     assert run.returncode == 0, run.stderr
     assert "of 3 joints with 4 coordinates" in run.stdout
 
 
 def test_what_needs_a_model_is_refused_of_a_robot(hand: Path) -> None:
-    run = psdmc("show", hand, "--cost")
+    run = typed("show", hand, "--cost")
     assert run.returncode == 2
     assert "derive one first" in run.stderr
     assert "Traceback" not in run.stderr

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
+from command_line import status
 
 import psdmc
-from psdmc.cli import main
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.target.presets import PRESETS
@@ -26,9 +26,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def emit(model: Path, folder: Path, *options: str) -> int | str | None:
     """Exit status of `psdmc emit-c`."""
     words = ["emit-c", str(model), "-o", str(folder), "--functions", "gravity", *options]
-    with pytest.raises(SystemExit) as left:
-        main(words)
-    return left.value.code
+    return status(*words)
 
 
 @pytest.mark.parametrize(
@@ -74,8 +72,7 @@ def test_an_unknown_target_is_refused_in_a_line_with_the_list(
 
 def test_help_lists_every_target(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "400")
-    with pytest.raises(SystemExit):
-        main(["emit-c", "--help"])
+    assert status("emit-c", "--help") == 0
     shown = capsys.readouterr().out
     assert all(name in shown for name in PRESETS)
 

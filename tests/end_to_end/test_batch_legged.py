@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.metadata
 import importlib.util
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -62,7 +61,7 @@ def test_from_numpy_on_one_and_on_two_threads(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+@pytest.mark.needs("make")
 def test_in_c_as_rows_and_lane_by_lane(from_python, tmp_path: Path) -> None:
     model = derive(from_python.solo12(), floating=True)
     emit_c(model, tmp_path / "solo12", functions=from_python.FUNCTIONS, name="robot")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled import bundled_model
+from installed import need
 
 from psdmc.compiler import emit_c
 
@@ -28,8 +28,7 @@ POSES = 3
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The example's own closed loop, a shorter trajectory."""
-    if shutil.which("make") is None:
-        pytest.skip("make is not installed")
+    need("make")
     package = tmp_path_factory.mktemp("closed_loop") / "arm"
     model = bundled_model(ROBOT)
     emit_c(model, package, functions=["inverse_dynamics", "mass_matrix"], name="robot")
@@ -132,8 +131,7 @@ def test_three_commands_take_a_urdf_to_the_running_loop(tmp_path: Path) -> None:
 
 def test_a_controller_finds_what_the_arm_picks_up(tmp_path: Path) -> None:
     """1 kg in MuJoCo: noticed within 2 s and within three standard deviations a second later, and tracked as before."""
-    if shutil.which("make") is None:
-        pytest.skip("make is not installed")
+    need("make")
     model = bundled_model(ROBOT)
     emit_c(
         model, tmp_path / "arm", functions=["inverse_dynamics"], name="robot", payload=True, estimator="mass"

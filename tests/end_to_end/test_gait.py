@@ -3,7 +3,6 @@ feet as controls, held against Crocoddyl's own."""
 
 from __future__ import annotations
 
-import shutil
 import sys
 from functools import partial
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from installed import need
 from unoptimised import without_optimisation
 
 import psdmc
@@ -28,8 +28,7 @@ def gait() -> Any:
     sys.path.insert(0, str(EXAMPLE))
     import gait
 
-    if shutil.which("make") is None or shutil.which("g++") is None:
-        pytest.skip("make or g++ is not installed")
+    need("make", "g++")
     try:
         gait.fitting()
     except SystemExit as reason:

@@ -14,12 +14,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import bundled_model, robot_path
+from command_line import status
 from limbed import shape
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 import psdmc
-from psdmc.cli.boundary import run
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, OF_TREES, RECIPES
@@ -263,20 +263,14 @@ def test_functions_that_depend_on_gravity_are_found(walker: Case) -> None:
         assert depends == RECIPES[name].signature.depends_on_gravity, name
 
 
-def commanded(*words: object) -> int:
-    with pytest.raises(SystemExit) as left:
-        run([str(word) for word in words])
-    return int(left.value.code or 0)
-
-
 def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The package's own self-test has another gravity for each state; a package under the file's gravity has none."""
     model, package = tmp_path / "arm.npz", tmp_path / "c"
-    assert not commanded("derive", robot_path("scara"), "-o", model, "--gravity-input")
-    assert not commanded("check", model)
+    assert not status("derive", robot_path("scara"), "-o", model, "--gravity-input")
+    assert not status("check", model)
     names = "gravity,inverse_dynamics,inverse_dynamics_theta_rows,mass_matrix,regressor_packed,rk4_step_derivatives"
     words = ("emit-c", model, "-o", package, "--gravity-input", "--functions", names)
-    assert not commanded(*words)
+    assert not status(*words)
     header = (package / "include" / "scara" / "scara.h").read_text(encoding="utf-8")
     assert "const double *qdd, const double *gravity, double *tau);" in header
     assert "const double *gravity, const double *theta_b, double *tau);" in header
@@ -286,14 +280,14 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         command = ["c++", "-std=c++17", "-fsyntax-only", "-x", "c++", f"-I{package / 'include'}"]
         subprocess.run([*command, package / "include" / "scara" / "scara.hpp"], check=True)
     capsys.readouterr()
-    assert not commanded("emit-c", model, "-o", package, "--check")
+    assert not status("emit-c", model, "-o", package, "--check")
     assert "up to date" in capsys.readouterr().out
-    assert not commanded("emit-c", model, "-o", package, "--check", "--gravity-input")
+    assert not status("emit-c", model, "-o", package, "--check", "--gravity-input")
     plain = tmp_path / "plain"
-    assert not commanded("emit-c", model, "-o", plain, "--functions", "gravity")
+    assert not status("emit-c", model, "-o", plain, "--functions", "gravity")
     header = (plain / "include" / "scara" / "scara.h").read_text(encoding="utf-8")
     assert "double *gravity" not in header
-    assert commanded("emit-c", model, "-o", plain, "--check", "--gravity-input")
+    assert status("emit-c", model, "-o", plain, "--check", "--gravity-input")
     assert "psdmc emitted the package without it" in capsys.readouterr().err
 
 
@@ -307,7 +301,7 @@ def test_wrong_options_are_refused(
     words: tuple[str, ...], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case("scara").model.save(tmp_path / "arm.npz")
-    assert commanded("emit-c", tmp_path / "arm.npz", "-o", tmp_path / "c", "--gravity-input", *words)
+    assert status("emit-c", tmp_path / "arm.npz", "-o", tmp_path / "c", "--gravity-input", *words)
     assert said in capsys.readouterr().err
     assert not (tmp_path / "c").exists()
 

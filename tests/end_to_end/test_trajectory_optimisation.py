@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot
+from installed import need
 from robots_at_hand import in_wheel
 from unoptimised import without_optimisation
 
@@ -78,8 +78,7 @@ def test_crocoddyl_finds_the_same_motion(kr6: ilqr.Problem) -> None:
 
 @pytest.mark.slow
 def test_the_step_of_a_1_khz_controller_compiles_and_arrives(tmp_path: Path) -> None:
-    if shutil.which("g++") is None or shutil.which("make") is None:
-        pytest.skip("g++ or make is not installed")
+    need("g++", "make")
     functions = ["gravity", "forward_dynamics", "forward_dynamics_derivatives"]
     emit_c(bundled_model("kr6"), tmp_path / "package", functions=functions, name="robot")
     flags = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
@@ -147,8 +146,7 @@ def test_solo12_jumps(jumped: tuple[Any, Any, Any]) -> None:
 @pytest.mark.slow
 def test_the_jump_is_that_of_pinocchio_on_symbols(jumped: tuple[Any, Any, Any]) -> None:
     jump, model, found = jumped
-    if shutil.which("g++") is None:
-        pytest.skip("g++ is not installed")
+    need("g++")
     theirs = jump.jump(jump.with_pinocchio(model), 24.0, PHASES, 0.4, 0.1)
     assert theirs.cost == pytest.approx(found.cost, rel=1e-8)
     assert np.abs(theirs.q - found.q).max() < 1e-5

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from installed import need
 
 pytest.importorskip("mujoco")
 pytest.importorskip("osqp")
@@ -34,8 +35,7 @@ METHODS = ("quadratic programme", "inverse dynamics")
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The example's modules, its folder, model, world, controller, and one run of each method."""
-    if shutil.which("make") is None:
-        pytest.skip("make is not installed")
+    need("make")
     folder = tmp_path_factory.mktemp("trotting")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(EXAMPLE))

@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import robot_path
+from command_line import status
 from pendulum import pendulum
 from pinocchio_robots import path_of
 from shared_data import UR10_LOG
 
 import psdmc
-from psdmc.cli.boundary import run
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
 from psdmc.errors import InputError
 from psdmc.friction.laws import LAWS
@@ -276,9 +276,7 @@ def test_the_line_nearest_to_a_viscous_law_that_is_none() -> None:
 
 def test_the_command_says_what_it_read_back(arm: DynamicsModel, tmp_path: Path, capsys) -> None:
     arm.save(tmp_path / "arm.npz")
-    with pytest.raises(SystemExit) as left:
-        run(["export-urdf", str(tmp_path / "arm.npz"), "-o", str(tmp_path / "back.urdf"), "--mjcf"])
-    assert not left.value.code
+    assert status("export-urdf", tmp_path / "arm.npz", "-o", tmp_path / "back.urdf", "--mjcf") == 0
     said = capsys.readouterr().out
     assert "back.urdf: Pinocchio's torques are theta_b's to" in said
     assert (tmp_path / "back.xml").exists()

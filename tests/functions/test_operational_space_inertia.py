@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from direct import Direct, write_sources
+from installed import need
 from mimic_trees import as_urdf
 from random_trees import TREES, RandomTree
 from robots_at_hand import drawn, in_wheel, subject
@@ -142,8 +142,7 @@ QUICK_BUILDS = [("gcc", "float64"), ("clang", "float32")]
 
 @pytest.mark.parametrize(("compiler", "real"), slow_but_for(QUICK_BUILDS, BUILDS, spread=True))
 def test_c_returns_a_status_and_nan_in_every_layout(compiler: str, real: str, tmp_path: Path) -> None:
-    if shutil.which(compiler) is None:
-        pytest.skip(f"{compiler} is not installed")
+    need(compiler)
     own = subject("kr6")
     model, dtype = own.model, np.dtype(real)
     package = package_view(package_info(model, "arm"), lower(model, functions=[NAME]), EmitOptions(real=real))  # type: ignore[arg-type]

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import status
 
-from psdmc.cli import main
 from psdmc.model.calibrated import Calibrated, Remark, Verdict, parameters_of
 from psdmc.model.calibrated_json import as_json, document, from_json, packed
 from psdmc.model.grounds import WORDS, Delay, Ground
@@ -135,9 +135,7 @@ def test_show_prints_an_older_file_and_writes_it_anew(name: str, tmp_path: Path,
     assert model.calibrated is not None
     assert as_json(again) == as_json(model.calibrated)
     for path in (SAMPLES / f"{name}.npz", tmp_path / "new.npz"):
-        with pytest.raises(SystemExit) as left:
-            main(["show", str(path)])
-        assert not left.value.code
+        assert status("show", path) == 0
     first, second = capsys.readouterr().out.split("verdict:")[1:]
     assert first.partition("model hash")[0] == second.partition("model hash")[0]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -196,7 +195,7 @@ int main()
 """
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.needs("g++")
 def test_the_class_does_so_too(tmp_path: Path) -> None:
     write_sources(package("kr6"), tmp_path)
     (tmp_path / "main.cpp").write_text(MAIN)

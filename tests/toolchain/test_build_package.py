@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from installed import need, run
 from slow_cases import slow_but_for
 from traced import arm_kernels, arm_package, arm_references
 from unoptimised import wrapper
@@ -30,23 +31,11 @@ NANS = ["inverse_dynamics", "forward_dynamics_theta"]
 BUILD_TOOLS = ["cmake", "make"]
 
 
-def _need(*programs: str) -> None:
-    for program in programs:
-        if shutil.which(program) is None:
-            pytest.skip(f"{program} is not installed")
-
-
 def _emit(folder: Path, references: ReferenceStates | None = None, **options: str) -> Path:
     made = EmitOptions(**options)  # type: ignore[arg-type]
     package = arm_package(options=made, names=NAMES, references=references or arm_references())
     write_package(folder, package_files(package))
     return folder
-
-
-def _run(words: list[str], **more: object) -> str:
-    done = subprocess.run(words, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload]
-    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
-    return str(done.stdout)
 
 
 @pytest.fixture
@@ -62,15 +51,15 @@ def emitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(emitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    _need("cmake")
+    need("cmake")
     prefix = tmp_path_factory.mktemp("prefix")
     build_package(emitted)
-    _run(["cmake", "--install", str(emitted / "build"), "--prefix", str(prefix)])
+    run("cmake", "--install", emitted / "build", "--prefix", prefix)
     return prefix
 
 
 def test_build_runs_the_self_test_with_cmake(emitted: Path) -> None:
-    _need("cmake")
+    need("cmake")
     report = build_package(emitted)
     for name in (
         "inverse_dynamics, one state",
@@ -84,7 +73,7 @@ def test_build_runs_the_self_test_with_cmake(emitted: Path) -> None:
 
 @pytest.mark.usefixtures("unoptimised")
 def test_build_runs_the_self_test_with_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _need("make")
+    need("make")
     folder = _emit(tmp_path / "arm", real="float32")
     which = shutil.which
     monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" else which(name))
@@ -105,7 +94,7 @@ def _spoilt(name: str, value: float) -> ReferenceStates:
 def test_a_failed_self_test_says_which_checks_failed_and_by_how_much(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _need(tool)
+    need(tool)
     which = shutil.which
     other = {"cmake": "make", "make": "cmake"}[tool]
     monkeypatch.setattr("shutil.which", lambda name: None if name == other else which(name))
@@ -233,7 +222,7 @@ def test_the_self_test_checks_whatever_was_emitted(tmp_path: Path) -> None:
 @pytest.mark.parametrize("real", slow_but_for(["float64"], ["float64", "float32"]))
 def test_the_self_test_checks_functions_that_add_loads(real: Any, tmp_path: Path) -> None:
     """At the tip and at every frame; a fault in the matrix of one frame is seen."""
-    _need("make")
+    need("make")
     robot = Path(__file__).parents[2] / "examples" / "robots" / "kr6.toml"
     model = psdmc.derive(robot, expand=False, frames=["link6", "link3"], tool=(0.1, 0, 0.2, 0, 0.3, 0))
     psdmc.emit_c(model, tmp_path / "arm", functions=["gravity"], real=real, payload=True, name="arm")
@@ -268,7 +257,7 @@ def _spoilt_group(matched: re.Match[str]) -> str:
 
 
 def test_a_fault_in_any_function_fails_its_checks_in_every_layout(tmp_path: Path) -> None:
-    _need("make")
+    need("make")
     package = arm_package(references=arm_references())
     files = package_files(package)
     for path in files:
@@ -296,7 +285,7 @@ def test_a_folder_without_a_package_is_said(tmp_path: Path) -> None:
     [('a"b', "'\"'"), ("a;b", "';'"), ("a\nb", r"'\\n'"), ("a[b", "'\\['"), ("a:b/c", "':'")],
 )
 def test_a_path_that_cmake_cannot_take_is_refused(name: str, shown: str, tmp_path: Path) -> None:
-    _need("cmake")
+    need("cmake")
     folder = _emit(tmp_path / name)
     with pytest.raises(InputError, match=f"CMake cannot take {shown} in a folder's path") as caught:
         build_package(folder)
@@ -308,7 +297,7 @@ def test_a_path_that_cmake_cannot_take_is_refused(name: str, shown: str, tmp_pat
 @pytest.mark.parametrize("name", slow_but_for(["~"], ["~", "-a", "a [b] 'c' $d #e"]))
 def test_cmake_takes_other_names(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also those that are something else on its command line."""
-    _need("cmake")
+    need("cmake")
     monkeypatch.chdir(tmp_path)
     assert ": ok" in build_package(_emit(Path(name)))
 
@@ -338,10 +327,10 @@ SANITIZED = ["-fsanitize=address,undefined", "-march=native -fsanitize=address,u
 
 @pytest.mark.parametrize("flags", slow_but_for(SANITIZED[:1], SANITIZED))
 def test_the_self_test_is_clean_under_sanitizers(flags: str, tmp_path: Path) -> None:
-    _need("make")
+    need("make")
     folder = _emit(tmp_path / "arm")
     sanitize = f"-O0 -g {flags} -fno-sanitize-recover=all"
-    _run(["make", "-C", str(folder), "CC=gcc", f"CFLAGS={sanitize}", "check"])
+    run("make", "-C", folder, "CC=gcc", f"CFLAGS={sanitize}", "check")
 
 
 CONSUMER = r"""
@@ -369,26 +358,25 @@ target_link_libraries(consumer PRIVATE test_arm::test_arm)
 def test_a_cmake_project_finds_the_installed_package(installed: Path, tmp_path: Path) -> None:
     (tmp_path / "main.c").write_text(CONSUMER)
     (tmp_path / "CMakeLists.txt").write_text(CMAKE)
-    _run(["cmake", "-S", str(tmp_path), "-B", str(tmp_path / "b"), f"-DCMAKE_PREFIX_PATH={installed}"])
-    _run(["cmake", "--build", str(tmp_path / "b")])
-    assert _run([str(tmp_path / "b" / "consumer")]).endswith(" joint 0\n")
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "b", f"-DCMAKE_PREFIX_PATH={installed}")
+    run("cmake", "--build", tmp_path / "b")
+    assert run(tmp_path / "b" / "consumer").endswith(" joint 0\n")
 
 
 def test_pkg_config_finds_the_installed_package(installed: Path, tmp_path: Path) -> None:
-    _need("pkg-config")
+    need("pkg-config")
     (tmp_path / "main.c").write_text(CONSUMER)
     (place,) = (str(path.parent) for path in installed.rglob("test_arm.pc"))
-    environment = {**os.environ, "PKG_CONFIG_PATH": place}
-    flags = _run(["pkg-config", "--cflags", "--libs", "test_arm"], env=environment).split()
-    _run(["gcc", "-std=c99", str(tmp_path / "main.c"), *flags, "-o", str(tmp_path / "main")])
-    assert _run([str(tmp_path / "main")]).endswith(" joint 0\n")
+    flags = run("pkg-config", "--cflags", "--libs", "test_arm", PKG_CONFIG_PATH=place).split()
+    run("gcc", "-std=c99", tmp_path / "main.c", *flags, "-o", tmp_path / "main")
+    assert run(tmp_path / "main").endswith(" joint 0\n")
 
 
 @pytest.mark.usefixtures("unoptimised")
 def test_make_install_gives_the_same_layout(tmp_path: Path) -> None:
-    _need("make")
+    need("make")
     folder, prefix = _emit(tmp_path / "arm"), tmp_path / "prefix"
-    _run(["make", "-C", str(folder), f"PREFIX={prefix}", "install"])
+    run("make", "-C", folder, f"PREFIX={prefix}", "install")
     found = sorted(str(path.relative_to(prefix)) for path in prefix.rglob("*") if path.is_file())
     assert found == [
         "include/test_arm/test_arm.h",
@@ -401,9 +389,9 @@ def test_make_install_gives_the_same_layout(tmp_path: Path) -> None:
 
 
 def test_openmp_gives_the_same_results(tmp_path: Path) -> None:
-    _need("make")
+    need("make")
     folder = _emit(tmp_path / "arm")
-    report = _run(["make", "-C", str(folder), "CFLAGS=-O0 -fopenmp -Dtest_arm_OPENMP", "check"])
+    report = run("make", "-C", folder, "CFLAGS=-O0 -fopenmp -Dtest_arm_OPENMP", "check")
     assert report.count(": ok") == 10
 
 
@@ -438,7 +426,7 @@ def test_what_a_killed_build_left_is_not_built_on(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An object file cut short is younger than its source: build tools take it for finished."""
-    _need(tool)
+    need(tool)
     which = shutil.which
     monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" != tool else which(name))
     folder = _emit(tmp_path / "arm")
@@ -458,7 +446,7 @@ def test_what_a_killed_build_left_is_not_built_on(
 def test_spaces_and_letters_in_paths_and_compilers(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _need(tool, "gcc")
+    need(tool, "gcc")
     which = shutil.which
     monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" != tool else which(name))
     own = tmp_path / "my $tools"
@@ -489,17 +477,17 @@ endif()
 def test_a_subdirectory_leaves_the_parents_tests_and_installation_alone(
     asked: bool, emitted: Path, tmp_path: Path
 ) -> None:
-    _need("cmake")
+    need("cmake")
     (tmp_path / "main.c").write_text(CONSUMER)
     (tmp_path / "CMakeLists.txt").write_text(PARENT.format(package=emitted))
     build, prefix = str(tmp_path / "b"), tmp_path / "prefix"
     options = ["-Dtest_arm_SELF_TEST=ON", "-Dtest_arm_INSTALL=ON"] if asked else []
-    _run(["cmake", "-S", str(tmp_path), "-B", build, *options])
-    _run(["cmake", "--build", build, "--parallel", "2"])
-    tests = _run(["ctest", "--test-dir", build])
-    _run(["cmake", "--install", build, "--prefix", str(prefix)])
+    run("cmake", "-S", tmp_path, "-B", build, *options)
+    run("cmake", "--build", build, "--parallel", "2")
+    tests = run("ctest", "--test-dir", build)
+    run("cmake", "--install", build, "--prefix", prefix)
 
     assert ("test_arm_self_test" in tests) == asked
     assert "consumer" in tests
     assert (prefix / "include" / "test_arm").is_dir() == asked
-    assert "Nightly" not in _run(["cmake", "--build", build, "--target", "help"])
+    assert "Nightly" not in run("cmake", "--build", build, "--target", "help")

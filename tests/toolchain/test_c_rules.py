@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from bundled import bundled_model
 from c_warnings import EXTRA, STRICT
 from direct import write_sources
+from installed import need
 from slow_cases import slow_but_for
 from traced import arm_package
 
@@ -24,11 +24,6 @@ from psdmc.toolchain.compile import lowered_once
 COMPILERS = ["gcc", "clang"]
 NAMES = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian"]
 """One of each kind: torques with parameters, pivots, a matrix with and one without parameters."""
-
-
-def _need(program: str) -> None:
-    if shutil.which(program) is None:
-        pytest.skip(f"{program} is not installed")
 
 
 def _checked(compiler: str, optimised: bool) -> list[str]:
@@ -65,7 +60,7 @@ WARNED = [
 @pytest.mark.parametrize(("options", "flag"), slow_but_for([WARNED[0], WARNED[-1]], WARNED, spread=True))
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_no_warnings(compiler: str, options: tuple[str, str], flag: str, tmp_path: Path) -> None:
-    _need(compiler)
+    need(compiler)
     package = arm_package(options=EmitOptions(*options), names=NAMES)  # type: ignore[arg-type]
     write_sources(package, tmp_path)
     for source in package.sources:
@@ -83,7 +78,7 @@ def every_kernel() -> dict[str, Kernel]:
 @pytest.mark.parametrize("name", slow_but_for(OF_TREES[::3], OF_TREES))
 def test_a_package_of_any_one_function_compiles(name: str, tmp_path: Path) -> None:
     """Macros and helpers that one function needs do not come from another that happens to be there."""
-    _need("gcc")
+    need("gcc")
     names = wanted([name])
     kernels = {key: kernel for key, kernel in every_kernel().items() if kernel.function.name in names}
     package = package_view(package_info(bundled_model("two_link")), kernels, EmitOptions())
@@ -109,7 +104,7 @@ PLAIN_OPTIONS = [("float64", "inline"), ("float32", "inline"), ("float64", "libm
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_without_vectors_it_is_plain_c99(compiler: str, options: tuple[str, str], tmp_path: Path) -> None:
     """No vector extension, attribute, builtin or pragma is left for a compiler that has none of GCC's."""
-    _need(compiler)
+    need(compiler)
     package = arm_package(options=EmitOptions(*options), names=NAMES)  # type: ignore[arg-type]
     write_sources(package, tmp_path)
     for source in map(str, (tmp_path / source for source in package.sources)):
@@ -130,7 +125,7 @@ FREESTANDING = [(compiler, real) for compiler in COMPILERS for real in ("float64
 @pytest.mark.parametrize(("compiler", "real"), slow_but_for([("gcc", "float32")], FREESTANDING, spread=True))
 def test_freestanding_code_needs_no_library(compiler: str, real: str, tmp_path: Path) -> None:
     """What it leaves to the linker is what a freestanding compiler itself may call. All functions by gcc in float64."""
-    _need(compiler)
+    need(compiler)
     names = None if (real, compiler) == ("float64", "gcc") else NAMES
     package = arm_package(options=EmitOptions(real, "freestanding"), names=names)  # type: ignore[arg-type]
     write_sources(package, tmp_path)
@@ -236,7 +231,7 @@ int main()
 
 
 def test_two_robots_run_side_by_side_in_a_cpp17_program(objects: list[Path], tmp_path: Path) -> None:
-    _need("g++")
+    need("g++")
     source, program = tmp_path / "main.cpp", tmp_path / "main"
     source.write_text(TWO_ROBOTS)
     folders = sorted({f"-I{path.parent}/include" for path in objects})

@@ -27,10 +27,9 @@ from psdmc.toolchain.interface import interface_of
 
 
 @pytest.fixture
-def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
+def fresh_cache(own_cache: Path) -> Iterator[Path]:
     with without_optimisation():
-        yield tmp_path / "cache"
+        yield own_cache
 
 
 def test_the_same_package_is_compiled_once(fresh_cache: Path) -> None:

@@ -19,12 +19,6 @@ from psdmc.toolchain.cache import cached
 from psdmc.toolchain.cache_room import cache_contents, cache_limit, clear_cache
 
 
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
 def entry(letter: str, size: int = 1000, hours_ago: float = 0.0) -> Path:
     folder = cached(letter * 64, lambda own: (own / "library.so").write_bytes(b"x" * size) and None)
     then = time.time() - 3600 * hours_ago
@@ -32,30 +26,30 @@ def entry(letter: str, size: int = 1000, hours_ago: float = 0.0) -> Path:
     return folder
 
 
-def letters(cache: Path) -> str:
-    return "".join(sorted(path.name[0] for path in cache.iterdir()))
+def letters(own_cache: Path) -> str:
+    return "".join(sorted(path.name[0] for path in own_cache.iterdir()))
 
 
-def test_the_least_recently_used_go_first(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_recently_used_go_first(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSDMC_CACHE_SIZE", "2500")
     for letter, age in (("a", 3), ("b", 2)):
         entry(letter, hours_ago=age)
     cached("a" * 64, lambda own: pytest.fail("a is there"))  # used now: b is the oldest
     entry("c")
-    assert letters(cache) == "ac"
+    assert letters(own_cache) == "ac"
 
 
-def test_what_was_just_used_stays_beyond_the_limit(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_just_used_stays_beyond_the_limit(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another process may be about to open it."""
     monkeypatch.setenv("PSDMC_CACHE_SIZE", "1")
     for letter in "abc":
         entry(letter)
-    assert letters(cache) == "abc"
+    assert letters(own_cache) == "abc"
 
 
 @pytest.mark.parametrize("removing", ["making room", "clearing"])
 def test_entries_that_another_process_removes_meanwhile(
-    removing: str, cache: Path, monkeypatch: pytest.MonkeyPatch
+    removing: str, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It had the lock between the listing of entries and their removal."""
     for letter, age in (("a", 3), ("b", 2)):
@@ -64,25 +58,25 @@ def test_entries_that_another_process_removes_meanwhile(
 
     @contextmanager
     def hold_after_another(place: Path) -> Iterator[None]:
-        shutil.rmtree(cache / ("a" * 64), ignore_errors=True)
+        shutil.rmtree(own_cache / ("a" * 64), ignore_errors=True)
         with held(place):
             yield
 
     monkeypatch.setattr(cache_room, "hold", hold_after_another)
     if removing == "clearing":
         clear_cache()
-        assert letters(cache) == ""
+        assert letters(own_cache) == ""
         return
     monkeypatch.setenv("PSDMC_CACHE_SIZE", "1500")
     assert (entry("c") / "library.so").is_file()
-    assert letters(cache) == "c"
+    assert letters(own_cache) == "c"
 
 
-def test_an_entry_larger_than_the_limit_is_served(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_entry_larger_than_the_limit_is_served(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSDMC_CACHE_SIZE", "500")
     entry("a", hours_ago=1)
     assert (entry("b") / "library.so").is_file()
-    assert letters(cache) == "b"
+    assert letters(own_cache) == "b"
 
 
 @pytest.mark.parametrize(("text", "size"), [("100", 100), ("2k", 2048), ("3M", 3 << 20), ("1G", 1 << 30)])
@@ -92,7 +86,7 @@ def test_the_size_in_bytes_or_with_a_unit(text: str, size: int, monkeypatch: pyt
 
 
 @pytest.mark.parametrize("text", ["much", "-1", "1.5G", "10 MB", "٣"])
-def test_a_size_that_is_none(text: str, monkeypatch: pytest.MonkeyPatch, cache: Path) -> None:
+def test_a_size_that_is_none(text: str, monkeypatch: pytest.MonkeyPatch, own_cache: Path) -> None:
     monkeypatch.setenv("PSDMC_CACHE_SIZE", text)
     with pytest.raises(InputError, match="PSDMC_CACHE_SIZE is") as caught:
         entry("a")
@@ -112,33 +106,33 @@ cached("k" * 64, build)
 """
 
 
-def test_what_a_killed_build_left_goes_with_the_next(cache: Path) -> None:
+def test_what_a_killed_build_left_goes_with_the_next(own_cache: Path) -> None:
     subprocess.run([sys.executable, "-c", KILLED], check=False)
-    left = sorted(path.name[:6] for path in cache.iterdir())
+    left = sorted(path.name[:6] for path in own_cache.iterdir())
     assert left == [".build", ".turn-"], "the test wants a leftover"
 
     entry("a")
-    assert letters(cache) == "a"
+    assert letters(own_cache) == "a"
 
 
-def test_a_build_under_way_stays(cache: Path) -> None:
+def test_a_build_under_way_stays(own_cache: Path) -> None:
     def outer(folder: Path) -> None:
         entry("b")
         assert folder.is_dir(), "another build took it for a dead one"
         (folder / "x").write_text("")
 
     cached("a" * 64, outer)
-    assert letters(cache) == "ab"
+    assert letters(own_cache) == "ab"
 
 
-def test_contents_and_clearing(cache: Path) -> None:
+def test_contents_and_clearing(own_cache: Path) -> None:
     assert (cache_contents().entries, cache_contents().size) == (0, 0)
     entry("a")
     entry("b", size=500)
-    (cache / "mine.txt").write_text("keep")
-    (cache / ".gone-0123456789abcdef").mkdir()
+    (own_cache / "mine.txt").write_text("keep")
+    (own_cache / ".gone-0123456789abcdef").mkdir()
 
     assert (cache_contents().entries, cache_contents().size) == (2, 1500)
     assert clear_cache() == 2
-    assert [path.name for path in cache.iterdir()] == ["mine.txt"]
+    assert [path.name for path in own_cache.iterdir()] == ["mine.txt"]
     assert cache_contents().entries == 0

@@ -26,12 +26,6 @@ PARTS = ("hash", "auto", "float64")
 TRIG = [file.name for file in (resources.files("psdmc.templates") / "trig").iterdir()]
 
 
-@pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
 class Counted:
     """A package that is made, and how often it was."""
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import platform
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 from bundled import bundled_model
 from direct import write_sources
+from installed import need
 from limbed import package_of
 from slow_cases import slow_but_for
 
@@ -98,9 +98,7 @@ def package(shown: str) -> PackageView:
 
 @pytest.fixture(scope="module")
 def folder(shown: str, package: PackageView, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    for needed in ("gcc", "valgrind"):
-        if shutil.which(needed) is None:
-            pytest.skip(f"{needed} is not installed")
+    need("gcc", "valgrind")
     if shown in FLAGS and not has_four_lanes():
         pytest.skip("no processor for vectors of four lanes")
     made = tmp_path_factory.mktemp("constant")

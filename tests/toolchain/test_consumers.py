@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bundled import bundled_model
+from installed import need, run
 
 from psdmc.compiler import emit_c
 
@@ -23,68 +21,46 @@ STATE = ([0.3, -0.7], [1.1, 0.4], [2.0, -3.0])
 """What the C and the Eigen program ask for."""
 
 
-def _need(*programs: str) -> None:
-    for program in programs:
-        if shutil.which(program) is None:
-            pytest.skip(f"{program} is not installed")
-
-
-def _run(words: list[str], **environment: str) -> str:
-    done = subprocess.run(
-        words, capture_output=True, text=True, check=False, env={**os.environ, **environment}
-    )
-    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the emitted packages, built by their Makefiles."""
-    _need("make")
+    need("make")
     root = tmp_path_factory.mktemp("packages")
     for robot in ROBOTS:
         emit_c(bundled_model(robot), root / robot)
-        _run(["make", "-C", str(root / robot), "CFLAGS=-O0", f"PREFIX={root}/prefix", "install"])
+        run("make", "-C", root / robot, "CFLAGS=-O0", f"PREFIX={root}/prefix", "install")
     return root
 
 
 @pytest.fixture(scope="module")
 def prefix(packages: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same packages, installed by CMake."""
-    _need("cmake")
+    need("cmake")
     prefix = tmp_path_factory.mktemp("prefix")
     for robot in ROBOTS:
         build = str(packages / robot / "cmake-build")
-        _run(
-            [
-                "cmake",
-                "-S",
-                str(packages / robot),
-                "-B",
-                build,
-                "-DBUILD_TESTING=OFF",
-                "-DCMAKE_C_FLAGS_RELEASE=-O0",
-            ]
+        run(
+            "cmake", "-S", packages / robot, "-B", build, "-DBUILD_TESTING=OFF", "-DCMAKE_C_FLAGS_RELEASE=-O0"
         )
-        _run(["cmake", "--build", build, "--parallel", "2"])
-        _run(["cmake", "--install", build, "--prefix", str(prefix)])
+        run("cmake", "--build", build, "--parallel", "2")
+        run("cmake", "--install", build, "--prefix", prefix)
     return prefix
 
 
 def _with_cmake(consumer: str, prefix: Path, build: Path) -> str:
     """The program's output, found through find_package alone."""
     flags = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_FLAGS={' '.join(STRICT)}"]
-    _run(["cmake", "-S", str(CONSUMERS / consumer), "-B", str(build), *flags])
-    _run(["cmake", "--build", str(build)])
-    return _run([str(build / "consumer")])
+    run("cmake", "-S", CONSUMERS / consumer, "-B", build, *flags)
+    run("cmake", "--build", build)
+    return run(build / "consumer")
 
 
 def _with_pkg_config(compile_words: list[str], packages: Path, program: Path) -> str:
-    _need("pkg-config", compile_words[0])
+    need("pkg-config", compile_words[0])
     folder = str(packages / "prefix" / "lib" / "pkgconfig")
-    found = _run(["pkg-config", "--cflags", "--libs", "two_link"], PKG_CONFIG_PATH=folder).split()
-    _run([*compile_words, *found, "-o", str(program)])
-    return _run([str(program)], LD_LIBRARY_PATH=str(packages / "prefix" / "lib"))
+    found = run("pkg-config", "--cflags", "--libs", "two_link", PKG_CONFIG_PATH=folder).split()
+    run(*compile_words, *found, "-o", program)
+    return run(program, LD_LIBRARY_PATH=str(packages / "prefix" / "lib"))
 
 
 def _assert_torques_of_the_state(output: str) -> None:
@@ -117,7 +93,7 @@ def _last_torques(robot: str, steps: int = 20000) -> np.ndarray:
 @pytest.mark.slow
 def test_cpp17_class_of_two_robots_in_two_threads(prefix: Path, tmp_path: Path) -> None:
     """The program itself checks that each thread got what it gets alone."""
-    _need("g++")
+    need("g++")
     rows = [line.split() for line in _with_cmake("cpp", prefix, tmp_path).splitlines()]
     assert [row[0] for row in rows] == ["two_link", "scara"]
     for robot, *torques in rows:
@@ -149,7 +125,7 @@ def _eigen_headers() -> Path | None:
 
 def test_the_header_is_all_there_is_to_the_class(packages: Path, tmp_path: Path) -> None:
     """Calls cost what C calls cost: at -O2 no member function is left, and nothing allocates or throws."""
-    _need("g++", "nm")
+    need("g++", "nm")
     source = tmp_path / "main.cpp"
     source.write_text(
         '#include "scara/scara.hpp"\n'
@@ -159,15 +135,15 @@ def test_the_header_is_all_there_is_to_the_class(packages: Path, tmp_path: Path)
     )
     flags = ["-std=c++17", "-O2", "-fno-exceptions", "-fno-rtti", *STRICT]
     words = ["g++", *flags, f"-I{packages}/scara/include", "-c", str(source)]
-    _run([*words, "-o", str(tmp_path / "main.o")])
-    symbols = [line.split()[-1] for line in _run(["nm", "-u", str(tmp_path / "main.o")]).splitlines()]
+    run(*words, "-o", tmp_path / "main.o")
+    symbols = [line.split()[-1] for line in run("nm", "-u", tmp_path / "main.o").splitlines()]
     assert sorted(set(symbols) - {"__stack_chk_fail"}) == ["scara_forward_dynamics_theta", "scara_gravity"]
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_python_through_cffi(robot: str, packages: Path) -> None:
     script = str(CONSUMERS / "python" / "with_cffi.py")
-    found = json.loads(_run([sys.executable, "-I", script, str(packages / robot)]))
+    found = json.loads(run(sys.executable, "-I", script, packages / robot))
     model = bundled_model(robot)
     q, qd, qdd = np.random.default_rng(1).normal(size=(3, 1000, model.n))
     assert found["joints"] == ", ".join(model.joint_names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from direct import Direct, shared_library
+from installed import need
 from limbed import DERIVATIVES, SHAPES, limbed
 from lowered import lowered
 from random_trees import RandomTree
@@ -97,8 +97,7 @@ def test_derivatives_are_pinocchios_in_every_layout(
     name: str, functions: tuple[str, ...], real: str, compiler: str, tmp_path: Path
 ) -> None:
     """Those of forward dynamics without parameters at run time: that variant has no limbs in lanes."""
-    if shutil.which(compiler) is None:
-        pytest.skip(f"no {compiler}")
+    need(compiler)
     tree = TREES[name]()
     model = derive_model(tree.mechanism(), expand=False)
     kernels = lowered(model, "factored", functions, theta_variants=functions is INVERSE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -347,7 +346,7 @@ def test_what_cannot_have_one_is_refused(tmp_path: Path) -> None:
     assert not path.exists()
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.needs("g++")
 def test_cpp_and_other_compilers_take_the_header(mass: EstimatorLibrary, tmp_path: Path) -> None:
     emit_c(bundled_model("kr6"), tmp_path / "arm", functions=["gravity"], name="arm", estimator="inertia")
     main = '#include "arm/arm.h"\nint main() { static arm_estimator state; return state.started; }\n'

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from bundled import bundled_model
+from installed import need
 
 from psdmc.compiler import emit_c
 from psdmc.toolchain.compiler_command import FLAGS
@@ -33,8 +33,7 @@ PUBLIC = re.compile(r"kr6_((?!sincos_)\w+?)(?:_batch|_batch_soa)?$")
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if shutil.which("gcc") is None:
-        pytest.skip("gcc is not installed")
+    need("gcc")
     folder = tmp_path_factory.mktemp("stack") / "kr6"
     emit_c(bundled_model("kr6"), folder)
     return folder
@@ -68,8 +67,7 @@ def test_no_call_takes_more_than_16_kib(target: str, package: Path, tmp_path: Pa
 @whole
 @pytest.mark.parametrize("target", TARGETS)
 def test_derivatives_take_what_the_documents_say(target: str, tmp_path: Path) -> None:
-    if shutil.which("gcc") is None:
-        pytest.skip("gcc is not installed")
+    need("gcc")
     emit_c(bundled_model("kr6"), tmp_path / "kr6", functions=DERIVATIVES)
     deepest = stack_of(tmp_path / "kr6", target, tmp_path)
     assert len(deepest) == 2 * (3 + 2)

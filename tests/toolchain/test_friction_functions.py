@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
+from command_line import status
 from direct import Direct, shared_library, write_sources
 
 from psdmc.backends.c.package import PackageView, package_view
@@ -17,7 +17,6 @@ from psdmc.backends.info import EmitOptions, package_info
 from psdmc.calibration.api import calibrate
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.cli.boundary import run
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
 from psdmc.lower.kernels import lower
@@ -133,7 +132,7 @@ int main()
 """
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.needs("g++")
 def test_the_cpp_class_has_it_too(arm: DynamicsModel, tmp_path: Path) -> None:
     write_sources(package(arm), tmp_path)
     (tmp_path / "main.cpp").write_text(MAIN)
@@ -167,19 +166,8 @@ def test_one_log_s_friction_reaches_a_built_package(tmp_path: Path, capsys) -> N
             assert abs(row.value - truth[k]) < 3.0 * row.std + 2e-3
     found.model.save(tmp_path / "calibrated.npz")
     calibrated = load(tmp_path / "calibrated.npz")
-    with pytest.raises(SystemExit) as left:
-        run(
-            [
-                "emit-c",
-                str(tmp_path / "calibrated.npz"),
-                "-o",
-                str(tmp_path / "c"),
-                "--functions",
-                "gravity",
-                "--friction",
-            ]
-        )
-    assert not left.value.code
+    words = ["-o", tmp_path / "c", "--functions", "gravity", "--friction"]
+    assert status("emit-c", tmp_path / "calibrated.npz", *words) == 0
     build_package(tmp_path / "c")
     header = (tmp_path / "c" / "include" / "two_link_full" / "two_link_full.h").read_text()
     assert "void two_link_full_friction(const double *qd, double *tau_f);" in header
@@ -191,8 +179,7 @@ def test_one_log_s_friction_reaches_a_built_package(tmp_path: Path, capsys) -> N
     with pytest.raises(ToolchainError, match="friction"):
         build_package(tmp_path / "c", edited=True)
     capsys.readouterr()
-    with pytest.raises(SystemExit):
-        run(["show", str(tmp_path / "calibrated.npz")])
+    assert status("show", tmp_path / "calibrated.npz") == 0
     said = capsys.readouterr().out
     for word in ("log: log.csv", "6,000 rows", "R^2 held out", "coulomb [Nm]", "+-"):
         assert word in said

@@ -16,12 +16,6 @@ from psdmc.toolchain import compile
 from psdmc.toolchain.compile import KERNELS, lowered_once
 
 
-@pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
 class Counted:
     """A lowering that counts its calls."""
 

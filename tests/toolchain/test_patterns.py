@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -98,7 +97,7 @@ def test_functions_of_no_matrix_are_refused_by_name(robot: CompiledRobot) -> Non
         robot.pattern("coriolis_matrix")
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.needs("g++")
 def test_the_c_and_cpp_tables_are_pythons(robot: CompiledRobot, model: DynamicsModel, tmp_path: Path) -> None:
     """Read by a C and a C++ program, from what was written."""
     folder = tmp_path / "tree"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -91,7 +90,7 @@ int main()
 """
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.needs("g++")
 def test_the_class_does_so_too(kr6: DynamicsModel, tmp_path: Path) -> None:
     shown = package(kr6)
     write_sources(shown, tmp_path)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import shutil
-import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 from c_warnings import EXTRA, STRICT
 from direct import write_sources
+from installed import run
 from slow_cases import slow_but_for
 from traced import arm_package
 
@@ -75,12 +75,6 @@ def need(*programs: str) -> None:
             (pytest.fail if WHOLE else pytest.skip)(f"{program} is not installed")
 
 
-def run(*words: str | Path) -> str:
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
-    return done.stdout
-
-
 OF_THIS_MACHINE = ["native", "scalar", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
 
 
@@ -131,12 +125,10 @@ def test_the_default_targets_flags_are_those_for_this_machine() -> None:
 
 
 def test_targets_share_lowerings_where_their_costs_are_equal(
-    two_link: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    two_link: DynamicsModel, tmp_path: Path, own_cache: Path
 ) -> None:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
-
     def kept() -> int:
-        return len(list((tmp_path / "cache").glob("*/kernels.json")))
+        return len(list(own_cache.glob("*/kernels.json")))
 
     made = []
     for number, name in enumerate(("native", "x86-64-v4", "x86-64-v3", "cortex-m4f", "cortex-m4f")):
@@ -147,10 +139,10 @@ def test_targets_share_lowerings_where_their_costs_are_equal(
     assert preset("x86-64-v4").costs == COSTS
 
 
+@pytest.mark.usefixtures("own_cache")
 def test_lowering_is_given_the_targets_costs(
     two_link: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
     given: list[Costs] = []
 
     def recorded(*arguments: Any, costs: Costs = COSTS, **further: Any) -> dict[str, Kernel]:
@@ -166,9 +158,8 @@ def test_lowering_is_given_the_targets_costs(
 
 @pytest.mark.parametrize("target", [SCALAR, X86_64_V3], ids=lambda target: target.name)
 def test_libraries_are_compiled_with_the_targets_flags(
-    two_link: DynamicsModel, target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    two_link: DynamicsModel, target: Target, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
     try:
         flags = find_compiler(target).flags
     except ToolchainError as refused:

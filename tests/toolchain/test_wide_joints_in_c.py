@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from collections.abc import Iterator
 from functools import partial
@@ -13,13 +12,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import bundled_model
+from command_line import status
 from numpy.testing import assert_allclose
 from random_trees import RandomTree
 from unoptimised import without_optimisation, wrapper
 
 import psdmc
 from psdmc import compiler
-from psdmc.cli.boundary import run
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import OF_TREES
@@ -93,7 +92,7 @@ def test_the_package_passes_its_own_test_in_every_layout(
     build_package(package)
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
+@pytest.mark.needs("g++")
 def test_the_class_has_the_lengths_too(package: Path, tmp_path: Path) -> None:
     source = tmp_path / "lengths.cpp"
     source.write_text(
@@ -159,9 +158,7 @@ def test_the_command_shows_such_a_model(
     model: DynamicsModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model.save(tmp_path / "tree.npz")
-    with pytest.raises(SystemExit) as ended:
-        run(["show", str(tmp_path / "tree.npz")])
-    assert not ended.value.code
+    assert status("show", tmp_path / "tree.npz") == 0
     shown = capsys.readouterr().out
     for word in ("free", "spherical", "planar", "translation"):
         assert re.search(rf"^joint\d  link\d .* {word} ", shown, re.MULTILINE), word

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from importlib import resources
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import declarations
+from installed import need
 from small import (
     FORWARD,
     INVERSE,
@@ -192,8 +192,7 @@ def test_no_name_reaches_the_c_text_unescaped(name: str, tmp_path: Path) -> None
 @pytest.mark.parametrize("real", ["float64", "float32"])
 @pytest.mark.parametrize("name", ["pendulum", *NASTY])
 def test_the_cpp_header_takes_any_name_and_precision(name: str, real: str, tmp_path: Path) -> None:
-    if shutil.which("g++") is None:
-        pytest.skip("g++ is not installed")
+    need("g++")
     package = pendulum(pendulum_info(name, joint=name), EmitOptions(real=real))  # type: ignore[arg-type]
     files = package_files(package)
     for kind in ("h", "hpp"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from installed import need
 from small import INVERSE, kernel, pendulum, pendulum_info
 
 from psdmc.backends.c.back_end import package_files
@@ -40,8 +40,7 @@ def test_rounding_is_numpys(value: float) -> None:
 def test_limits_beyond_single_precision_do_not_warn(
     compiler: str, kind: str, real: str, tmp_path: Path
 ) -> None:
-    if shutil.which(compiler) is None:
-        pytest.skip(f"{compiler} is not installed")
+    need(compiler)
     info = replace(pendulum_info(), joints=(ODD,))
     files = package_files(pendulum(info, EmitOptions(real=real)))  # type: ignore[arg-type]
     for path, text in files.items():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled import bundled_model
+from command_line import status
 from sprung_plant import Run, recorded, torsional_spring
 
 from psdmc.calibration.columns.columns import read_columns
@@ -16,7 +17,6 @@ from psdmc.calibration.columns.kinds import KINDS
 from psdmc.calibration.identify.linear_problem import motion_of
 from psdmc.calibration.identify.motor_model import Coupling
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 
 BASE = {"link": "base", "point": [0.1, 0.0, 0.2]}
@@ -162,14 +162,12 @@ def test_a_description_s_springs_reach_the_calibrated_file(
 ) -> None:
     write_log(recorded(tmp_path / "coil.csv", (torsional_spring,), Run(seconds=20.0)), tmp_path / "coil.csv")
     words = calibration(tmp_path, LOG_TOML)
-    with pytest.raises(SystemExit) as left:
-        run([*words, "--report", str(tmp_path / "out.html")])
-    assert not left.value.code, capsys.readouterr()
+    code = status(*words, "--report", tmp_path / "out.html")
+    assert not code, capsys.readouterr()
     page = (tmp_path / "out.html").read_text(encoding="utf-8")
     assert "<h2>Springs</h2>" in page
     capsys.readouterr()
-    with pytest.raises(SystemExit):
-        run(["show", str(tmp_path / "out.npz")])
+    assert status("show", tmp_path / "out.npz") == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("coil")]
     assert float(line.split()[2]) == pytest.approx(8.0, abs=0.15)
 
@@ -177,9 +175,7 @@ def test_a_description_s_springs_reach_the_calibrated_file(
 def test_a_wrong_table_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_log(recorded(tmp_path / "coil.csv", (), Run(seconds=5.0)), tmp_path / "coil.csv")
     words = calibration(tmp_path, LOG_TOML.replace("joint_3", "elbow\\u0007"))
-    with pytest.raises(SystemExit) as left:
-        run(words)
-    assert left.value.code == 2
+    assert status(*words) == 2
     said = capsys.readouterr().err
     assert "log.toml" in said
     assert "spring 1: joint: found 'elbow\\x07'" in said

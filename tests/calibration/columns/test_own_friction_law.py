@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
+from command_line import status
 from direct import Direct, shared_library
 
 from psdmc.backends.c.package import package_view
@@ -20,7 +21,6 @@ from psdmc.calibration.columns.columns import read_columns
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.delivered import delivered_quality
-from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.friction.own import laws_of, read_law
 from psdmc.lower.kernels import lower
@@ -44,12 +44,6 @@ def friction(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.asarray(plain + SINES * np.sin(5.0 * q) + COSINES * np.cos(5.0 * q))
 
 
-def commanded(*words: object) -> None:
-    with pytest.raises(SystemExit) as left:
-        run([str(word) for word in words])
-    assert not left.value.code
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model, the law, and a log of Pinocchio's torques with that friction and noise; calibrated by the command."""
@@ -68,7 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(EXAMPLE, folder)
     (folder / "log.toml").write_text('friction = "ripple.py"\n[[log]]\nfile = "arm.csv"\n', encoding="utf-8")
     found, page = folder / "found.npz", folder / "page.html"
-    commanded("calibrate", folder / "arm.npz", folder / "log.toml", "-o", found, "--report", page)
+    assert status("calibrate", folder / "arm.npz", folder / "log.toml", "-o", found, "--report", page) == 0
     (folder / "ripple.py").unlink()  # what follows reads the model file alone
     return folder
 
@@ -96,9 +90,9 @@ def test_the_fit_finds_its_values(folder: Path) -> None:
 
 def test_report_show_and_export_name_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "ripple sin [Nm]" in (folder / "page.html").read_text(encoding="utf-8")
-    commanded("show", folder / "found.npz")
+    assert status("show", folder / "found.npz") == 0
     assert "ripple cos [Nm]" in capsys.readouterr().out
-    commanded("export-urdf", folder / "found.npz", "-o", folder / "back.urdf")
+    assert status("export-urdf", folder / "found.npz", "-o", folder / "back.urdf") == 0
     said = capsys.readouterr().out
     assert (
         "Torque ripple of a gear: five waves per turn of the joint (ripple): joint 'shoulder', 'elbow'"
@@ -139,8 +133,8 @@ def test_c_is_its_program_and_its_formula(folder: Path, tmp_path: Path, real: st
 
 def test_the_package_builds_and_tests_itself(folder: Path, tmp_path: Path) -> None:
     words = ("--functions", "gravity", "--friction")
-    commanded("emit-c", folder / "found.npz", "-o", tmp_path / "c", *words)
-    commanded("build", tmp_path / "c")
+    assert status("emit-c", folder / "found.npz", "-o", tmp_path / "c", *words) == 0
+    assert status("build", tmp_path / "c") == 0
     header = next((tmp_path / "c" / "include").rglob("two_link_full.h")).read_text(encoding="utf-8")
     assert "_friction(const double *q, const double *qd, double *tau_f);" in header
     assert "ripple_sin sin(5 q) + ripple_cos cos(5 q)" in header

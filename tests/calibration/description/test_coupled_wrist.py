@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import bundled_model, bundled_robot, robot_path
+from command_line import status
 
 from psdmc.calibration.logs.log_files import write_columns
-from psdmc.cli.boundary import run
 from psdmc.model.load import load
 from psdmc.robot.reference import reference
 
@@ -89,12 +89,6 @@ def description(names: tuple[str, ...]) -> str:
     return "\n".join(lines).replace("np.float64(", "").replace(")", "")
 
 
-def typed(*words: object) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run([str(word) for word in words])
-    assert ended.value.code == 0
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """With the model of a file whose masses are wrong by up to a quarter, two logs and their description."""
@@ -106,7 +100,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wrong = re.sub(r"^mass = (\S+)", lambda m: f"mass = {float(m[1]) * next(factors):.6g}", text, flags=re.M)
     assert wrong != text
     (folder / "wrong.toml").write_text(wrong, encoding="utf-8")
-    typed("derive", folder / "wrong.toml", "-o", folder / "wrong.npz")
+    assert status("derive", folder / "wrong.toml", "-o", folder / "wrong.npz") == 0
     (folder / "log.toml").write_text(description(bundled_model(ROBOT).joint_names), encoding="utf-8")
     return folder
 
@@ -114,7 +108,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_coupled_wrist_is_recovered(folder: Path, capsys: pytest.CaptureFixture[str]):
     words = (folder / "wrong.npz", folder / "log.toml", "-o", folder / "out.npz")
 
-    typed("calibrate", *words, "--report", folder / "out.html")
+    assert status("calibrate", *words, "--report", folder / "out.html") == 0
 
     assert capsys.readouterr().out.splitlines()[0].startswith("verdict: usable")
     truth, found = bundled_model(ROBOT), load(folder / "out.npz")
@@ -142,7 +136,7 @@ def test_a_coupled_wrist_is_recovered(folder: Path, capsys: pytest.CaptureFixtur
     assert 0.6 < np.sqrt(np.mean(np.square(list(off.values())))) < 1.4
     assert {name: round(x, 2) for name, x in off.items() if abs(x) >= 3.0} == {}
     assert [log.get("use", "fit") for log in kept["facts"]["data"]] == ["fit", "validate"]
-    typed("show", folder / "out.npz")
+    assert status("show", folder / "out.npz") == 0
     shown = capsys.readouterr().out
     assert "log: check.csv, 7,500 rows, 30 s, held out whole" in shown
     assert "friction: of the motors, some of which drive several joints together" in shown
@@ -157,20 +151,18 @@ def test_a_coupled_wrist_is_recovered(folder: Path, capsys: pytest.CaptureFixtur
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    with pytest.raises(SystemExit) as ended:
-        run([str(word) for word in words])
-    assert ended.value.code == 2
+    assert status(*words) == 2
     return capsys.readouterr().err
 
 
 @pytest.mark.slow
 def test_what_has_no_place_for_motors_says_so(folder: Path, capsys: pytest.CaptureFixture[str]):
-    typed("calibrate", folder / "wrong.npz", folder / "log.toml", "-o", folder / "again.npz")
+    assert status("calibrate", folder / "wrong.npz", folder / "log.toml", "-o", folder / "again.npz") == 0
 
     text = refused(capsys, "emit-c", folder / "again.npz", "-o", folder / "again", "--friction")
     assert "its friction is of motors that drive several joints together" in text
     assert not (folder / "again").exists()
-    typed("export-urdf", folder / "again.npz", "-o", folder / "again.urdf")
+    assert status("export-urdf", folder / "again.npz", "-o", folder / "again.urdf") == 0
     text = capsys.readouterr().out
     assert (
         "not in the files: friction of motors that drive several joints together: joint 'J4', 'J5', 'J6'"
@@ -188,15 +180,7 @@ def test_a_motor_s_wrong_sign_is_found_by_motor(folder: Path, capsys: pytest.Cap
         text.replace(own, own.replace("sign = 1", "sign = -1")), encoding="utf-8"
     )
 
-    with pytest.raises(SystemExit) as ended:
-        run(
-            [
-                "calibrate",
-                *map(str, [folder / "wrong.npz", folder / "turned.toml", "-o", folder / "turned.npz"]),
-            ]
-        )
-
-    assert ended.value.code == 6
+    assert status("calibrate", folder / "wrong.npz", folder / "turned.toml", "-o", folder / "turned.npz") == 6
     shown = capsys.readouterr().out
     assert "friction would give power instead of taking it: joint J6" in shown
     assert not (folder / "turned.npz").exists()

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundled import bundled_model
+from command_line import status
 from shared_data import UR10_LOG
 
 from psdmc.calibration.description.description import read_description
@@ -14,7 +15,6 @@ from psdmc.calibration.description.draft import drafted
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_columns
-from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 
 TIME = np.arange(0.0, 4.0, 0.01)
@@ -149,10 +149,9 @@ def test_hostile_names_stay_in_their_strings(tmp_path: Path):
 
 
 def typed(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[object, str]:
-    with pytest.raises(SystemExit) as ended:
-        run([str(word) for word in words])
+    code = status(*words)
     shown = capsys.readouterr()
-    return ended.value.code, shown.out + shown.err
+    return code, shown.out + shown.err
 
 
 def test_the_command_drafts_once_and_says_what_to_type_next(

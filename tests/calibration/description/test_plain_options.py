@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundled import bundled_model
+from command_line import status
 from test_payload_identification import Run, record
 
 from psdmc.calibration.description.description import read_description
@@ -15,7 +16,6 @@ from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log, write_columns
 from psdmc.calibration.verdict.judge import acceleration_lost, cutoff_for
-from psdmc.cli.boundary import run
 
 
 @pytest.fixture(scope="module")
@@ -28,10 +28,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def calibrated(capsys: pytest.CaptureFixture[str], folder: Path, *words: object) -> tuple[object, str]:
-    with pytest.raises(SystemExit) as ended:
-        run(["calibrate", *map(str, [folder / "kr6.npz", *words, "-o", folder / "out.npz"])])
+    code = status("calibrate", folder / "kr6.npz", *words, "-o", folder / "out.npz")
     shown = capsys.readouterr()
-    return ended.value.code, shown.out + shown.err
+    return code, shown.out + shown.err
 
 
 def test_validation_split_and_friction_from_the_command_line(

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import robot_path
+from command_line import status
 from scipy import signal
 from shared_data import UR10_LOG
 from slow_cases import slow_but_for
@@ -28,7 +29,6 @@ from psdmc.calibration.plant.spoiled import geared
 from psdmc.calibration.verdict import judge
 from psdmc.calibration.verdict.couplings import ProposedCoupling, proposed_coupling
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
-from psdmc.cli.boundary import run
 from psdmc.compiler import derive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
@@ -103,24 +103,17 @@ def recorded(
 def folder(tmp_path: Path) -> Path:
     """With the model of the arm."""
     (tmp_path / "arm.toml").write_text(with_tool(), encoding="utf-8")
-    typed("derive", tmp_path / "arm.toml", "-o", tmp_path / "arm.npz")
+    status("derive", tmp_path / "arm.toml", "-o", tmp_path / "arm.npz")
     return tmp_path
-
-
-def typed(*words: object) -> object:
-    """The exit status of a command."""
-    with pytest.raises(SystemExit) as ended:
-        run([str(word) for word in words])
-    return ended.value.code
 
 
 def calibrated(folder: Path, capsys: pytest.CaptureFixture[str]) -> tuple[object, list[str], dict]:
     """Exit status, console lines and JSON of a calibration."""
     capsys.readouterr()
     words = ("calibrate", folder / "arm.npz", folder / "log.toml", "-o", folder / "out.npz", "--keep")
-    status = typed(*words, "--report", folder / "out.html")
+    code = status(*words, "--report", folder / "out.html")
     lines = capsys.readouterr().out.splitlines()
-    return status, lines, json.loads((folder / "out.json").read_text(encoding="utf-8"))
+    return code, lines, json.loads((folder / "out.json").read_text(encoding="utf-8"))
 
 
 def r2(numbers: dict, joint: str) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import status
 from scipy import signal
 from worn_arm import COULOMB, VISCOUS, Worn, recorded
 
@@ -16,7 +17,6 @@ from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.log_information import FrictionDrift, friction_drift
 from psdmc.calibration.logs.log import Log, StoredLog, without_start
 from psdmc.calibration.logs.log_files import open_log, read_log, write_log
-from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.store import save
 
@@ -109,16 +109,10 @@ def test_rows_on_disk_and_many_logs_say_the_same(arm, folder: Path):
     assert [key for key, one in kept.items() if one.shown] == [("cold0.csv", "shoulder")]
 
 
-def typed(*words: object) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run([str(word) for word in words])
-    assert ended.value.code == 0
-
-
 def test_the_command_says_it_and_warm_mends_it(folder: Path, capsys: pytest.CaptureFixture[str]):
     words = ("calibrate", folder / "arm.npz", folder / "cold0.csv", "-o", folder / "out.npz")
 
-    typed(*words, "--report", folder / "o.html")
+    assert status(*words, "--report", folder / "o.html") == 0
 
     line = next(line for line in capsys.readouterr().out.splitlines() if "friction changes" in line)
     assert "fitted of cold0.csv: joint shoulder by -" in line
@@ -127,7 +121,7 @@ def test_the_command_says_it_and_warm_mends_it(folder: Path, capsys: pytest.Capt
     assert "friction_drifts" in numbers["verdict"]["codes"]["doubts"]
     assert [each["shown"] for each in numbers["facts"]["friction_drift"]] == [True, False]
     assert "Change of friction over each log" in (folder / "o.html").read_text(encoding="utf-8")
-    typed(*words, "--warm", 20, "--report", folder / "o.html")
+    assert status(*words, "--warm", 20, "--report", folder / "o.html") == 0
     assert "friction changes" not in capsys.readouterr().out
     numbers = json.loads((folder / "o.json").read_text(encoding="utf-8"))
     assert numbers["facts"]["data"][0]["rows"] == 2000
