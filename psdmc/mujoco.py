@@ -234,7 +234,7 @@ def _found(what: str, chain: Mechanism, kinds: Sequence[str], mj_model: Any) -> 
 
 
 def _own(chain: Mechanism, counts: Sequence[int]) -> NDArray[np.intp]:
-    """Return the positions, among all joints' entries, of those of joints that follow no other. `counts` is by joint."""
+    """Return the positions, among all joints' entries, of those of joints that are no mimic joints. `counts` is by joint."""
     starts = np.cumsum([0, *counts])
     return _joined(starts[i] + k for i in chain.own_joints for k in range(counts[i]))
 

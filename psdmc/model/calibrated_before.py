@@ -37,7 +37,7 @@ def upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
     logs = [
         {"date": "", "use": use, **json.record(row, "a log"), **({"use": use} if use != "fit" else {})}
         for name, use in (("data", "fit"), ("with_load", "with_load"))
-        for row in _entries({name: facts.pop(name, [])}, name)
+        for row in list_of({name: facts.pop(name, [])}, name)
     ]
     load, verdict, prediction = facts.pop("load", None), old.get("verdict"), old.get("prediction")
     return {
@@ -54,7 +54,7 @@ def upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
         "motors": [_row(row) for row in _rows(old, "motors")],
         "friction": [_row(row) for row in _named_by_exponents(old)],
         "springs": [_row({"joint": row.pop("spring", None), **row}) for row in _rows(old, "springs")],
-        "warnings": [{"code": "", "text": text} for text in _texts({"warnings": [], **old}, "warnings")],
+        "warnings": [{"code": "", "text": text} for text in texts_of({"warnings": [], **old}, "warnings")],
         "prediction": None if prediction is None else _prediction(prediction),
         "verdict": None if verdict is None else _verdict(verdict),
         "logs": logs,
@@ -64,18 +64,20 @@ def upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _entries(old: Mapping[str, Any], name: str) -> list[Any]:
-    return json.entries(old[name], f"the calibration's {name}", MOST)
+def list_of(of: object, name: str) -> list[Any]:
+    """Return a list of the calibration by its name."""
+    return json.entries(json.part(of, name, "the calibration"), f"the calibration's {name}", MOST)
 
 
-def _texts(old: Mapping[str, Any], name: str) -> list[str]:
-    return [json.text(each, f"an entry of the calibration's {name}") for each in _entries(old, name)]
+def texts_of(of: object, name: str) -> list[str]:
+    """Return a list of texts of the calibration by its name."""
+    return [json.text(each, f"an entry of the calibration's {name}") for each in list_of(of, name)]
 
 
 def _rows(old: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
     return [
         dict(json.record(row, f"a row of the calibration's {name}"))
-        for row in _entries({name: [], **old}, name)
+        for row in list_of({name: [], **old}, name)
     ]
 
 
@@ -92,7 +94,7 @@ def _named_by_exponents(old: Mapping[str, Any]) -> Sequence[dict[str, Any]]:
     """Rows of friction with the present names of terms."""
     rows = _rows(old, "friction")
     law = json.record(old.get("prediction") or {}, "the calibration's prediction")
-    exponents = [json.number(each, "an exponent") for each in _entries({"exponents": [], **law}, "exponents")]
+    exponents = [json.number(each, "an exponent") for each in list_of({"exponents": [], **law}, "exponents")]
     return with_present_names(rows, exponents)
 
 
@@ -112,10 +114,10 @@ def _prediction(value: object) -> dict[str, Any]:
 def _verdict(value: object) -> dict[str, Any]:
     old = json.record(value, "the verdict")
     grounds = {
-        key: [{"code": "said", "text": text} for text in _texts({key: [], **old}, key)] for key in KINDS
+        key: [{"code": "said", "text": text} for text in texts_of({key: [], **old}, key)] for key in KINDS
     }
     delays = [
-        {"shown": False, **json.record(each, "a delay")} for each in _entries({"delays": [], **old}, "delays")
+        {"shown": False, **json.record(each, "a delay")} for each in list_of({"delays": [], **old}, "delays")
     ]
     return {"samples_per_unknown": None, "joints": {}, **old, **grounds, "delays": delays}
 

@@ -33,7 +33,7 @@ from psdmc.model.calibrated import (
     code_of,
     parameters_of,
 )
-from psdmc.model.calibrated_before import KINDS, MOST, upgraded
+from psdmc.model.calibrated_before import KINDS, MOST, list_of, texts_of, upgraded
 from psdmc.model.grounds import Delay, Ground
 
 Row = TypeVar("Row")
@@ -205,15 +205,15 @@ def from_json(value: object) -> Calibrated:
     return Calibrated(
         robot=_text(content, "robot"),
         method=_text(content, "method"),
-        joint_names=tuple(_texts(content, "joints")),
+        joint_names=tuple(texts_of(content, "joints")),
         parameters=parameters,
         motors=_rows(content, "motors", _number),
         friction=friction,
         springs=_rows(content, "springs", _number),
         elasticity=_rows(content, "elasticity", _number) if "elasticity" in content else (),
         steps=tuple(_step(name, rows) for name, rows in _record(content, "quality").items()),
-        warnings=tuple(_remark_of(each) for each in _list(content, "warnings")),
-        notes=tuple(_texts(content, "notes")),
+        warnings=tuple(_remark_of(each) for each in list_of(content, "warnings")),
+        notes=tuple(texts_of(content, "notes")),
         facts=plain(_record(content, "facts")),
         prediction=prediction,
         verdict=_maybe(content, "verdict", _verdict_of),
@@ -240,16 +240,8 @@ def _record(of: object, name: str) -> dict[str, Any]:
     return json.record(_part(of, name), f"the calibration's {name}")
 
 
-def _list(of: object, name: str) -> list[Any]:
-    return json.entries(_part(of, name), f"the calibration's {name}", MOST)
-
-
-def _texts(of: object, name: str) -> list[str]:
-    return [json.text(each, f"an entry of the calibration's {name}") for each in _list(of, name)]
-
-
 def _rows(of: object, name: str, row: Callable[[object], Row]) -> tuple[Row, ...]:
-    return tuple(row(each) for each in _list(of, name))
+    return tuple(row(each) for each in list_of(of, name))
 
 
 def _maybe(of: object, name: str, part: Callable[[Any], Row]) -> Row | None:
@@ -333,10 +325,10 @@ def _prediction_of(value: object) -> Prediction:
     if law not in (LINEAR, *WITH_STATE):
         expected = " or ".join(map(repr, (LINEAR, *WITH_STATE)))
         raise ValueError(f"the calibration's law of friction is {law!r}, expected {expected}")
-    coupling = _list(value, "coupling")
+    coupling = list_of(value, "coupling")
     size = len(coupling)
     matrix = json.numbers(coupling, "the calibration's coupling", *([size, size] if size else [0]))
-    exponents = _list(value, "exponents")
+    exponents = list_of(value, "exponents")
     columns = plain(_record(value, "columns"))
     json.record(columns.get("friction", {}), "the calibration's table of friction")
     found = Prediction(
@@ -365,10 +357,10 @@ def _used(step: object) -> StepUsed:
 def _verdict_of(value: object) -> Verdict:
     delays = [
         _of(Delay, {**json.record(each, "a delay"), "value": _part(each, "seconds")})
-        for each in _list(value, "delays")
+        for each in list_of(value, "delays")
     ]
     return Verdict(
-        **{name: tuple(_ground(each) for each in _list(value, key)) for key, name in KINDS.items()},
+        **{name: tuple(_ground(each) for each in list_of(value, key)) for key, name in KINDS.items()},
         joints=tuple(
             _of(JointFigures, figures, joint=joint) for joint, figures in _record(value, "joints").items()
         ),

@@ -6,12 +6,11 @@ JSON has no NaN and no infinity. Unknown parameters and missing joint limits the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from psdmc.model.json_values import entries, number, numbers, part, text, whole
+from psdmc.model.json_values import entries, number, numbers, part, record, text, whole
 from psdmc.robot.coordinates import Coordinate, own_coordinates
 from psdmc.robot.inertia import leading_rows
 from psdmc.robot.joints import joint_type
@@ -46,30 +45,37 @@ def chain_to_json(chain: Mechanism) -> dict[str, Any]:
     """Return the robot as plain JSON values. For a serial chain, these are equal to those of psdmc versions that had no
     trees."""
     rows, columns = np.nonzero(chain.parameter_span)
-    values = chain.parameter_span[rows, columns]
-    return (
-        {
-            "name": chain.name,
-            "convention": chain.convention,
-            "base_name": chain.base_name,
-            "tip_name": chain.tip_name,
-            "gravity": chain.gravity.tolist(),
-            "tip": _placement_to_json(chain.tip),
-            "joints": [_joint_to_json(joint) for joint in chain.joints],
-            "parameters": [[None if math.isnan(v) else v for v in row] for row in chain.parameters.tolist()],
-            "parameter_span": {
-                "columns": chain.parameter_span.shape[1],
-                "rows": rows.tolist(),
-                "in_columns": columns.tolist(),
-                "values": values.tolist(),
-            },
-            "notes": list(chain.notes),
-        }
-        | ({"massless": list(chain.massless)} if chain.massless else {})
-        | _frames_to_json(chain)
-        | ({"loops": [_loop_to_json(loop) for loop in chain.loops]} if chain.loops else {})
-        | _tree_to_json(chain)
-    )
+    found = {
+        "name": chain.name,
+        "convention": chain.convention,
+        "base_name": chain.base_name,
+        "tip_name": chain.tip_name,
+        "gravity": chain.gravity.tolist(),
+        "tip": _placement_to_json(chain.tip),
+        "joints": [_joint_to_json(joint) for joint in chain.joints],
+        "parameters": [[None if math.isnan(v) else v for v in row] for row in chain.parameters.tolist()],
+        "parameter_span": {
+            "columns": chain.parameter_span.shape[1],
+            "rows": rows.tolist(),
+            "in_columns": columns.tolist(),
+            "values": chain.parameter_span[rows, columns].tolist(),
+        },
+        "notes": list(chain.notes),
+    }
+    if chain.massless:
+        found["massless"] = list(chain.massless)
+    # Files of versions without named frames have the tip alone.
+    if [(frame.name, frame.rows) for frame in chain.frames] != [(chain.tip_name, POINT)]:
+        found["frames"] = [_frame_to_json(frame) for frame in chain.frames]
+    if chain.loops:
+        found["loops"] = [_loop_to_json(loop) for loop in chain.loops]
+    if not is_plain_chain(chain):
+        found["parents"], found["tip_body"] = list(chain.parents), chain.tip_body
+        found["coordinates"] = [
+            [c.leader, c.ratio, c.offset, *(value for other in c.others for value in other)]
+            for c in chain.coordinates
+        ]
+    return found
 
 
 def is_plain_chain(chain: Mechanism) -> bool:
@@ -79,24 +85,10 @@ def is_plain_chain(chain: Mechanism) -> bool:
     return is_known and chain.is_serial and chain.coordinates == own_coordinates(len(chain))
 
 
-def _frames_to_json(chain: Mechanism) -> dict[str, Any]:
-    return {} if _is_tip_alone(chain) else {"frames": [_frame_to_json(frame) for frame in chain.frames]}
-
-
-def _tree_to_json(chain: Mechanism) -> dict[str, Any]:
-    """Return what each joint hangs on and follows, and where the tip is."""
-    if is_plain_chain(chain):
-        return {}
-    followed = [
-        [c.leader, c.ratio, c.offset, *(value for other in c.others for value in other)]
-        for c in chain.coordinates
-    ]
-    return {"parents": list(chain.parents), "tip_body": chain.tip_body, "coordinates": followed}
-
-
-def _tree_from_json(data: object, n: int) -> dict[str, Any]:
-    """Keyword arguments of Mechanism; none in files of plain chains."""
-    if not isinstance(data, dict) or "parents" not in data:
+def _tree_from_json(data: dict[str, Any], n: int) -> dict[str, Any]:
+    """Keyword arguments of Mechanism: what each joint hangs on and follows, and where the tip is. Files of plain chains have
+    none."""
+    if "parents" not in data:
         return {}
     parents = entries(data["parents"], "parents", n)
     coordinates = entries(part(data, "coordinates", "the robot"), "coordinates", n)
@@ -125,20 +117,6 @@ def _coordinate_from_json(data: object, n: int) -> Coordinate:
     )
 
 
-def _frames(data: object) -> Sequence[object]:
-    """The named frames' entries; empty in files of earlier versions."""
-    return (
-        entries(data["frames"], "the chain's frames", MOST_FRAMES)
-        if isinstance(data, dict) and "frames" in data
-        else ()
-    )
-
-
-def _is_tip_alone(chain: Mechanism) -> bool:
-    """Whether the only frame is the tip, as in all model files of earlier versions."""
-    return [(frame.name, frame.rows) for frame in chain.frames] == [(chain.tip_name, POINT)]
-
-
 def _frame_to_json(frame: NamedFrame) -> dict[str, Any]:
     plain = {"name": frame.name, "joint": frame.joint, "placement": _placement_to_json(frame.placement)}
     return plain if frame.rows == POINT else {**plain, "rows": frame.rows}
@@ -153,7 +131,7 @@ def _loop_to_json(loop: Loop) -> dict[str, Any]:
 def _loop_from_json(data: object, joints: int) -> Loop:
     first, second = (_frame_from_json(part(data, end, "a loop"), joints, BASE) for end in ("first", "second"))
     rows = entries(part(data, "rows", "a loop"), "a loop's rows", len(ROW_NAMES))
-    passive = entries(data.get("passive", []), "passive joints", joints) if isinstance(data, dict) else ()
+    passive = entries(record(data, "a loop").get("passive", []), "passive joints", joints)
     return Loop(
         text(part(data, "name", "a loop"), "a loop's name"),
         first,
@@ -163,51 +141,51 @@ def _loop_from_json(data: object, joints: int) -> Loop:
     )
 
 
-def _loops(data: object, joints: int) -> tuple[Loop, ...]:
-    """Closed loops; none in files of earlier versions."""
-    found = data.get("loops", []) if isinstance(data, dict) else []
-    return tuple(_loop_from_json(loop, joints) for loop in entries(found, "the chain's loops", MOST_FRAMES))
-
-
 def _frame_from_json(data: object, joints: int, least: int = 0) -> NamedFrame:
     name = text(part(data, "name", "a frame"), "a frame's name")
     joint = whole(part(data, "joint", "a frame"), "a frame's joint", least, joints - 1)
-    rows = whole(data.get("rows", POINT), "a contact's rows", 0, SURFACE) if isinstance(data, dict) else POINT
+    rows = whole(record(data, "a frame").get("rows", POINT), "a contact's rows", 0, SURFACE)
     return NamedFrame(name, joint, _placement_from_json(part(data, "placement", "a frame"), "a frame"), rows)
 
 
 def chain_from_json(data: object) -> Mechanism:
     """Return the robot (a Mechanism) from plain JSON values. Raises ValueError with the name of the wrong value."""
-    listed = entries(part(data, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
+    chain = record(data, "the chain")
+    listed = entries(part(chain, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
     if not listed:
         raise ValueError("the chain has no joints")
-    convention = text(part(data, "convention", "the chain"), "the chain's convention")
+    n = len(listed)
+    convention = text(part(chain, "convention", "the chain"), "the chain's convention")
     if convention not in ("urdf", "standard", "modified"):
         raise ValueError(f"the chain's convention is {convention!r}")
     return Mechanism(
-        name=text(part(data, "name", "the chain"), "the chain's name"),
+        name=text(part(chain, "name", "the chain"), "the chain's name"),
         convention=convention,  # type: ignore[arg-type]
-        base_name=text(part(data, "base_name", "the chain"), "the chain's base"),
-        tip_name=text(part(data, "tip_name", "the chain"), "the chain's tip"),
+        base_name=text(part(chain, "base_name", "the chain"), "the chain's base"),
+        tip_name=text(part(chain, "tip_name", "the chain"), "the chain's tip"),
         joints=tuple(_joint_from_json(joint) for joint in listed),
-        parameters=_parameters(part(data, "parameters", "the chain"), len(listed)),
-        parameter_span=_span(part(data, "parameter_span", "the chain"), len(listed)),
-        gravity=numbers(part(data, "gravity", "the chain"), "the chain's gravity", 3),
-        tip=_placement_from_json(part(data, "tip", "the chain"), "the tip"),
+        parameters=_parameters(part(chain, "parameters", "the chain"), n),
+        parameter_span=_span(part(chain, "parameter_span", "the chain"), n),
+        gravity=numbers(part(chain, "gravity", "the chain"), "the chain's gravity", 3),
+        tip=_placement_from_json(part(chain, "tip", "the chain"), "the tip"),
         notes=tuple(
-            text(note, "a note") for note in entries(part(data, "notes", "the chain"), "notes", MOST_NOTES)
+            text(note, "a note") for note in entries(part(chain, "notes", "the chain"), "notes", MOST_NOTES)
         ),
-        frames=tuple(_frame_from_json(frame, len(listed)) for frame in _frames(data)),
-        massless=_massless(data, len(listed)),
-        loops=_loops(data, len(listed)),
-        **_tree_from_json(data, len(listed)),
+        # Files of earlier versions have no frames, massless links or loops.
+        frames=tuple(
+            _frame_from_json(frame, n)
+            for frame in entries(chain.get("frames", []), "the chain's frames", MOST_FRAMES)
+        ),
+        massless=tuple(
+            text(name, "a massless link's name")
+            for name in entries(chain.get("massless", []), "massless links", n)
+        ),
+        loops=tuple(
+            _loop_from_json(loop, n)
+            for loop in entries(chain.get("loops", []), "the chain's loops", MOST_FRAMES)
+        ),
+        **_tree_from_json(chain, n),
     )
-
-
-def _massless(data: object, n: int) -> tuple[str, ...]:
-    """Links' names; empty in files of earlier versions."""
-    found = data.get("massless", []) if isinstance(data, dict) else []
-    return tuple(text(name, "a massless link's name") for name in entries(found, "massless links", n))
 
 
 def _parameters(rows: object, n: int) -> Array:

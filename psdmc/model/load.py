@@ -343,18 +343,9 @@ def _check_base_parameters(arrays: Arrays, chain: Mechanism, l: int, is_known: b
         raise ValueError("a base parameter lies outside the parameters' span")
 
 
-def _exponents(E: NDArray[Any], n: int) -> NDArray[np.uint8]:
-    if E.shape[0] != BLOCKS * n:
-        raise ValueError(f"E has {E.shape[0]} rows for {n} joints")
-    if E.size and E.max() > HIGHEST_POWER:
-        raise ValueError(f"E has exponents up to {E.max()}, expected {HIGHEST_POWER} at most")
-    return E
-
-
 def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
-    shape = (arrays["E"].shape[1], l)
-    ranges = {"P_joint": n, "P_row": shape[0], "P_col": shape[1]}
-    values = arrays["P_value"]
+    E, values = arrays["E"], arrays["P_value"]
+    ranges = {"P_joint": n, "P_row": E.shape[1], "P_col": l}
     for name, count in ranges.items():
         if arrays[name].shape != values.shape:
             raise ValueError(f"{name} has {len(arrays[name])} entries, P_value {len(values)}")
@@ -364,8 +355,11 @@ def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
         raise ValueError("P is not finite")
     if (np.diff(arrays["P_joint"]) < 0).any():
         raise ValueError("P_joint is not in order")
-    entries = Entries(arrays["P_joint"], arrays["P_row"], arrays["P_col"], values)
-    return Expansion(_exponents(arrays["E"], n), entries, l)
+    if E.shape[0] != BLOCKS * n:
+        raise ValueError(f"E has {E.shape[0]} rows for {n} joints")
+    if E.size and E.max() > HIGHEST_POWER:
+        raise ValueError(f"E has exponents up to {E.max()}, expected {HIGHEST_POWER} at most")
+    return Expansion(E, Entries(arrays["P_joint"], arrays["P_row"], arrays["P_col"], values), l)
 
 
 def _provenance(value: object, chain: Mechanism) -> dict[str, Any]:

@@ -34,7 +34,7 @@ from psdmc.version import psdmc_version
 CHAIN_SCHEMA = 1
 """Of files with serial chains, which every psdmc reads."""
 TREE_SCHEMA = 2
-"""Of files with trees, or with joints that follow others."""
+"""Of files with trees, or with mimic joints."""
 CALIBRATED_SCHEMA = 3
 """Of files with a calibration."""
 SCHEMA = 4

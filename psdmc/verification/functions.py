@@ -235,7 +235,7 @@ def _rounding(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) 
 
 
 def _expected(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) -> Mapping[str, Array]:
-    """Pinocchio's values; of a robot whose joints follow others from every joint's own, summed along the axes of rates."""
+    """Pinocchio's values. For a robot with mimic joints, they are those of all joints, summed along the axes of rates."""
     if not robot.follows:
         return recipe.pinocchio(robot.free, given)
     joints = dict(given)
