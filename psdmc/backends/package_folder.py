@@ -107,7 +107,12 @@ def _write(root: Path, files: Mapping[str, str], force: bool) -> Changes:
     before = content_of(root)
     present = {path: digest_of(root, path) for path in files}
     changed = {path: text for path, text in files.items() if present[path] != digest(text)}
-    _refuse_links(root, changed)
+    for path in changed:
+        if link_in(root, path):
+            raise InputError(
+                f"{root}: not writing {path}: it is a symbolic link",
+                "remove the link, or choose another folder",
+            )
     foreign = [path for path in changed if not _is_own(path, present[path], manifest, journal)]
     blocked = [path for path in foreign if not force or present[path] == NOT_REGULAR]
     if blocked:
@@ -120,7 +125,9 @@ def _write(root: Path, files: Mapping[str, str], force: bool) -> Changes:
     stale = _stale(root, files, manifest, journal)
     if changed or stale:
         _replace(root, changed, stale, journal)
-    _tidy(root, files)
+    for folder in dict.fromkeys((root / path).parent for path in files):
+        remove_leftovers(folder)  # of a killed emission
+    (root / JOURNAL).unlink(missing_ok=True)
     after = json.loads(files[MANIFEST]) if MANIFEST in files else {}
     symbols = renamed(before, after) if before and after else []
     return Changes(changed, stale, kept, symbols, _robots(before, after) if before and after else None)
@@ -148,15 +155,6 @@ def _copied(root: Path, path: str) -> str:
     free = next(name for name in names if not os.path.lexists(root / name))
     shutil.copy2(root / path, root / free)
     return free
-
-
-def _refuse_links(root: Path, paths: Mapping[str, str]) -> None:
-    for path in paths:
-        if link_in(root, path):
-            raise InputError(
-                f"{root}: not writing {path}: it is a symbolic link",
-                "remove the link, or choose another folder",
-            )
 
 
 def _is_own(path: str, found: str | None, manifest: Digests, journal: Digests) -> bool:
@@ -195,13 +193,6 @@ def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Di
         for folder in list(Path(path).parents)[:-1]:
             with suppress(OSError):  # it is not empty
                 (root / folder).rmdir()  # make would take an empty folder for a target that is up to date
-
-
-def _tidy(root: Path, files: Mapping[str, str]) -> None:
-    """Remove what a killed emission left."""
-    for folder in dict.fromkeys((root / path).parent for path in files):
-        remove_leftovers(folder)
-    (root / JOURNAL).unlink(missing_ok=True)
 
 
 # A package on disk: its options, and in which files it differs

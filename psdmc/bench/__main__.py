@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import Settings, run
 from psdmc.errors import exit_status_of
 from psdmc.files import write_whole
-from psdmc.progress import on_standard_error
+from psdmc.progress import Progress, on_standard_error
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement, serial_parents
 
@@ -50,7 +50,7 @@ def _measure(options: argparse.Namespace) -> int:
         rounds=options.rounds, rivals=rivals, count=full, threads=full, cold=full or options.cold
     )
     cases = list(standard_cases(options.names or None, progress=on_standard_error))
-    scaling = list(scaling_cases(progress=on_standard_error)) if full and not options.names else []
+    scaling = list(scaling_cases(on_standard_error)) if full and not options.names else []
     result = run(cases, settings, on_standard_error, scaling)
     print(as_text(result))
     if options.json:
@@ -58,13 +58,11 @@ def _measure(options: argparse.Namespace) -> int:
     return 1 if result.wrong else 0
 
 
-def scaling_cases(
-    joints: Sequence[int] = JOINTS, progress: Callable[[str], None] = lambda message: None
-) -> Iterator[Case]:
+def scaling_cases(progress: Progress) -> Iterator[Case]:
     """Yield the KUKA LBR with different numbers of joints, as benchmark robots that show how times grow with the
     joints. Each model is derived in a new process."""
     longest = generic_chain(eight_joints(bundled_chain("LBR7")), SEED)
-    for n in joints:
+    for n in JOINTS:
         progress(f"LBR with {n} joints: deriving")
         chain = longest if n == 8 else generic_chain(first_joints(bundled_chain("LBR7"), n), SEED)
         found = derive_fresh(chain)

@@ -17,6 +17,7 @@ from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress, silent
 from psdmc.reproducible import length
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.load import load_robot
@@ -60,41 +61,35 @@ ARMS, TREES = ("UR5", "Panda"), ("solo12", "anymal_b", "talos", "allegro", "baxt
 """Of POPULAR."""
 
 
-def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Mechanism]]:
+def standard_chains() -> dict[str, Callable[[], Mechanism]]:
     """Return, by name, the functions that make the standard robots of the benchmark, including two generic arms."""
     makers: dict[str, Callable[[], Mechanism]] = {}
     for name in (*BUNDLED, *ARMS):
-        makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
+        makers[name] = lambda name=name: generic_chain(_known(name), SEED)  # type: ignore[misc]
     for n in (6, 7):
-        makers[f"generic {n}R"] = lambda n=n: generic_chain(oblique_chain(n, seed + n), seed)  # type: ignore[misc]
+        makers[f"generic {n}R"] = lambda n=n: generic_chain(oblique_chain(n, SEED + n), SEED)  # type: ignore[misc]
     for name in TREES:
-        makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
+        makers[name] = lambda name=name: generic_chain(_known(name), SEED)  # type: ignore[misc]
     return makers
 
 
-def standard_cases(
-    names: Sequence[str] | None = None,
-    seed: int = SEED,
-    progress: Callable[[str], None] = lambda message: None,
-) -> Iterator[Case]:
+def standard_cases(names: Sequence[str] | None = None, progress: Progress = silent) -> Iterator[Case]:
     """Derive the models of the standard robots of the benchmark, each in a new process.
 
     Raise InputError if a robot's file is not installed, or if a name is unknown.
     """
-    makers = standard_chains(seed)
+    makers = standard_chains()
     for name in makers if names is None else names:
         if name not in makers:
             raise InputError(f"there is no standard robot {name!r}", f"choose from {', '.join(makers)}")
         progress(f"{name}: deriving")
         found = derive_fresh(makers[name]())
-        note = f"generic physical inertias, floor mount, no drive inertia, seed {seed}"
+        note = f"generic physical inertias, floor mount, no drive inertia, seed {SEED}"
         yield Case(name, found.model, note, found.seconds, found.peak_bytes)
 
 
 def legged_cases(
-    functions: tuple[str, ...],
-    names: Sequence[str] = (),
-    progress: Callable[[str], None] = lambda message: None,
+    functions: tuple[str, ...], names: Sequence[str] = (), progress: Progress = silent
 ) -> Iterator[Case]:
     """Derive the models of legged robots with the inertias of their files, each in a new process. Without names, all
     legged robots are derived.

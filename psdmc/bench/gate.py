@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from psdmc.bench.rivals import psdmc_c
 from psdmc.errors import InputError, ToolchainError, exit_status_of
 from psdmc.files import make_folder, read_file, write_whole
 from psdmc.program.cost import cost
+from psdmc.progress import Progress, silent
 from psdmc.toolchain.compiler_command import find_compiler
 
 BASELINE = Path("benchmarks") / "baseline.json"
@@ -197,11 +198,7 @@ class Baseline:
             ) from None
 
 
-def count(
-    cases: Sequence[Case],
-    progress: Callable[[str], None] = lambda message: None,
-    with_instructions: bool = True,
-) -> Baseline:
+def count(cases: Sequence[Case], progress: Progress = silent, with_instructions: bool = True) -> Baseline:
     """Count the operations and instructions per state of every function of each robot, for code that psdmc factors into
     few operations.
 

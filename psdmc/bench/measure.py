@@ -20,7 +20,7 @@ from psdmc.bench.contestant import Contestant, Runner, source
 from psdmc.bench.machine import IDLE_SHARE, built, counted_flags, cxx, others_share
 from psdmc.bench.states import States
 from psdmc.errors import ToolchainError
-from psdmc.progress import Step
+from psdmc.progress import Progress, Step, silent
 from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.toolchain.compiler_command import run
 
@@ -95,7 +95,7 @@ class Measured:
 def measure(
     runners: Sequence[Runner],
     rounds: int,
-    progress: Callable[[str], None] = lambda message: None,
+    progress: Progress = silent,
     between: Callable[[], None] = lambda: None,
     cold: bool = False,
 ) -> Measured:

@@ -43,10 +43,9 @@ def compiled_once(
     made: list[tuple[Interface, Path]] = []
 
     def build(folder: Path) -> None:
-        package = make()
-        library = compile_library(package)
-        made.append((interface_of(package), library))
-        (folder / INTERFACE).write_text(interface_to_json(made[0][0], library.parent.name), encoding="utf-8")
+        interface, library = _made(make())
+        made.append((interface, library))
+        (folder / INTERFACE).write_text(interface_to_json(interface, library.parent.name), encoding="utf-8")
 
     decides = (*sources_digests(), *_emission(), *find_compiler(target).identity, repr(target), *parts)
     key = cache_key({}, ("interface", *decides))

@@ -85,8 +85,8 @@ def documentation(function: Signature) -> str:
         _rows(given),
         returned,
         _rows(made),
-        *_note(function),
-        *_masses(function),
+        *([_filled(function.note)] if function.note else []),
+        *([_filled(_FIXED_MASSES)] if function.name in OF_FILE_MASSES else []),
         *_failures(function),
         "In these shapes:",
         _rows(lengths),
@@ -115,15 +115,7 @@ _FIXED_MASSES = (
     "The masses and inertias of the links are those of the robot file, with loads that `DynamicsModel.with_payload` added. "
     "The function does not use theta_b, because base parameters do not determine its results."
 )
-
-
-def _note(function: Signature) -> list[str]:
-    return [_filled(function.note)] if function.note else []
-
-
-def _masses(function: Signature) -> list[str]:
-    """Return a paragraph that says which masses a function without theta_b uses, if it needs any."""
-    return [_filled(_FIXED_MASSES)] if function.name in OF_FILE_MASSES else []
+"""A paragraph on functions without theta_b that need masses."""
 
 
 def _failures(function: Signature) -> list[str]:

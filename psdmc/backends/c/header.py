@@ -54,6 +54,7 @@ def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str
     for function in functions:
         names[function.signature.has_motor_torques].append(function.name)
     headings = [name for term in law.terms for name in term.names]
+    of_one_rate = (joint.name for joint in info.joints if joint.nv == 1)  # the joints that have friction
     return (
         "Friction in the dynamics: tau are the torques of the motors, M(q) qdd + h(q, qd) + friction (N m; N if sliding).",
         "Friction is positive where the motor must push in the positive direction. Friction that brakes has the",
@@ -62,7 +63,7 @@ def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str
         f"Values per joint ({', '.join(headings)}):",
         *(
             f"  {joint}: {', '.join(f'{x:.9g}' for x in values)}"
-            for joint, values in zip(_with_friction(info), law.values.tolist(), strict=True)
+            for joint, values in zip(of_one_rate, law.values.tolist(), strict=True)
         ),
         *wrap(f"Functions with friction: {', '.join(names[True]) or 'none'}.", WIDTH, subsequent_indent="  "),
         *wrap(
@@ -75,11 +76,6 @@ def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str
         ),
         "",
     )
-
-
-def _with_friction(info: PackageInfo) -> list[str]:
-    """Names of the joints that have friction: those of one rate."""
-    return [joint.name for joint in info.joints if joint.nv == 1]
 
 
 def _array_lines(info: PackageInfo) -> tuple[str, ...]:

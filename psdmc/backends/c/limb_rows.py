@@ -290,9 +290,8 @@ def _packed(packed: Packed) -> StoreView:
 def _rows(rows: Rows) -> StoreView:
     none = f"limbs{rows.group.count}_{NONE}"
     vectors = (none if slot is None else str(slot) for slot in rows.slots)
-    return StoreView(tuple(vectors), rows.group.count, tuple(_row_stores(rows)))
-
-
-def _row_stores(rows: Rows) -> Iterator[str]:
-    for limb, (first, width) in enumerate(zip(rows.at, rows.widths, strict=True)):
-        yield f"{STORES[width]}({rows.vector} + {first}, row[{limb}])"
+    lines = (
+        f"{STORES[width]}({rows.vector} + {first}, row[{limb}])"
+        for limb, (first, width) in enumerate(zip(rows.at, rows.widths, strict=True))
+    )
+    return StoreView(tuple(vectors), rows.group.count, tuple(lines))

@@ -16,12 +16,13 @@ from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel, takes_gravity
+from psdmc.program.signature import Signature
 from psdmc.robot.mechanism import Mechanism
 
+CASADI = (casadi.FIRST, casadi.BY_THETA, casadi.HESSIANS)
+
 ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
-    casadi.FIRST: casadi.files_of(casadi.FIRST),
-    casadi.BY_THETA: casadi.files_of(casadi.BY_THETA),
-    casadi.HESSIANS: casadi.files_of(casadi.HESSIANS),
+    **{name: partial(casadi.files, adapter=name) for name in CASADI},
     "wheel": wheel.files,
     "fmu": fmu.files,
     "fmu2": partial(fmu.files, version=2),
@@ -30,9 +31,9 @@ ADAPTERS: dict[str, Callable[[PackageView], dict[str, str]]] = {
 }
 """By name, the function that makes an adapter's files, path -> text. At least one of them lies in the folder <name>."""
 
-NEEDS = {
+NEEDS: dict[str, Callable[[Sequence[Signature], bool], list[str]]] = {
     casadi.FIRST: casadi.needed,
-    casadi.BY_THETA: casadi.needed_by_theta,
+    casadi.BY_THETA: partial(casadi.needed, theta=True),
     casadi.HESSIANS: casadi.needed,
     "fmu": fmu.needed,
     "fmu2": fmu.needed,
@@ -40,7 +41,7 @@ NEEDS = {
 }
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
-REMARKS = dict.fromkeys((casadi.FIRST, casadi.BY_THETA, casadi.HESSIANS), casadi.remark)
+REMARKS = dict.fromkeys(CASADI, casadi.remark)
 """By name, the function that says what users should know of an adapter's functions of a robot."""
 
 

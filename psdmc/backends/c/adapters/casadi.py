@@ -18,7 +18,7 @@ Jacobian of the gradient adj1_f.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from psdmc.backends.c.adapters.casadi_externals import (
@@ -98,11 +98,6 @@ def needed(functions: Sequence[Signature], wide: bool, theta: bool = False) -> l
     return found + [MAP] * wide + [REGRESSOR] * (theta and bool(found))
 
 
-def needed_by_theta(functions: Sequence[Signature], wide: bool) -> list[str]:
-    """Return what `needed` returns, for functions that take theta_b."""
-    return needed(functions, wide, theta=True)
-
-
 def _is_by_program(function: Signature, sizes: Sizes, theta: bool = False) -> bool:
     """True if psdmc makes the Jacobian of a function from its PROGRAM: no function computes it, and it is not too large."""
     if not _is_differentiated(function.name):
@@ -139,19 +134,14 @@ def _is_of(adapter: str, kernel: Kernel | KernelView) -> bool:
     return adapter in (FIRST, BY_THETA, HESSIANS) and wants
 
 
-def files_of(adapter: str) -> Callable[[PackageView], dict[str, str]]:
-    """Return the function that makes the C file of an adapter, as a mapping from its path to its text.
+def files(package: PackageView, adapter: str = FIRST) -> dict[str, str]:
+    """Return the C file of an adapter, as a mapping from its path to its text.
 
-    The file includes the C files of the package and is compiled to a separate shared library. The function raises
-    InputError if CasADi cannot call the functions of the package.
+    The file includes the C files of the package and is compiled to a separate shared library. Raises InputError if
+    CasADi cannot call the functions of the package.
     """
-
-    def files(package: PackageView) -> dict[str, str]:
-        view = casadi_view(package, adapter)
-        path = f"{view.library}/{view.robot}_{view.library}.c"
-        return {path: render("adapters/casadi.c.jinja", view=view)}
-
-    return files
+    path = f"{adapter}/{package.robot}_{adapter}.c"
+    return {path: render("adapters/casadi.c.jinja", view=_view(package, adapter))}
 
 
 def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
@@ -172,12 +162,9 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
     return f"CasADi functions normalize the q of {whose} and differentiate by each of its entries{rest}"
 
 
-def casadi_view(package: PackageView, adapter: str = FIRST) -> CasadiView:
-    """Return what the template of a CasADi adapter prints for a package.
-
-    Raises InputError if the package computes in float. Also raises InputError if the base parameters are unknown and
-    not an input.
-    """
+def _view(package: PackageView, adapter: str) -> CasadiView:
+    """What the template of a CasADi adapter prints for a package. InputError if the package computes in float, or if the
+    base parameters are unknown and not an input."""
     info, theta = package.info, adapter == BY_THETA
     if package.real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
