@@ -22,7 +22,6 @@ from psdmc.calibration.identify.linear_problem import LinearOptions
 from psdmc.calibration.identify.log_information import (
     ALONE,
     MAIN_SHARE,
-    FrictionDrift,
     LogInformation,
     friction_drift,
     log_information,
@@ -328,11 +327,20 @@ class LogFit:
         drifts = friction_drift(found.problem, found.estimate, [log.name for log in self.logs])
         unstated, found = found, self._with_prior(found)
         self.progress("reading the result back")
-        result = self._consistent(found)
-        if self.known.essential is not None:
-            result = self._essential(found, result, self.known.essential)
+        result, essential_options = self._consistent(found), self.known.essential
+        if essential_options is not None:
+            self.progress("essential parameters")
+            lesser = essential(
+                found.estimate, found.prior.values, found.samples, essential_options, self.linear.fit
+            )
+            fewer = self._consistent(replace(found, estimate=lesser.estimate, dropped=lesser.dropped))
+            names = (*self.model.base_parameters.labels, *found.problem.names)
+            result = with_price(fewer, result, lesser, names)
         result = result if logs is None else with_log_information(result, logs, unstated)
-        return with_drift(result, drifts)
+        if not drifts:
+            return result
+        facts = {**result.facts, FRICTION_DRIFT: [asdict(each) for each in drifts]}
+        return with_model(replace(result, facts=facts))
 
     def _with_prior(self, found: LinearResult) -> LinearResult:
         if not self.known.confidence:
@@ -343,12 +351,6 @@ class LogFit:
         covariance = theta_covariance(self.model, dict(self.known.confidence), found.prior.scale)
         joined = with_prior(found.estimate, known, covariance, self.model.unknown_base_parameters)
         return replace(found, estimate=joined, stated=True)
-
-    def _essential(self, found: LinearResult, whole: Calibration, options: EssentialOptions) -> Calibration:
-        self.progress("essential parameters")
-        lesser = essential(found.estimate, found.prior.values, found.samples, options, self.linear.fit)
-        fewer = self._consistent(replace(found, estimate=lesser.estimate, dropped=lesser.dropped))
-        return with_price(fewer, whole, lesser, (*self.model.base_parameters.labels, *found.problem.names))
 
     def _consistent(self, found: LinearResult) -> Calibration:
         """The physically consistent record where it is wanted and exists; else the unconstrained one, with a note."""
@@ -461,12 +463,3 @@ def with_log_information(record: Calibration, logs: LogInformation, found: Linea
         ODD_LOGS: {"disagree": logs.disagree, "items": [dict(each) for each in logs.odd]},
     }
     return with_model(replace(record, facts=facts, notes=(*record.notes, *notes)))
-
-
-def with_drift(record: Calibration, drifts: Sequence[FrictionDrift]) -> Calibration:
-    """Return the result with the change of each joint's friction over each log, from which a doubt may follow."""
-    if not drifts:
-        return record
-    return with_model(
-        replace(record, facts={**record.facts, FRICTION_DRIFT: [asdict(each) for each in drifts]})
-    )

@@ -205,7 +205,11 @@ def plan_campaign(
         tuple(planner.runs),
         found,
         chain,
-        looked_at(allowed, model, options.shapes, options.floor),
+        (
+            _of_torques(allowed, model),
+            _of_shapes(allowed, model, options.shapes),
+            _of_floor(allowed, options.floor),
+        ),
         (*planner.remarks, *said),
     )
 
@@ -245,11 +249,19 @@ class _Planner:
             )
             self.runs.append(PlannedRun("motor", f"motor_{name}", sweep, name))
             self.runs.append(PlannedRun("motor", f"motor_{name}_loaded", sweep, name, load))
-        self.remarks += [_unfelt(self.chain, k) for k in left_out]
+        for name in (shown(self.chain.joint_names[k]) for k in left_out):
+            self.remarks.append(
+                f"joint {name}: the load acts on it in no pose (its axis is along gravity, or the load lies on it): no motor"
+                f" runs; give its torque constant when you calibrate (--torque-constants {name}=NM_PER_A), or take another"
+                " load"
+            )
 
     def gravity(self) -> None:
         for seed in range(1, self.options.gravity_runs + 1):
-            tries = _gravity_tries(self.chain, seed, self.options.sweep)
+            tries: Iterator[Try] = (
+                (share, partial(gravity_sweep, part, seed + 1000 * number, self.options.sweep))
+                for share, number, part in smaller_boxes(self.chain, seed)
+            )
             motion = self._first(f"gravity sweep {seed}", tries)
             self.runs.append(PlannedRun("gravity", f"gravity_{seed}", motion))
 
@@ -289,11 +301,6 @@ def _sweeps(chain: Mechanism, k: int, poses: np.ndarray, options: SweepOptions) 
             yield share, partial(single_joint_sweep, part, k, poses[number % len(poses)], options)
 
 
-def _gravity_tries(chain: Mechanism, seed: int, options: SweepOptions) -> Iterator[Try]:
-    for share, number, part in smaller_boxes(chain, seed):
-        yield share, partial(gravity_sweep, part, seed + 1000 * number, options)
-
-
 def _sine_tries(chain: Mechanism, k: int, options: SineOptions) -> Iterator[Try]:
     """Sines about the middle of the ranges; then in other poses; then smaller and slower ones."""
     middle = np.array([sum(swept_range(joint, 1.0)) / 2 for joint in chain.joints])
@@ -305,16 +312,6 @@ def _sine_tries(chain: Mechanism, k: int, options: SineOptions) -> Iterator[Try]
         own = replace(options, largest=max(largest, options.smallest), margin=min(margin, options.margin))
         for pose in (middle, *others):
             yield share, partial(sine_series, chain, k, pose, own)
-
-
-def _unfelt(chain: Mechanism, k: int) -> str:
-    """Why no motor run of a joint is planned, and what to do."""
-    name = chain.joint_names[k]
-    return (
-        f"joint {shown(name)}: the load acts on it in no pose (its axis is along gravity, or the load lies on it): no motor"
-        f" runs; give its torque constant when you calibrate (--torque-constants {shown(name)}=NM_PER_A), or take another"
-        " load"
-    )
 
 
 def _spoken(progress: Progress) -> Callable[[float, float, float], None]:
@@ -386,13 +383,6 @@ def _torques(model: DynamicsModel, chain: Mechanism, regressor: Regressor) -> To
     except InputError:
         friction = None  # of a campaign: it has a state
     return TorqueLimits(chain, regressor, largest, model.theta_b, friction)
-
-
-def looked_at(
-    allowed: Allowed, model: DynamicsModel, shapes: Sequence[Path] | None, floor: float | None
-) -> tuple[str, ...]:
-    """Return one sentence each on the checks of torques, shapes and floor."""
-    return (_of_torques(allowed, model), _of_shapes(allowed, model, shapes), _of_floor(allowed, floor))
 
 
 def _of_torques(allowed: Allowed, model: DynamicsModel) -> str:

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.calibration.identify.friction import (
     FrictionResult,
@@ -201,25 +200,15 @@ def physical_steps(
     joints = found.friction.joints
     unknowns = {name: unknowns_of(joint)[:SEVEN] for name, joint in joints.items()}
     vector = np.concatenate([found.inertial.theta_b, *unknowns.values()])
-    near = nearest_physical(
-        model, vector, _whitening(found, len(vector)), _bounded(model.l, len(joints)), options
-    )
-    moved = {
-        name: _moved(joints[name], near.values[model.l + SEVEN * k : model.l + SEVEN * (k + 1)])
-        for k, name in enumerate(joints)
-    }
+    bounded = np.concatenate([np.zeros(model.l, dtype=bool), np.tile(NEVER_NEGATIVE, len(joints))])
+    near = nearest_physical(model, vector, _whitening(found, len(vector)), bounded, options)
+    moved = {}
+    for (name, joint), seven in zip(joints.items(), near.values[model.l :].reshape(-1, SEVEN), strict=True):
+        fixed = np.diag(joint.covariance) == 0.0
+        kept = np.where(fixed, unknowns[name], np.maximum(seven, SMALLEST))
+        moved[name] = replace(joint, friction=STATE_LAW.from_unknowns(kept))
     friction = FrictionResult(moved, found.friction.warnings)
     return PhysicalSteps(near.values[: model.l], replace(found, friction=friction), near.distance)
-
-
-def _bounded(l: int, joints: int) -> NDArray[np.bool_]:
-    return np.concatenate([np.zeros(l, dtype=bool), np.tile(NEVER_NEGATIVE, joints)])
-
-
-def _moved(joint: JointFriction, seven: Array) -> JointFriction:
-    fixed = np.diag(joint.covariance) == 0.0
-    kept = np.where(fixed, unknowns_of(joint)[:SEVEN], np.maximum(seven, SMALLEST))
-    return replace(joint, friction=STATE_LAW.from_unknowns(kept))
 
 
 def _whitening(found: FourSteps, size: int) -> Array:

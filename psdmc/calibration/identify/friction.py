@@ -71,38 +71,42 @@ def calibrate_friction(
     """
     earlier = start.joints if start is not None else {}
     tasks = [(name, run, options, earlier.get(name)) for name, run in runs.items()]
-    found = {joint.joint: joint for joint in in_processes(_fit, tasks, options.workers)}
-    warnings = tuple(
+    found = {joint.joint: joint for joint in in_processes(_fit_joint, tasks, options.workers)}
+    warnings = [
         f"joint {name}: friction parameter(s) not seen in the data: {', '.join(joint.unseen)}"
         for name, joint in found.items()
         if joint.unseen
-    )
-    return FrictionResult(found, (*warnings, *_correlated(found)))
-
-
-def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """One warning that names the joints whose residual is not noise."""
+    ]
     named = [
         f"{name} ({joint.correlation:.2f}, by {joint.widened:.1f})"
         for name, joint in found.items()
         if joint.correlation > CORRELATED
     ]
-    if not named:
-        return ()
-    text = (
-        f"friction: the residual is no noise but correlated from sample to sample, joint(s) {', '.join(named)}: the "
-        "model lacks an effect there; standard deviations are widened for it, by the factor named"
-    )
-    return (Remark(text, "residual"),)
+    if named:
+        text = (
+            f"friction: the residual is no noise but correlated from sample to sample, joint(s) {', '.join(named)}: the "
+            "model lacks an effect there; standard deviations are widened for it, by the factor named"
+        )
+        warnings.append(Remark(text, "residual"))
+    return FrictionResult(found, tuple(warnings))
 
 
 def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:
-    """Return how well each joint's friction predicts its run's motor torque, after the gravity torque is subtracted."""
+    """Return how well each joint's friction alone predicts its run. The torque that gravity, inertia and offset explain is
+    subtracted from the measured and from the predicted motor torque."""
     qualities, samples = {}, []
     for name, data in runs.items():
-        if name in joints:
-            qualities[name], sample = _judged(name, data, joints[name])
-            samples.append(sample)
+        if name not in joints:
+            continue
+        joint, fit, out, every = joints[name], data.fit, data.out, data.every
+        rigid = data.low_pass(data.rigid(joint.inertia, joint.offset, joint.delay))
+        measured = data.measured - rigid
+        modelled = data.low_pass(data.torque(unknowns_of(joint))) - rigid
+        qualities[name] = JointQuality(
+            quality(measured[fit], modelled[fit]), quality(measured[out], modelled[out])
+        )
+        is_out = np.isin(every, out)
+        samples.append(Sample(name, "time [s]", data.time[every], measured[every], modelled[every], is_out))
     return StepQuality("Friction", qualities, tuple(samples))
 
 
@@ -116,19 +120,7 @@ def prepared_runs(
     return {run.joint: prepared(robot, theta_b, run, places[run.joint], options) for run in own}
 
 
-def _fit(task: tuple[str, JointRun, FrictionOptions, JointFriction | None]) -> JointFriction:
-    return fit_joint(*task)
-
-
-def _judged(name: str, data: JointRun, joint: JointFriction) -> tuple[JointQuality, Sample]:
-    """Quality of friction alone: the torque that gravity, inertia and offset explain is subtracted from both sides."""
-    rigid = data.low_pass(data.rigid(joint.inertia, joint.offset, joint.delay))
-    measured = data.measured - rigid
-    modelled = data.low_pass(data.torque(unknowns_of(joint))) - rigid
-    fit, out, every = data.fit, data.out, data.every
-    both = JointQuality(quality(measured[fit], modelled[fit]), quality(measured[out], modelled[out]))
-    is_out = np.isin(every, out)
-    return both, Sample(name, "time [s]", data.time[every], measured[every], modelled[every], is_out)
+# The fit of one joint
 
 
 DELAY = 9
@@ -186,19 +178,20 @@ def unknowns_of(found: JointFriction) -> Array:
     return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 
 
-def fit_joint(
-    name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
-) -> JointFriction:
-    """Return the friction of one joint, from the paper's two steps or an earlier result, then the refinement."""
-    if options.law == "coulomb_viscous":
-        sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
-        return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
-    if start is not None:
+def _fit_joint(task: tuple[str, JointRun, FrictionOptions, JointFriction | None]) -> JointFriction:
+    """The friction of one joint, from the paper's two steps or an earlier result, then the refinement."""
+    name, data, options, start = task
+    if start is not None and options.law != "coulomb_viscous":
         return _polished(name, data, unknowns_of(start), options)
     fast = _fast(data, options)
-    return _polished(
-        name, data, _best_of_peaks(data, _presliding(data, fast, options), fast, options), options
-    )
+    if options.law == "coulomb_viscous":
+        # as LuGre parameters: no Stribeck peak, linear, rigid bristles
+        coulomb, viscous, _, *others = fast
+        first = np.array([coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, *others])
+        sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
+        return _polished(name, replace(data, fit=sliding), first, options)
+    first = _best_of_peaks(data, _presliding(data, fast, options), fast, options)
+    return _polished(name, data, first, options)
 
 
 def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionOptions) -> Array:
@@ -210,14 +203,7 @@ def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionO
         other[[0, 1, 2, 3, 4]] = fast[0], PEAK_HEIGHT * fast[0], np.log(speed * top), fast[1], fast[2]
         starts.append(other)
     found = [_descended(data, start, options, SHORT_DESCENT) for start in starts]
-    best = min(found, key=lambda fitted: float(fitted.cost))
-    return _put(first, _free(options), best.x)
-
-
-def _plain(fast: Array) -> Array:
-    """Coulomb and viscous friction as LuGre parameters: no Stribeck peak, linear, rigid bristles."""
-    coulomb, viscous, _, *others = fast
-    return np.array([coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, *others])
+    return min(found, key=lambda fitted: float(fitted[0].cost))[1]
 
 
 def _fast(data: JointRun, options: FrictionOptions) -> Array:
@@ -280,11 +266,11 @@ def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
     return unknowns(found.x)
 
 
-def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> JointFriction:
+def _polished(name: str, data: JointRun, start: Array, options: FrictionOptions) -> JointFriction:
     """All free unknowns together by trust region within bounds, with standard deviations from its Jacobian."""
     free = _free(options)
-    scale = step_sizes(p)[free]
-    fitted = _descended(data, p, options, LONG_DESCENT)
+    scale = step_sizes(start)[free]
+    fitted, p = _descended(data, start, options, LONG_DESCENT)
     spread = np.zeros((len(p), len(p)))
     spread[np.ix_(free, free)] = _covariance(fitted.jac * scale, fitted.fun) * np.outer(scale, scale)
     left = np.zeros((len(data.time), 1))
@@ -292,8 +278,27 @@ def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> 
     use = np.isin(np.arange(len(left)), data.fit)[:, None]
     left, use = left[data.every], use[data.every]
     widened = float(widening(left, use)[0])
-    found = _with_uncertainty(name, _put(p, free, fitted.x), widened**2 * spread, options)
-    return replace(found, correlation=float(sample_correlation(left, use)[0]), widened=widened)
+    spread = widened**2 * spread
+    friction = STATE_LAW.from_unknowns(p[:7])
+    turn = to_seven(friction)
+    covariance = turn @ spread @ turn.T
+    relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction), 1e-12)
+    unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
+    no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: v_s has no effect
+    if no_peak and PARAMETERS[2] not in unseen and options.law == "lugre":
+        unseen.append(PARAMETERS[2])
+    return JointFriction(
+        joint=name,
+        friction=friction,
+        covariance=covariance,
+        unseen=tuple(unseen),
+        inertia=float(p[7]),
+        offset=float(p[8]),
+        delay=float(p[DELAY]),
+        correlation=float(sample_correlation(left, use)[0]),
+        widened=widened,
+        with_delay=np.append(turn @ spread[:, DELAY], spread[DELAY, DELAY]),
+    )
 
 
 def _free(options: FrictionOptions) -> list[int]:
@@ -301,15 +306,24 @@ def _free(options: FrictionOptions) -> list[int]:
     return [j for j in FREE[options.law] if options.estimate_delay or j != DELAY]
 
 
-def _descended(data: JointRun, p: Array, options: FrictionOptions, evaluations: int) -> Any:
-    """scipy's result for the free unknowns, from p by trust region within the bounds."""
-    free = _free(options)
-    low, high = (bounds[free] for bounds in _bounds(options))
-    scale = step_sizes(p)[free]
-    inner = np.clip(p[free], low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
+def _descended(data: JointRun, start: Array, options: FrictionOptions, evaluations: int) -> tuple[Any, Array]:
+    """scipy's result for the free unknowns, and all unknowns with it, from `start` by trust region within the bounds.
+
+    The bounds are the law's, which keep the search within reasonable numbers, inertia >= 0, and the largest delay.
+    """
+    free, reach = _free(options), options.largest_delay
+    low = np.append(STATE_LAW.bounds[0], [0.0, -np.inf, -reach])[free]
+    high = np.append(STATE_LAW.bounds[1], [np.inf, np.inf, reach])[free]
+    scale = step_sizes(start)[free]
+    inner = np.clip(start[free], low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
+
+    def whole(x: Array) -> Array:
+        p = start.copy()
+        p[free] = x
+        return p
 
     def residual(x: Array) -> Array:
-        return data.residual(_put(p, free, x), data.fit)
+        return data.residual(whole(x), data.fit)
 
     def jacobian(x: Array) -> Array:
         here = residual(x)
@@ -322,20 +336,8 @@ def _descended(data: JointRun, p: Array, options: FrictionOptions, evaluations: 
 
     bounds = {"bounds": (low, high), "x_scale": scale}
     limits = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-12, "max_nfev": evaluations}
-    return optimize.least_squares(residual, inner, jac=jacobian, **bounds, **limits)
-
-
-def _put(p: Array, free: list[int], x: Array) -> Array:
-    whole = p.copy()
-    whole[free] = x
-    return whole
-
-
-def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
-    """The law's, which keep the search within reasonable numbers, inertia >= 0, and the largest delay."""
-    reach = options.largest_delay
-    low, high = STATE_LAW.bounds
-    return np.append(low, [0.0, -np.inf, -reach]), np.append(high, [np.inf, np.inf, reach])
+    fitted = optimize.least_squares(residual, inner, jac=jacobian, **bounds, **limits)
+    return fitted, whole(fitted.x)
 
 
 def step_sizes(p: Array) -> Array:
@@ -357,20 +359,6 @@ def to_seven(friction: Array) -> Array:
     """Return the derivatives (7, 10) of the seven LuGre values by the ten unknowns of the fit. The last three unknowns
     (inertia, offset, delay) do not affect these values."""
     return np.hstack([STATE_LAW.slopes(friction), np.zeros((7, 3))])
-
-
-def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptions) -> JointFriction:
-    friction = STATE_LAW.from_unknowns(p[:7])
-    turn = to_seven(friction)
-    covariance = turn @ spread @ turn.T
-    relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction), 1e-12)
-    unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
-    no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: v_s has no effect
-    if no_peak and PARAMETERS[2] not in unseen and options.law == "lugre":
-        unseen.append(PARAMETERS[2])
-    with_delay = np.append(turn @ spread[:, DELAY], spread[DELAY, DELAY])
-    own = (float(p[7]), float(p[8]), float(p[DELAY]))
-    return JointFriction(name, friction, covariance, tuple(unseen), *own, with_delay=with_delay)
 
 
 # The friction run of one joint

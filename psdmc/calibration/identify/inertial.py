@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from psdmc.calibration.identify.estimate import Consider, Estimate, Prior, base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.friction import FrictionResult, JointFriction
@@ -231,15 +232,8 @@ def _considered(motors: Motors, gravity: GravityResult, friction: FrictionResult
 
 
 def _source_covariance(motors: Motors, gravity: GravityResult, friction: FrictionResult) -> Array:
-    blocks = [np.diag(motors.relative_std**2), gravity.estimate.covariance]
-    blocks += [joint.covariance for joint in friction.joints.values()]
-    size = sum(len(block) for block in blocks)
-    covariance = np.zeros((size, size))
-    start = 0
-    for block in blocks:
-        covariance[start : start + len(block), start : start + len(block)] = block
-        start += len(block)
-    return covariance
+    own = [joint.covariance for joint in friction.joints.values()]
+    return np.asarray(block_diag(np.diag(motors.relative_std**2), gravity.estimate.covariance, *own))
 
 
 def _combined(motors: Motors, gravity: GravityResult, friction: FrictionResult, solved: Estimate) -> Array:

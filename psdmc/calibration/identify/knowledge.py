@@ -67,8 +67,18 @@ def knowledge_of(
             f"prior confidence (--prior-confidence) is {share:g}, expected {SHARES[0]:g} to {SHARES[1]:g}",
             "0.1 says that masses and inertias of the file are right to 10 %",
         )
-    stated = share if share is not None else _share(tables.get("prior"), faults)
-    wanted = essential or _essential(tables.get("essential"), faults)
+    stated, prior = share, tables.get("prior")
+    if share is None and prior is not None:
+        table = TomlTable(prior, "prior", ("confidence",), faults)
+        stated = table.number("confidence", *SHARES) if isinstance(prior, dict) else None
+    wanted = essential
+    if essential is None and "essential" in tables:
+        table = TomlTable(tables["essential"], "essential", ("relative", "significance"), faults)
+        usual = EssentialOptions()
+        wanted = EssentialOptions(
+            table.number("relative", 0.01, 100.0, usual.relative),
+            table.number("significance", 1e-6, 0.5, usual.significance),
+        )
     bodies = _Bodies(model, faults)
     bodies.read(tables.get("bodies", []))
     require_none(faults, where, HINT)
@@ -93,23 +103,6 @@ def _require_values(model: DynamicsModel, confidence: Mapping[int, Confidence]) 
             f"{model.mechanism.name}: a confidence in the file's values is stated, but it lacks {lacks}",
             "leave the confidence out, or give masses and inertias in the robot's file",
         )
-
-
-def _share(value: object, faults: list[str]) -> float | None:
-    if value is None:
-        return None
-    table = TomlTable(value, "prior", ("confidence",), faults)
-    return table.number("confidence", *SHARES) if isinstance(value, dict) else None
-
-
-def _essential(value: object, faults: list[str]) -> EssentialOptions | None:
-    if value is None:
-        return None
-    table, usual = TomlTable(value, "essential", ("relative", "significance"), faults), EssentialOptions()
-    return EssentialOptions(
-        table.number("relative", 0.01, 100.0, usual.relative),
-        table.number("significance", 1e-6, 0.5, usual.significance),
-    )
 
 
 class _Bodies:

@@ -146,9 +146,19 @@ class LinearProblem:
 
     @property
     def limits(self) -> Array:
-        """Return k rows of linear inequalities, an array (k, number of unknowns). The product of each row with the
-        vector of unknowns may not be negative."""
-        return limits_of(self.columns, self.plain, self.l)
+        """Return k rows of linear inequalities between the unknowns, an array (k, l + n f + m). The product of each row
+        with the vector of unknowns may not be negative. The rows keep the magnitude of a value below another value of
+        its joint."""
+        rows: list[Array] = []
+        width = self.first_extra + len(self.columns)
+        for k, unknown in enumerate(self.columns.unknowns, start=self.first_extra):
+            if not unknown.within:
+                continue
+            for sign in (1.0, -1.0):
+                row = np.zeros(width)
+                row[self.l + self.plain.index((unknown.owner, unknown.within))], row[k] = 1.0, sign
+                rows.append(row)
+        return np.reshape(rows, (-1, width))
 
 
 def names_of(terms: Sequence[Term]) -> tuple[str, ...]:
@@ -311,25 +321,3 @@ def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Ar
     acts = effect > NO_EFFECT * effect.max(axis=0, initial=0.0)
     scale = np.min(np.where(acts, sizes[:, None] / np.where(acts, effect, 1.0), np.inf), axis=0)
     return np.where(np.isfinite(scale), scale, 1.0)
-
-
-def limits_of(columns: Columns, plain: Sequence[tuple[str, str]], l: int) -> Array:
-    """Return k rows of linear inequalities between the unknowns of a fit, an array (k, l + n f + m). The product of
-    each row with the vector of unknowns may not be negative. The rows keep the magnitude of a value below another value
-    of its joint.
-
-    The unknowns are l base parameters, f friction values of each of n joints, and m values of springs and further
-    friction.
-
-    plain  joint and name of each of the n f friction values
-    """
-    rows: list[Array] = []
-    width = l + len(plain) + len(columns)
-    for k, unknown in enumerate(columns.unknowns, start=l + len(plain)):
-        if not unknown.within:
-            continue
-        for sign in (1.0, -1.0):
-            row = np.zeros(width)
-            row[l + list(plain).index((unknown.owner, unknown.within))], row[k] = 1.0, sign
-            rows.append(row)
-    return np.reshape(rows, (-1, width))

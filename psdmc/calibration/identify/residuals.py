@@ -4,12 +4,12 @@ correspond."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
+from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.logs.log import Array
 from psdmc.model.calibrated import Quality, Remark
 
@@ -30,18 +30,6 @@ def quality(measured: Array, predicted: Array) -> Quality:
 def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
     """Return R^2 and RMSE of each joint's predicted torque, from measured and predicted torques (N, n)."""
     return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))
-
-
-class Judged(Protocol):
-    """The results of a fit that a check of the residuals needs, such as least_squares.Estimate.
-
-    They are the lag-one correlation of each joint's residuals, and the factor on all standard deviations.
-    """
-
-    @property
-    def correlation(self) -> Array: ...
-    @property
-    def noise_factor(self) -> float: ...
 
 
 def spread(residual: Array, use: NDArray[np.bool_]) -> Array:
@@ -100,7 +88,7 @@ NOISY = 1.7
 """Widening from which a fit is said to lack something: white residuals of short logs reach 1.3."""
 
 
-def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tuple[str, ...]:
+def noise_warnings(step: str, joint_names: Sequence[str], solved: Estimate) -> tuple[str, ...]:
     """Return warnings if the residuals of a fit are correlated from sample to sample and therefore more than noise.
 
     The model then lacks an effect. The warnings also give the factor by which standard deviations were increased.

@@ -190,7 +190,10 @@ class Changes:
         much as a load if a load is possible. A load that nobody would feel is no explanation.
         """
         found = self._search(with_load=True)
-        return found if found.load is None or self._is_felt(found) else self._search(with_load=False)
+        if found.load is None:
+            return found
+        is_felt = np.any(np.sqrt(np.mean(self.torque(found.of_load) ** 2, axis=0)) > self.felt)
+        return found if is_felt else self._search(with_load=False)
 
     def _search(self, with_load: bool) -> Explanation:
         price = float(stats.chi2.isf(CHANCE / self.size, 1))
@@ -231,10 +234,6 @@ class Changes:
         """Whether the logs show a load's mass by itself, and it is not zero."""
         values, covariance = _solved(block, self.white)
         return bool(_resolved(block, 0) and abs(values[0]) > SURE * np.sqrt(covariance[0, 0]) > 0.0)
-
-    def _is_felt(self, found: Explanation) -> bool:
-        """Whether the load alone changes some joint's torque by what counts."""
-        return bool(np.any(np.sqrt(np.mean(self.torque(found.of_load) ** 2, axis=0)) > self.felt))
 
     @property
     def refuses_load(self) -> str:

@@ -64,8 +64,15 @@ def joint_gains(evidence: Evidence) -> tuple[Gain, ...]:
     if by_file is None:
         return tuple(Gain(np.nan, np.nan, False) for _ in range(evidence.n))
     lines = [_line(evidence, by_file, k) for k in range(evidence.n)]
-    scale = _scale(lines)
-    return tuple(_gain(line, scale) for line in lines)
+    first = max(lines, key=lambda line: line.size)
+    # the log's unit: gain of the joint whose torque by the file is largest; one if that joint's torque does not follow it
+    scale = abs(first.gain) if first.correlation >= LEADING else 1.0
+    gains = []
+    for line in lines:
+        seen = line.size > 0 and scale * line.size >= VISIBLE_SHARE * line.all_of_it
+        settled = line.std <= SETTLED * max(abs(line.gain), scale)
+        gains.append(Gain(line.gain, line.std, bool(seen and settled)))
+    return tuple(gains)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,19 +114,6 @@ def nuisance(evidence: Evidence, k: int) -> Array:
     if not drive > 0:
         columns.append(evidence.qdd[:, k])
     return np.stack(columns, axis=1)
-
-
-def _scale(lines: list[_Line]) -> float:
-    """The log's unit: gain of the joint whose torque by the file is largest; one where that joint's torque does not
-    follow it."""
-    first = max(lines, key=lambda line: line.size)
-    return abs(first.gain) if first.correlation >= LEADING else 1.0
-
-
-def _gain(line: _Line, scale: float) -> Gain:
-    seen = line.size > 0 and scale * line.size >= VISIBLE_SHARE * line.all_of_it
-    settled = line.std <= SETTLED * max(abs(line.gain), scale)
-    return Gain(line.gain, line.std, bool(seen and settled))
 
 
 def friction_powers(evidence: Evidence) -> tuple[Power, ...]:
