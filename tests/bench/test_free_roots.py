@@ -8,6 +8,7 @@ from shutil import which
 import numpy as np
 import pinocchio as pin
 import pytest
+from urdf_text import inertial, joint, link, urdf
 
 from psdmc.bench.case import LONGEST_INPUT, Case, generic_chain, robot_as_numbers
 from psdmc.bench.cases import LEGGED, TREES, legged_cases, robot_data, standard_chains
@@ -27,18 +28,12 @@ from psdmc.robot.load import load_robot_text
 FLAGS = (*native_flags(), "-O0")
 """Which values come from where is asked here, not how fast."""
 
-BODY = (
-    '<inertial><origin xyz="0.1 -0.05 0.2"/><mass value="1.5"/>'
-    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="-0.002" iyz="0.0015"/></inertial>'
+BIRD = urdf(
+    *(link(name, inertial(rpy="0 0 0")) for name in ("trunk", "wing", "tail")),
+    joint("left", "trunk", "wing", rpy="0.3 0.1 -0.2", axis="0.6 0 0.8"),
+    joint("rudder", "trunk", "tail", kind="prismatic", xyz="-0.3 0 0.1", rpy="0 0 0.7", axis="0 1 0"),
+    name="bird",
 )
-LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="40"/>'
-BIRD = f"""<robot name="bird">
-<link name="trunk">{BODY}</link><link name="wing">{BODY}</link><link name="tail">{BODY}</link>
-<joint name="left" type="revolute"><parent link="trunk"/><child link="wing"/><axis xyz="0.6 0 0.8"/>
-  <origin xyz="0.1 0.2 0.3" rpy="0.3 0.1 -0.2"/>{LIMIT}</joint>
-<joint name="rudder" type="prismatic"><parent link="trunk"/><child link="tail"/><axis xyz="0 1 0"/>
-  <origin xyz="-0.3 0 0.1" rpy="0 0 0.7"/>{LIMIT}</joint>
-</robot>"""
 PAIR = BIRD.replace(
     '<joint name="rudder" type="prismatic">', '<joint name="rudder" type="revolute"><mimic joint="left"/>'
 )

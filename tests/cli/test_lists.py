@@ -7,17 +7,19 @@ from pathlib import Path
 import pytest
 from bundled import robot_path
 from command_line import status
+from urdf_text import BALL, joint, link, urdf
 
 from psdmc.cli.arguments import assignments, names, with_numbers_joined
 from psdmc.model.load import load
 
-TREE = """<robot name="t"><link name="base"/>
-<link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="c"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="one" type="continuous"><parent link="base"/><child link="a"/></joint>
-<joint name="two,too" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/></joint>
-<joint name="three" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/></joint></robot>"""
+TREE = urdf(
+    link("base", ""),
+    *(link(name, BALL) for name in "abc"),
+    joint("one", "base", "a", kind="continuous"),
+    joint("two,too", "a", "b", kind="continuous", axis="0 1 0"),
+    joint("three", "b", "c", kind="continuous", axis="0 1 0"),
+    name="t",
+)
 
 
 @pytest.fixture

@@ -12,26 +12,24 @@ from pathlib import Path
 import pytest
 from bundled import bundled_model
 from command_line import status, typed
+from urdf_text import joint, link, urdf
 
 from psdmc.cli.tables import Table, lines, pieces
 
 BOXES = re.compile("[\u2500-\u257f]")
 LONG = "shoulder_pan_joint_of_the_left_arm"
-BODY = """<inertial><origin xyz="0.1 0.2 0.3"/><mass value="1.5"/>
-<inertia ixx="0.1" iyy="0.2" izz="0.25" ixy="0.01" ixz="0.02" iyz="0.03"/></inertial>"""
-LINKS = "\n".join(f'<link name="link_with_a_long_name_{k}">{BODY}</link>' for k in range(4))
-JOINTS = "\n".join(
-    f'<joint name="{LONG}_{k}" type="revolute"><parent link="link_with_a_long_name_{k}"/>'
-    f'<child link="link_with_a_long_name_{k + 1}"/><axis xyz="0 {k % 2} {1 - k % 2}"/>'
-    '<limit lower="-2.8973" upper="2.8973" velocity="2.175" effort="87"/></joint>'
+LIMIT = '<limit lower="-2.8973" upper="2.8973" velocity="2.175" effort="87"/>'
+LINKS = [f"link_with_a_long_name_{k}" for k in range(4)]
+JOINTS = [
+    joint(f"{LONG}_{k}", *LINKS[k : k + 2], xyz="0 0 0", axis=f"0 {k % 2} {1 - k % 2}", extra=LIMIT)
     for k in range(3)
-)
+]
 
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("long")
-    (folder / "arm.urdf").write_text(f'<robot name="arm">{LINKS}{JOINTS}</robot>', encoding="utf-8")
+    (folder / "arm.urdf").write_text(urdf(*map(link, LINKS), *JOINTS), encoding="utf-8")
     assert status("derive", folder / "arm.urdf", "-o", folder / "arm.npz") == 0
     return folder / "arm.npz"
 

@@ -12,30 +12,7 @@ import numpy as np
 import pytest
 from bundled import robot_path
 from command_line import files_in, status, typed
-
-INERTIAL = (
-    '<inertial><origin xyz="0.1 0 0"/><mass value="{mass}"/>'
-    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
-
-
-def link(name: str, mass: str = "1.5") -> str:
-    return f'<link name="{name}">{INERTIAL.format(mass=mass)}</link>'
-
-
-def joint(
-    name: str, parent: str, child: str, kind: str = "revolute", axis: str = "0 0 1", extra: str = ""
-) -> str:
-    limit = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0.1 0.2 0.3"/><axis xyz="{axis}"/>{limit}{extra}</joint>'
-    )
-
-
-def urdf(*parts: str) -> str:
-    return f'<robot name="arm">{"".join(parts)}</robot>'
-
+from urdf_text import inertial, joint, link, urdf
 
 BASE, ARM, SHOULDER = link("base"), link("arm"), joint("shoulder", "base", "arm")
 BOMB = '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
@@ -49,12 +26,12 @@ ROBOTS = {
     "an external entity": (EXTERNAL, "entities"),
     "a link that is not there": (urdf(BASE, joint("shoulder", "base", "arm")), "'arm'"),
     "a loop": (urdf(BASE, ARM, SHOULDER, joint("second", "base", "arm")), "'arm'"),
-    "no movable joint": (urdf(BASE, ARM, joint("mount", "base", "arm", "fixed")), "no movable joint"),
+    "no movable joint": (urdf(BASE, ARM, joint("mount", "base", "arm", kind="fixed")), "no movable joint"),
     "a zero axis": (urdf(BASE, ARM, joint("shoulder", "base", "arm", axis="0 0 0")), "'shoulder'"),
-    "a mass that is no number": (urdf(BASE, link("arm", "nan"), SHOULDER), "'arm'"),
-    "a negative mass": (urdf(BASE, link("arm", "-1"), SHOULDER), "'arm'"),
+    "a mass that is no number": (urdf(BASE, link("arm", inertial("nan")), SHOULDER), "'arm'"),
+    "a negative mass": (urdf(BASE, link("arm", inertial("-1")), SHOULDER), "'arm'"),
     "a joint that mimics itself": (urdf(BASE, ARM, link("tip"), SHOULDER, MIMIC), "'finger'"),
-    "a spherical joint": (urdf(BASE, ARM, joint("loose", "base", "arm", "spherical")), "'loose'"),
+    "a spherical joint": (urdf(BASE, ARM, joint("loose", "base", "arm", kind="spherical")), "'loose'"),
 }
 
 

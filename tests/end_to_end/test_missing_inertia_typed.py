@@ -5,16 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from command_line import typed
-
-BODY = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+from urdf_text import BALL, joint, link, urdf
 
 
 def two_links(folder: Path) -> Path:
     path = folder / "arm.urdf"
     path.write_text(
-        f'<robot name="arm"><link name="base"/><link name="upper">{BODY}</link><link name="hand"/>'
-        '<joint name="j1" type="continuous"><parent link="base"/><child link="upper"/></joint>'
-        '<joint name="j2" type="continuous"><parent link="upper"/><child link="hand"/><axis xyz="0 1 0"/></joint></robot>'
+        urdf(
+            *(link("base", ""), link("upper", BALL), link("hand", "")),
+            joint("j1", "base", "upper", kind="continuous", axis="1 0 0"),
+            joint("j2", "upper", "hand", kind="continuous", axis="0 1 0"),
+        )
     )
     return path
 

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from bundled import robot_path
 from command_line import status, typed
+from urdf_text import inertial, joint, link, urdf
 
-BODY = (
-    '<inertial><origin xyz="0.1 0 0"/><mass value="9.4"/>'
-    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
-PLAIN = (
-    f'<robot name="arm"><link name="base_link"/><link name="tool0">{BODY}</link>'
-    '<joint name="j" type="revolute"><parent link="base_link"/><child link="tool0"/><origin rpy="1.5 0 0"/>'
-    '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="240" velocity="1"/></joint></robot>'
+STRONG = '<limit lower="-1" upper="1" effort="240" velocity="1"/>'
+PLAIN = urdf(
+    link("base_link", ""),
+    link("tool0", inertial(9.4, "0.1 0 0", "0 0 0", "0.02 0.03 0.025")),
+    joint("j", "base_link", "tool0", xyz="0 0 0", rpy="1.5 0 0", extra=STRONG),
 )
 
 

@@ -17,6 +17,7 @@ from bundled import bundled_model, bundled_robot
 from command_line import status
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
+from urdf_text import LIMIT, inertial, joint, link, urdf
 
 import psdmc
 from psdmc.calibration.logs.log import Log
@@ -67,25 +68,16 @@ RIPPLE = Law(
     torque=lambda p, at: p[0] * sin(5.0 * at.q) + p[1] * cos(5.0 * at.q),
 )
 
-LINK = (
-    '<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/><inertia ixx="0.11" iyy="0.12" izz="0.09"'
-    ' ixy="0.01" ixz="0.02" iyz="-0.01"/></inertial></link>'
-)
-JOINT = (
-    '<joint name="{0}" type="{1}"><axis xyz="{2}"/>{3}<parent link="{4}"/><child link="{5}"/><origin xyz="{6}"'
-    ' rpy="0.2 0.1 -0.3"/><limit lower="-3" upper="3" effort="99" velocity="9"/></joint>'
-)
 FOLLOWS = '<mimic joint="knee" multiplier="-0.7" offset="0.1"/>'
-WALKER = "".join(
-    (
-        '<robot name="walker">',
-        LINK.format("trunk", "0.02 0.01 0.05", 5.0),
-        *(LINK.format(f"leg{k}", "0.1 0.03 0.05", 2.0 - 0.4 * k) for k in range(3)),
-        JOINT.format("hip", "revolute", "0 1 0", "", "trunk", "leg0", "0.2 0 0"),
-        JOINT.format("knee", "revolute", "0 0 1", "", "leg0", "leg1", "0.3 0.1 0"),
-        JOINT.format("foot", "revolute", "0 1 0", FOLLOWS, "leg1", "leg2", "0.3 0 0.1"),
-        "</robot>",
-    )
+THICK = "0.11 0.12 0.09 0.01 0.02 -0.01"
+TURNED = "0.2 0.1 -0.3"
+WALKER = urdf(
+    link("trunk", inertial(5.0, "0.02 0.01 0.05", "0 0 0", THICK)),
+    *(link(f"leg{k}", inertial(2.0 - 0.4 * k, "0.1 0.03 0.05", "0 0 0", THICK)) for k in range(3)),
+    joint("hip", "trunk", "leg0", xyz="0.2 0 0", rpy=TURNED, axis="0 1 0"),
+    joint("knee", "leg0", "leg1", xyz="0.3 0.1 0", rpy=TURNED),
+    joint("foot", "leg1", "leg2", xyz="0.3 0 0.1", rpy=TURNED, axis="0 1 0", extra=LIMIT + FOLLOWS),
+    name="walker",
 )
 """A floating base whose foot follows the knee."""
 

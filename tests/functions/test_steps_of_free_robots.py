@@ -11,6 +11,7 @@ from complex_step import slopes_along
 from lowered import lowered
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
+from urdf_text import inertial, joint, link, urdf
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
 import psdmc
@@ -20,26 +21,15 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot_text
 from psdmc.toolchain.call import CompiledRobot
 
-BODY = (
-    '<link name="{name}"><inertial><origin xyz="{at}"/><mass value="{mass}"/>'
-    '<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-)
-HINGE = (
-    '<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>'
-    '<axis xyz="{axis}"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>'
-)
-SATELLITE = "".join(
-    [
-        '<robot name="satellite">',
-        BODY.format(name="bus", at="0.05 0 0.02", mass=12, ixx=0.9, iyy=0.7, izz=1.1),
-        BODY.format(name="panel", at="0 0.6 0", mass=2, ixx=0.25, iyy=0.02, izz=0.26),
-        BODY.format(name="flap", at="0 0.4 0.1", mass=1, ixx=0.06, iyy=0.01, izz=0.06),
-        BODY.format(name="boom", at="0.5 0 0", mass=1.5, ixx=0.01, iyy=0.14, izz=0.14),
-        HINGE.format(name="wing", kind="revolute", parent="bus", child="panel", at="0 0.5 0", axis="0 1 0"),
-        HINGE.format(name="fold", kind="revolute", parent="panel", child="flap", at="0 1.2 0", axis="1 0 0"),
-        HINGE.format(name="ball", kind="floating", parent="bus", child="boom", at="0.5 0 0", axis="0 0 1"),
-        "</robot>",
-    ]
+SATELLITE = urdf(
+    link("bus", inertial(12, "0.05 0 0.02", "0 0 0", "0.9 0.7 1.1")),
+    link("panel", inertial(2, "0 0.6 0", "0 0 0", "0.25 0.02 0.26")),
+    link("flap", inertial(1, "0 0.4 0.1", "0 0 0", "0.06 0.01 0.06")),
+    link("boom", inertial(1.5, "0.5 0 0", "0 0 0", "0.01 0.14 0.14")),
+    joint("wing", "bus", "panel", xyz="0 0.5 0", axis="0 1 0"),
+    joint("fold", "panel", "flap", xyz="0 1.2 0", axis="1 0 0"),
+    joint("ball", "bus", "boom", kind="floating", xyz="0.5 0 0"),
+    name="satellite",
 )
 """A body with a panel of two parts, and a loose boom that flies beside it."""
 

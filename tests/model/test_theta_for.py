@@ -15,6 +15,7 @@ from lowered import lowered
 from mimic_trees import as_urdf
 from random_trees import TREES, RandomTree
 from slow_cases import slow_but_for
+from urdf_text import BALL, joint, link, urdf
 
 import psdmc
 from psdmc.backends.c.package import PackageView, package_view
@@ -34,23 +35,14 @@ EXACT = 1e-12
 SINGLE = 2e-5
 """The same in single precision, whose rounding is 6e-8; theta_b's sums of bodies and lengths lose a digit or two."""
 
-LINK = (
-    '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    "</inertial></link>"
+BEAST = urdf(
+    *(link(name, BALL) for name in ("hull", "trunk", "leg", "foot", "boom")),
+    joint("weld", "hull", "trunk", kind="fixed", rpy="0.4 -0.7 1.1"),
+    joint("hip", "trunk", "leg", rpy="0.3 0.1 -0.2", axis="0.6 0 0.8"),
+    joint("knee", "leg", "foot", rpy="0 0 0.7", axis="0 1 0"),
+    joint("lift", "hull", "boom", kind="prismatic", rpy="0 0.4 0"),
+    name="beast",
 )
-JOINT = (
-    '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><axis xyz="{4}"/>'
-    '<origin xyz="0.1 0.2 -0.3" rpy="{5}"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
-)
-BEAST = "".join([
-    '<robot name="beast">',
-    *map(LINK.format, ("hull", "trunk", "leg", "foot", "boom")),
-    JOINT.format("weld", "fixed", "hull", "trunk", "1 0 0", "0.4 -0.7 1.1"),
-    JOINT.format("hip", "revolute", "trunk", "leg", "0.6 0 0.8", "0.3 0.1 -0.2"),
-    JOINT.format("knee", "revolute", "leg", "foot", "0 1 0", "0 0 0.7"),
-    JOINT.format("lift", "prismatic", "hull", "boom", "0 0 1", "0 0.4 0"),
-    "</robot>",
-])  # fmt: skip
 """Its root link carries another by a fixed joint: on a free root the two are one body."""
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from urdf_text import urdf
 
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
@@ -16,37 +17,6 @@ from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.robot.reference import reference
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "robots"
-
-INERTIAL = (
-    '<inertial><origin xyz="0.1 -0.05 0.2" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>'
-    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="-0.002" iyz="0.0015"/></inertial>'
-)
-LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="40"/>'
-
-
-def link(name: str, inertial: str = INERTIAL) -> str:
-    return f'<link name="{name}">{inertial}</link>'
-
-
-def joint(
-    name: str,
-    parent: str,
-    child: str,
-    *,
-    kind: str = "revolute",
-    xyz: str = "0.1 0.2 0.3",
-    rpy: str = "0 0 0",
-    axis: str = "0 0 1",
-    extra: str = LIMIT,
-) -> str:
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{extra}</joint>'
-    )
-
-
-def urdf(*parts: str, name: str = "arm") -> str:
-    return f'<robot name="{name}">{"".join(parts)}</robot>'
 
 
 def load_urdf(*parts: str, **options: object) -> LoadedRobot:

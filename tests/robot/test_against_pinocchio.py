@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import EXAMPLES, joint, largest_difference, link, load_dh, load_urdf, robot_data
+from small_robots import EXAMPLES, largest_difference, load_dh, load_urdf, robot_data
+from urdf_text import joint, link
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.frames import frames_of

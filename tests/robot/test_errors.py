@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from small_robots import INERTIAL, joint, link, load_dh, load_urdf, robot_data
+from small_robots import load_dh, load_urdf, robot_data
+from urdf_text import INERTIAL, joint, link
 
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot, load_robot_text

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from small_robots import joint, link, torques, urdf
+from small_robots import torques
+from urdf_text import joint, link, urdf
 
 import psdmc
 from psdmc.compiler import derive

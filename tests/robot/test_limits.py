@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_robots import INERTIAL, dh, joint, link, load_dh, load_urdf, urdf
+from small_robots import dh, load_dh, load_urdf
+from urdf_text import INERTIAL, joint, link, urdf
 
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError

@@ -10,7 +10,8 @@ import re
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import joint, link, robot_data, urdf
+from small_robots import robot_data
+from urdf_text import joint, link, urdf
 
 from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from small_robots import EXAMPLES, joint, largest_difference, link, load_dh, load_urdf, robot_data
+from small_robots import EXAMPLES, largest_difference, load_dh, load_urdf, robot_data
+from urdf_text import joint, link
 
 from psdmc.robot.load import load_robot, load_robot_text
 from psdmc.robot.mechanism import Limits

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pinocchio as pin
 import pytest
-from small_robots import LIMIT, joint, largest_difference, link, robot_data, torques, urdf
+from small_robots import largest_difference, robot_data, torques
+from urdf_text import LIMIT, joint, link, urdf
 
 from psdmc.compiler import derive
 from psdmc.derivation.derive import derive_model, provenance_of

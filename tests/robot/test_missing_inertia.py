@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_robots import INERTIAL, joint, link, load_dh, load_urdf
+from small_robots import load_dh, load_urdf
+from urdf_text import INERTIAL, joint, link
 
 from psdmc.errors import InputError
 from psdmc.model.chain_json import chain_from_json, chain_to_json

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_robots import EXAMPLES, joint, link, load_dh, load_urdf
+from small_robots import EXAMPLES, load_dh, load_urdf
+from urdf_text import joint, link
 
 from psdmc.robot.load import load_robot
 from psdmc.robot.placement import (

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import INERTIAL, joint, largest_difference, link, load_urdf, robot_data, urdf
+from small_robots import largest_difference, load_urdf, robot_data
+from urdf_text import INERTIAL, joint, link, urdf
 
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot, load_robot_text

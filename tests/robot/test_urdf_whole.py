@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from small_robots import joint, link, robot_data, urdf
+from small_robots import robot_data
+from urdf_text import joint, link, urdf
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.frames import base_acceleration, frames_of

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import INERTIAL, joint, largest_difference, link, load_urdf, torques
+from small_robots import largest_difference, load_urdf, torques
+from urdf_text import INERTIAL, joint, link
 
 from psdmc.errors import InputError
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text

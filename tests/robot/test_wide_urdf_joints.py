@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from small_robots import joint, link, load_urdf, torques, urdf
+from small_robots import load_urdf, torques
+from urdf_text import joint, link, urdf
 
 from psdmc.compiler import derive
 from psdmc.errors import InputError

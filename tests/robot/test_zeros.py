@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_robots import EXAMPLES, joint, link, load_dh, load_urdf
+from small_robots import EXAMPLES, load_dh, load_urdf
+from urdf_text import joint, link
 
 from psdmc.errors import InputError
 from psdmc.robot.inertia import COM_NAMES, column_echelon, link_span, standard_parameters

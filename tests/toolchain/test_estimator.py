@@ -13,6 +13,7 @@ import pytest
 from bundled import bundled_model, bundled_robot, robot_path
 from estimator_library import Array, EstimatorLibrary
 from scipy.signal import lfilter
+from urdf_text import LIMIT, inertial, joint, link, urdf
 
 from psdmc.backends.info import package_info
 from psdmc.compiler import compare_emitted, derive, emit, emit_c
@@ -33,18 +34,17 @@ PARAMETERS = standard_parameters(
 OFFSET = np.array([0.4, -0.7, 0.2, 0.1, -0.3, 0.5])
 DT, CUTOFF = 1e-3, 20.0
 
-MIMIC = """<robot name="gripper"><link name="base"/>
-{links}
-<joint name="a" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 1 0"/>
-  <limit lower="-2" upper="2" effort="9" velocity="3"/></joint>
-<joint name="b" type="prismatic"><parent link="one"/><child link="two"/><origin xyz="0.3 0 0.1"/><axis xyz="1 0 0"/>
-  <limit lower="-2" upper="2" effort="9" velocity="3"/></joint>
-<joint name="c" type="revolute"><parent link="two"/><child link="tip"/><origin xyz="0.1 0.2 0" rpy="0.3 0.2 0.1"/>
-  <axis xyz="0 0 1"/><mimic joint="a" multiplier="-0.5" offset="0.2"/>
-  <limit lower="-2" upper="2" effort="9" velocity="3"/></joint></robot>"""
+FOLLOWS = '<mimic joint="a" multiplier="-0.5" offset="0.2"/>'
+BODY = inertial(2, "0.1 0.05 -0.02", "0 0 0", "0.02 0.03 0.025 0.001 -0.002 0.003")
+MIMIC = urdf(
+    link("base", ""),
+    *(link(name, BODY) for name in ("one", "two", "tip")),
+    joint("a", "base", "one", xyz="0 0 0", axis="0 1 0"),
+    joint("b", "one", "two", kind="prismatic", xyz="0.3 0 0.1", axis="1 0 0"),
+    joint("c", "two", "tip", xyz="0.1 0.2 0", rpy="0.3 0.2 0.1", extra=LIMIT + FOLLOWS),
+    name="gripper",
+)
 FOLLOWING = np.array([[1.0, 0.0], [0.0, 1.0], [-0.5, 0.0]])
-LINK = """<link name="{}"><inertial><origin xyz="0.1 0.05 -0.02"/><mass value="2"/>
-<inertia ixx="0.02" ixy="0.001" ixz="-0.002" iyy="0.03" iyz="0.003" izz="0.025"/></inertial></link>"""
 
 
 def loaded(robot: Reference) -> Reference:
@@ -68,7 +68,7 @@ def terms(robot: Reference, q: Array, qd: Array) -> tuple[Array, Array]:
 @pytest.fixture(scope="module")
 def gripper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("mimic") / "gripper.urdf"
-    path.write_text(MIMIC.format(links="".join(map(LINK.format, ("one", "two", "tip")))))
+    path.write_text(MIMIC)
     return path
 
 

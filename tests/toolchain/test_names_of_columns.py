@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bundled import bundled_model
 from unoptimised import without_optimisation
+from urdf_text import BALL, joint, link, urdf
 
 import psdmc
 from psdmc.derivation.derive import derive_model
@@ -22,15 +23,8 @@ RANDOM = np.random.default_rng(5)
 JOINTS = ["J1", "J2", "J3", "J4"]
 TURNED = ["J3", "J1", "J4", "J2"]
 
-LINK = (
-    '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    "</inertial></link>"
-)
-HOPPER = (
-    f'<robot name="hopper">{LINK.format("hull")}{LINK.format("foot")}'
-    '<joint name="leg" type="prismatic"><parent link="hull"/><child link="foot"/><axis xyz="0 0 1"/>'
-    '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
-)
+LEG = joint("leg", "hull", "foot", kind="prismatic", xyz="0 0 0")
+HOPPER = urdf(link("hull", BALL), link("foot", BALL), LEG, name="hopper")
 OF_Q = [f"root_joint.{name}" for name in ("x", "y", "z", "qx", "qy", "qz", "qw")] + ["leg"]
 OF_V = [f"root_joint.{name}" for name in ("vx", "vy", "vz", "wx", "wy", "wz")] + ["leg"]
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bundled import ROBOTS
 from slow_cases import slow_but_for
+from urdf_text import INERTIAL, joint, link, urdf
 
 from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.functions import RECIPES
@@ -20,12 +21,6 @@ from psdmc.robot.urdf import urdf_draft
 from psdmc.robot.urdf.urdf_draft import placement_of
 from psdmc.verification.check import MUJOCO, CheckRow, check_model, readers
 
-BODY = (
-    '<inertial><origin xyz="0.1 -0.05 0.2" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>'
-    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="-0.002" iyz="0.0015"/></inertial>'
-)
-
-
 OF_THE_TIP = {
     recipe.title
     for recipe in RECIPES.values()
@@ -35,9 +30,9 @@ OF_THE_TIP = {
 """Functions that a frame's place matters to."""
 
 
-def oblique_urdf(body: str = BODY, kind: str = "continuous") -> str:
+def oblique_urdf(body: str = INERTIAL, kind: str = "continuous") -> str:
     """A base turned in the root, three joints about oblique axes, and a tool."""
-    links = "".join(f'<link name="{name}">{body}</link>' for name in ("root", "base", "a", "b", "c", "tool"))
+    links = [link(name, body) for name in ("root", "base", "a", "b", "c", "tool")]
     joints = [
         ("mount", "fixed", "root", "base", "0 0 0.3", "0.4 -0.2 0.1", "0 0 1"),
         ("j1", "revolute", "base", "a", "0.1 0.2 0.3", "0.4 0.1 -0.3", "0 1 0"),
@@ -45,12 +40,11 @@ def oblique_urdf(body: str = BODY, kind: str = "continuous") -> str:
         ("j3", kind, "b", "c", "0.2 0 0.4", "1.1 0 0.2", "1 0 0.5"),
         ("flange", "fixed", "c", "tool", "0 0.1 0.2", "0.3 0.2 0.1", "0 0 1"),
     ]
-    rows = (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/></joint>'
+    rows = [
+        joint(name, parent, child, kind=kind, xyz=xyz, rpy=rpy, axis=axis, extra="")
         for name, kind, parent, child, xyz, rpy, axis in joints
-    )
-    return f'<robot name="oblique">{links}{"".join(rows)}</robot>'
+    ]
+    return urdf(*links, *rows, name="oblique")
 
 
 def oblique() -> LoadedRobot:
@@ -250,7 +244,7 @@ def test_mujoco_reads_the_file_too() -> None:
     [
         (scara, "not compared: MuJoCo reads no DH tables"),
         (
-            lambda: load_robot_text(oblique_urdf(BODY.replace('izz="0.025"', 'izz="0.25"')), "urdf"),
+            lambda: load_robot_text(oblique_urdf(INERTIAL.replace('izz="0.025"', 'izz="0.25"')), "urdf"),
             "not compared: MuJoCo refuses it: ",
         ),
         (
@@ -258,7 +252,7 @@ def test_mujoco_reads_the_file_too() -> None:
             "not compared: MuJoCo reads no quat_xyzw",
         ),
         (
-            lambda: load_robot_text(oblique_urdf(BODY.replace('value="1.5"', 'value="0 "')), "urdf"),
+            lambda: load_robot_text(oblique_urdf(INERTIAL.replace('value="1.5"', 'value="0 "')), "urdf"),
             "not compared: MuJoCo drops inertia without mass, as link 'a' has it",
         ),
         (
@@ -280,7 +274,7 @@ def test_what_mujoco_does_not_read_is_said(make, said: str) -> None:
 def test_a_last_link_without_inertia_is_no_failure() -> None:
     text = oblique_urdf()
     for name in ("c", "tool"):
-        text = text.replace(f'<link name="{name}">{BODY}</link>', f'<link name="{name}"/>')
+        text = text.replace(f'<link name="{name}">{INERTIAL}</link>', f'<link name="{name}"/>')
 
     rows = checked(lambda: load_robot_text(text, "urdf"))
 

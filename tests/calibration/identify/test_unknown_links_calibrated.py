@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import status
+from urdf_text import inertial, joint, link, urdf
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.linear_problem import LinearOptions
@@ -20,20 +21,16 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot_text
 
-INERTIAL = (
-    '<inertial><origin xyz="0.1 0 0.02"/><mass value="2"/>'
-    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
+INERTIAL = inertial(2, "0.1 0 0.02", "0 0 0", "0.02 0.03 0.025")
 LIMIT = '<limit lower="-2" upper="2" velocity="5" effort="90"/>'
 
 
 def model_of(fore: str, upper: str = INERTIAL, **options: object) -> DynamicsModel:
     """Two links that turn about one horizontal axis."""
-    text = (
-        f'<robot name="arm"><link name="base"/><link name="upper">{upper}</link><link name="fore">{fore}</link>'
-        f'<joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>{LIMIT}</joint>'
-        '<joint name="j2" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.3 0 0"/>'
-        f'<axis xyz="0 1 0"/>{LIMIT}</joint></robot>'
+    text = urdf(
+        *(link(name, inside) for name, inside in (("base", ""), ("upper", upper), ("fore", fore))),
+        joint("j1", "base", "upper", xyz="0 0 0", axis="0 1 0", extra=LIMIT),
+        joint("j2", "upper", "fore", xyz="0.3 0 0", axis="0 1 0", extra=LIMIT),
     )
     return derive_model(load_robot_text(text, "urdf", source_name="arm.urdf", **options).mechanism)  # type: ignore[arg-type]
 
