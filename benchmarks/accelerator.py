@@ -30,7 +30,7 @@ from psdmc.emission import EmitRequest, cuda_source
 from psdmc.errors import InputError, exit_status_of
 from psdmc.files import write_whole
 from psdmc.functions import DEFAULT, SIGNATURES
-from psdmc.lower.kernels import wanted
+from psdmc.lower.admitted import wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import Quantity, Signature, Sizes

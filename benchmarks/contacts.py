@@ -32,7 +32,8 @@ from psdmc.bench.contestant import source
 from psdmc.bench.machine import built, cxx, native_flags, this_machine, version_of
 from psdmc.bench.rivals.pinocchio_cpp import DEFINES, includes, pinocchio_prefix
 from psdmc.derivation.derive import derive_model
-from psdmc.lower.kernels import lower, wanted
+from psdmc.lower.admitted import wanted
+from psdmc.lower.kernels import lower
 from psdmc.model.random_states import states_of
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import load_robot

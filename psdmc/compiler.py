@@ -41,7 +41,8 @@ from psdmc.emission import (
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS
 from psdmc.garbage import collecting_rarely
-from psdmc.lower.kernels import Lowering, wanted
+from psdmc.lower.admitted import wanted
+from psdmc.lower.kernels import Lowering
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.progress import Progress, silent

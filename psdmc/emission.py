@@ -21,8 +21,8 @@ from psdmc.backends.reference_states import reference_load, reference_states
 from psdmc.errors import InputError
 from psdmc.friction.joints import FrictionInDynamics
 from psdmc.garbage import collecting_rarely
-from psdmc.lower.admitted import require
-from psdmc.lower.kernels import Lowering, lower, lower_estimator, wanted
+from psdmc.lower.admitted import require, wanted
+from psdmc.lower.kernels import Lowering, lower, lower_estimator
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import friction_in_dynamics
 from psdmc.model.load import load_bytes

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.lower.kernels import Lowering, lower, wanted
+from psdmc.lower.admitted import wanted
+from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.target.presets import COSTS

@@ -10,7 +10,7 @@ from bundled import bundled_model, robot_path
 
 import psdmc
 from psdmc.errors import InputError
-from psdmc.lower.kernels import wanted
+from psdmc.lower.admitted import wanted
 from psdmc.real_arrays import real_array
 
 

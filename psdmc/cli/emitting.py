@@ -161,8 +161,7 @@ def emit(
     from psdmc.backends.package_folder import require_own_folder
     from psdmc.backends.protocol import back_end
     from psdmc.cli.console import one_line
-    from psdmc.lower import kernels
-    from psdmc.lower.admitted import run_time_only
+    from psdmc.lower import admitted
     from psdmc.model.linear_friction import beyond_friction
     from psdmc.model.load import load
 
@@ -212,11 +211,11 @@ def emit(
         print(f"note: the {language.language} name of '{one_line(asked)}' is {written_as}")
     elif output is None and asked != folder.name:
         print(f"note: the {language.named} is {asked}; --name changes it")
-    shown = kernels.wanted(wanted, found.mechanism)
+    shown = admitted.wanted(wanted, found.mechanism)
     for remark in remarks(found.mechanism, names(adapters), shown, found.l):
         print(f"note: {remark}")
     ending = "; write --with casadi_theta to call them in CasADi" if names(adapters) == ("casadi",) else ""
-    for note in run_time_only(found, wanted):
+    for note in admitted.run_time_only(found, wanted):
         print(f"note: {note}{ending}")
     for what in beyond_friction(found):
         print(f"note: not in the package, though calibrated: {what}; add its torque to inverse dynamics'")

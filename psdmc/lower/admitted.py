@@ -1,5 +1,8 @@
-"""Tells which functions psdmc can generate for a model. Some need a positive definite mass matrix, or links whose parameters
-are all known. Code that contains theta_b as constants needs a known theta_b."""
+"""Tells which functions the user asks for, and which of them psdmc can generate for a model.
+
+Some need a positive definite mass matrix, or links whose parameters are all known. Code that contains theta_b as constants
+needs a known theta_b.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,12 @@ from collections.abc import Sequence
 from functools import cache
 
 from psdmc.errors import InputError
-from psdmc.functions import RECIPES, default_of, recipe_of
-from psdmc.lower.kernels import wanted
+from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, near_names, recipe_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import check_mass_matrix, is_surely_positive, lack_of_standard_parameters
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Mechanism
 from psdmc.robot.urdf.missing_inertia import idle_joints, massless_words, unknown_option
 
 REMEDY = {
@@ -21,6 +24,35 @@ REMEDY = {
     Needs.LOOPS: "declare loops with --loops",
     Needs.PASSIVE: 'name the joints without motor in tables [[loop]] of --loops, such as passive = ["rod"]',
 }
+
+
+def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
+    """Return the names of the functions that the user asked for, in the order of psdmc.functions. Variants
+    NAME_theta_rows (one theta_b per state) come last.
+
+    None and the word 'default' mean the default functions, of this robot if one is given. 'all' means all functions
+    except NAME_theta_rows. A text is one name. The functions that these functions call are added. Raises InputError for
+    an unknown name.
+    """
+    default = DEFAULT if robot is None else default_of(robot)
+    if functions is None:
+        return default
+    if isinstance(functions, str):
+        functions = (functions,)
+    own = (name for name, recipe in RECIPES.items() if robot and recipe.lack_of_loops(robot) is None)
+    groups = {"default": default, "all": tuple(own) or OF_TREES}
+    names = [name for word in functions for name in groups.get(word, (word,))]
+    known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        some = f"the default functions are {', '.join(default)}; the page Functions of the documentation lists all"
+        hint = near_names(unknown[0], (*RECIPES, *groups), some)
+        raise InputError(f"function {unknown[0]!r} is not known", hint)
+    if not names:
+        raise InputError("no function is named", f"give default, all, or names such as {', '.join(default)}")
+    calling = [name for name in names if robot is None or robot.nv > recipe_of(name).straight]
+    called = {other for name in calling for other in known[name].calls}
+    return tuple(name for name in known if name in names or name in called)
 
 
 def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:

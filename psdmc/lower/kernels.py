@@ -4,16 +4,17 @@ Each function gets its cheapest form."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InputError
 from psdmc.friction.joints import FrictionInDynamics
-from psdmc.functions import BY_ROWS, DEFAULT, OF_TREES, RECIPES, default_of, near_names, recipe_of
+from psdmc.functions import BY_ROWS, RECIPES, recipe_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
+from psdmc.lower.admitted import wanted
 from psdmc.lower.dimension_check import check_dimensions
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
@@ -34,7 +35,7 @@ from psdmc.progress import Step
 from psdmc.recipes.load_momentum import LOADS, load_recipe
 from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.recipes.torques_and_accelerations import with_friction, with_gravity_input
-from psdmc.robot.mechanism import Mechanism, require_derivable
+from psdmc.robot.mechanism import require_derivable
 from psdmc.target.presets import COSTS
 from psdmc.target.target import Costs
 
@@ -77,9 +78,9 @@ def lower(
     Raises InputError for an unknown function, and for forward dynamics if the mass matrix is singular for every q. Raises
     InputError also if gravity is an input and the base parameters do not determine the torques under every gravity.
     """
-    require_derivable(model.mechanism)
-    with _lowering(model, lowering, costs, friction, gravity_input) as lowered:
-        kernels: dict[str, Kernel] = {}
+    lowered = _Lowered(model, lowering, costs, friction, gravity_input)
+    kernels: dict[str, Kernel] = {}
+    try:
         names = wanted(functions, model.mechanism)
         for number, name in enumerate(names):
             recipe, is_by_rows = recipe_of(name), name in BY_ROWS
@@ -98,7 +99,9 @@ def lower(
                     raise _refusal(model, recipe.signature, singular) from singular
                 kernel = kernel_by_rows(kernel) if is_by_rows else kernel
                 kernels[kernel.name] = kernel
-        return kernels
+    finally:
+        _last[:] = [lowered.searched]
+    return kernels
 
 
 def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Kernel:
@@ -124,40 +127,10 @@ def lower_estimator(model: DynamicsModel, kind: str, costs: Costs = COSTS) -> Ke
             f"{robot.name}: no estimator: a joint of the robot has several coordinates",
             "derive the model without --floating, or lock the joint with --lock",
         )
-    require_derivable(robot)
     # Its searches are not kept: the recipes of both kinds have one name, by which searches are found again.
-    lowered, recipe = _Lowered(model, "factored", costs, None), load_recipe(kind)
+    lowered, recipe = _Lowered(model, "factored", costs), load_recipe(kind)
     lowered.check(recipe)
     return lowered.kernel(recipe, False)
-
-
-def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
-    """Return the names of the functions that the user asked for, in the order of psdmc.functions. Variants
-    NAME_theta_rows (one theta_b per state) come last.
-
-    None and the word 'default' mean the default functions, of this robot if one is given. 'all' means all functions
-    except NAME_theta_rows. A text is one name. The functions that these functions call are added. Raises InputError for
-    an unknown name.
-    """
-    default = DEFAULT if robot is None else default_of(robot)
-    if functions is None:
-        return default
-    if isinstance(functions, str):
-        functions = (functions,)
-    own = (name for name, recipe in RECIPES.items() if robot and recipe.lack_of_loops(robot) is None)
-    groups = {"default": default, "all": tuple(own) or OF_TREES}
-    names = [name for word in functions for name in groups.get(word, (word,))]
-    known = {name: recipe.signature for name, recipe in RECIPES.items()} | BY_ROWS
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        some = f"the default functions are {', '.join(default)}; the page Functions of the documentation lists all"
-        hint = near_names(unknown[0], (*RECIPES, *groups), some)
-        raise InputError(f"function {unknown[0]!r} is not known", hint)
-    if not names:
-        raise InputError("no function is named", f"give default, all, or names such as {', '.join(default)}")
-    calling = [name for name in names if robot is None or robot.nv > recipe_of(name).straight]
-    called = {other for name in calling for other in known[name].calls}
-    return tuple(name for name in known if name in names or name in called)
 
 
 def _refusal(model: DynamicsModel, function: Signature, singular: SingularMatrix) -> InputError:
@@ -190,22 +163,6 @@ _last: list[_Searched] = []
 after another, and searching takes most of the time."""
 
 
-@contextmanager
-def _lowering(
-    model: DynamicsModel,
-    lowering: Lowering,
-    costs: Costs,
-    friction: FrictionInDynamics | None = None,
-    gravity_input: bool = False,
-) -> Iterator[_Lowered]:
-    """Yield a lowering, and keep its searches for the next one."""
-    lowered = _Lowered(model, lowering, costs, friction, gravity_input)
-    try:
-        yield lowered
-    finally:
-        _last[:] = [lowered.searched]
-
-
 class _Lowered:
     """One model's programs. Functions that run the same recursion share one search."""
 
@@ -217,13 +174,10 @@ class _Lowered:
         friction: FrictionInDynamics | None = None,
         gravity_input: bool = False,
     ) -> None:
+        require_derivable(model.mechanism)
         self.model = for_every_gravity(model) if gravity_input else model
-        self.lowering, self.costs, self.friction, self.gravity_input = (
-            lowering,
-            costs,
-            friction,
-            gravity_input,
-        )
+        self.lowering, self.costs = lowering, costs
+        self.friction, self.gravity_input = friction, gravity_input
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         self.searched = self._continued(model)
         self.geometry = self.searched.geometry

@@ -18,7 +18,7 @@ from scipy.stats import qmc
 from psdmc import compiler
 from psdmc.errors import InputError
 from psdmc.functions import BY_ROWS, RECIPES, SIGNATURES
-from psdmc.lower.kernels import wanted
+from psdmc.lower.admitted import wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import THETA_ROWS
 from psdmc.program.signature import Quantity, Signature, Sizes

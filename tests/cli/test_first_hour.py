@@ -19,7 +19,7 @@ import psdmc
 from psdmc.backends.manifest import MANIFEST, target_of
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT
-from psdmc.lower.kernels import wanted
+from psdmc.lower.admitted import wanted
 from psdmc.toolchain.build_package import checks_of
 
 

@@ -12,7 +12,8 @@ from unoptimised import compiled
 from psdmc.backends.c.package import package_view
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import RECIPES
-from psdmc.lower.kernels import lower, wanted
+from psdmc.lower.admitted import wanted
+from psdmc.lower.kernels import lower
 from psdmc.model.random_states import near_closed
 from psdmc.program.signature import Sizes
 

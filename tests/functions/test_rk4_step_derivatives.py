@@ -11,7 +11,8 @@ from fifty_digits import fifty_digit_jacobian
 from unoptimised import without_optimisation
 
 from psdmc.compiler import compile
-from psdmc.lower.kernels import lower, wanted
+from psdmc.lower.admitted import wanted
+from psdmc.lower.kernels import lower
 
 
 @pytest.mark.parametrize(("robot", "real"), SEVERAL)

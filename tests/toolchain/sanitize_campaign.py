@@ -27,7 +27,8 @@ from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look  # noqa: E402
 from psdmc.backends.c.package import PackageView, package_view  # noqa: E402
 from psdmc.backends.info import EmitOptions, package_info  # noqa: E402
 from psdmc.compiler import derive  # noqa: E402
-from psdmc.lower.kernels import lower, wanted  # noqa: E402
+from psdmc.lower.admitted import wanted  # noqa: E402
+from psdmc.lower.kernels import lower  # noqa: E402
 from psdmc.model.dynamics_model import DynamicsModel  # noqa: E402
 
 WALKER = "walker"

@@ -17,7 +17,8 @@ from traced import arm_package
 from psdmc.backends.c.package import package_view
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.functions import OF_TREES
-from psdmc.lower.kernels import lower, wanted
+from psdmc.lower.admitted import wanted
+from psdmc.lower.kernels import lower
 from psdmc.program.kernel import Kernel
 from psdmc.toolchain.compile import lowered_once
 
