@@ -6,7 +6,6 @@ Broadcasting, results, errors and NaN are as for compiled robots.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -61,13 +60,11 @@ def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
 
     meaning = documentation(recipe.signature).replace(BASE_FRAME, model.mechanism.base_frame)
     function.__name__, function.__doc__ = name, meaning
-    function.__signature__ = _without_self(signature_of(recipe.signature))  # type: ignore[attr-defined]
+    method = signature_of(recipe.signature)
+    without_self = method.replace(parameters=list(method.parameters.values())[1:])
+    function.__signature__ = without_self  # type: ignore[attr-defined]
     function.__qualname__ = f"{type(model).__name__}.{name}"
     return function
-
-
-def _without_self(signature: inspect.Signature) -> inspect.Signature:
-    return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 def evaluated(

@@ -130,10 +130,11 @@ def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) ->
     and inertias."""
     tracer = Tracer()
     inputs = _inputs(recipe, robot, tracer)
-    return tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
+    return tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, without_bodies))
 
 
-def _without_bodies() -> ByTheta:
+def without_bodies() -> ByTheta:
+    """Return no bodies, for functions that have none as functions of theta_b."""
     return ByTheta([], (), ())
 
 

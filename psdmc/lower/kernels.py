@@ -25,7 +25,7 @@ from psdmc.lower.reframe import Reframed
 from psdmc.lower.search import Geometry, Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.parameter_checks import for_every_gravity
-from psdmc.program.cost import Scoring, for_lanes, for_one_state
+from psdmc.program.cost import for_lanes, for_one_state
 from psdmc.program.kernel import Kernel, kernel_by_rows, packed
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import in_loops, written_out
@@ -143,11 +143,6 @@ def _refusal(model: DynamicsModel, function: Signature, singular: SingularMatrix
     )
 
 
-def _is_worth_two_bodies(shared: float, own: float, theta: bool, costs: Costs) -> bool:
-    """Whether lanes get a body of their own, at cost `own`, instead of the one for one state, at cost `shared`."""
-    return shared > costs.worth_two_bodies * own and not (theta and own > costs.longest_of_two)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Searched:
     """Frames, searches and arrangements of one model and one target, which later lowerings go on with."""
@@ -183,7 +178,6 @@ class _Lowered:
         self.geometry = self.searched.geometry
         self._searches, self._arrangements = self.searched.searches, self.searched.arrangements
         self._limbs: dict[str, LimbArrangement | None] = {}
-        self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
         self._kernels: dict[tuple[str, bool], Kernel] = {}
         self._short: list[tuple[Program, Program]] = []
 
@@ -269,8 +263,8 @@ class _Lowered:
         if expanded is not None:
             candidates.append(self._kernel(recipe, theta, expanded, expanded, "expanded"))
         if self.lowering != "expanded" or not candidates:
-            single = self._factored(recipe, theta, self.single)
-            batch = self._factored(recipe, theta, self.batch)
+            traces = tuple(self._traces(recipe, theta))
+            single, batch = (min(traces, key=each.score) for each in (self.single, self.batch))
             if batch != single and self._serves_both(single, batch):
                 single = batch
             candidates.append(self._kernel(recipe, theta, single, batch, "factored"))
@@ -288,8 +282,11 @@ class _Lowered:
         if is_same:
             return Kernel(function, theta, one, shared, lowering)
         lanes = ordered(self._shortened(written_out(batch, function.products)), costs)[1]
-        if shared == one and not _is_worth_two_bodies(score(one), score(lanes), theta, costs):
-            lanes = shared
+        if shared == one:
+            own = score(lanes)
+            is_long = theta and own > costs.longest_of_two
+            if is_long or score(one) <= costs.worth_two_bodies * own:
+                lanes = shared  # a body of its own is not worth it
         return Kernel(function, theta, one, lanes, lowering)
 
     def _shortened(self, program: Program) -> Program:
@@ -342,9 +339,6 @@ class _Lowered:
             return False
         return self.lowering == "expanded" or self.model.p <= EXPANDED_LIMIT
 
-    def _factored(self, recipe: Recipe, theta: bool, scoring: Scoring) -> Program:
-        return min(self._candidates(recipe, theta), key=scoring.score)
-
     def _serves_both(self, single: Program, batch: Program) -> bool:
         """Check if code for one state can use the arithmetic of the lanes. Sums of angles by the addition theorems save
         lanes a sincos each and cost one state of a long function next to nothing."""
@@ -354,13 +348,8 @@ class _Lowered:
         one, lanes = (self.single.score(self._shortened(each)) for each in (single, batch))
         return lanes <= costs.worth_sharing * one
 
-    def _candidates(self, recipe: Recipe, theta: bool) -> tuple[Program, ...]:
-        """The PROGRAMs that code for one state and code for lanes choose from, traced once for both."""
-        if (recipe.name, theta) not in self._traced:
-            self._traced[recipe.name, theta] = tuple(self._traces(recipe, theta))
-        return self._traced[recipe.name, theta]
-
     def _traces(self, recipe: Recipe, theta: bool) -> Iterator[Program]:
+        """Yield the PROGRAMs that code for one state and code for lanes choose from, traced once for both."""
         search, geometry = self._search(theta), self.geometry
         if recipe.signature.theta:
             arranged = self._known(recipe.shares) if recipe.shares else recipe

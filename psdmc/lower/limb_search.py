@@ -32,7 +32,15 @@ from psdmc.lower.limbs import (
     trace_limbs,
 )
 from psdmc.lower.reframe import Reframed
-from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, ROUNDING, Search, distinct
+from psdmc.lower.search import (
+    CHOICES,
+    LARGEST_TRANSFER,
+    MANY_JOINTS,
+    ROUNDING,
+    Search,
+    distinct,
+    with_choices,
+)
 from psdmc.program.cost import for_lanes, for_one_state
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import StageCost, stage_costs, staged
@@ -130,7 +138,9 @@ class LimbSearch:
         """Return the cheapest form of the code that computes limbs (such as legs) in SIMD lanes, one limb per lane. The
         search for link frames and nonzero link parameters begins at `start`. Return None if the function or the target
         processor does not allow any."""
-        if not self.costs.has_vectors or self._is_eliminated(start):
+        # Accelerations cannot go by articulated bodies where joints follow others.
+        is_eliminated = self.recipe.accelerates and any_follows(start.reframed.frames)
+        if not self.costs.has_vectors or is_eliminated:
             return None
         ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]
         limit = LIKELY * min((each.weight for each in ways), default=0.0)
@@ -156,27 +166,23 @@ class LimbSearch:
         """Return the cheapest options of the recursion for this function. Frames, parameters and groups of limbs are
         those that were found for another function."""
         own = self._weighed(shared.arrangement, shared.groups)
-        return self._cheapest(own, self._rearranged(shared.arrangement))
+        return self._cheapest(own, with_choices(shared.arrangement, distinct(self.recipe, CHOICES)))
 
     def lowered(self, found: LimbArrangement, straight: Program) -> LimbProgram | None:
         """Return this function with limbs in SIMD lanes, with the frames, parameters and groups of limbs that a search
         found. Return None if no number of lanes makes it cheaper than straight-line code."""
-        limbs = self._ordered(self._traced(found.arrangement, found.groups))
+        limbs = self._ordered(trace_limbs(self.recipe, found.arrangement, self.search.robot, found.groups))
         if any(each.narrowest < AT_ONCE for each in limbs.products):
             return None
         limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
         paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]
-        return limbs.with_least(paying[0]) if paying else None
-
-    def _is_eliminated(self, start: Arrangement) -> bool:
-        """Whether accelerations cannot go by articulated bodies: joints follow others."""
-        return self.recipe.accelerates and any_follows(start.reframed.frames)
+        return replace(limbs, least=paying[0]) if paying else None
 
     def _arranged(self, start: Arrangement, groups: tuple[Limbs, ...]) -> LimbArrangement:
         """The cheapest before exchanges."""
         best = self._weighed(self._admissible(start, groups), groups)
         best = self._cheapest(best, self._alike(best.arrangement, groups))
-        return self._cheapest(best, self._rearranged(best.arrangement))
+        return self._cheapest(best, with_choices(best.arrangement, distinct(self.recipe, CHOICES)))
 
     def _descended(self, best: LimbArrangement) -> LimbArrangement:
         """The cheapest that exchanges lead to."""
@@ -234,9 +240,6 @@ class LimbSearch:
         part, robot = self.search.branches.part(arrangement, kept)
         return self._weight(part, robot, limbs_in(groups, kept))
 
-    def _traced(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> TracedLimbs:
-        return trace_limbs(self.recipe, arrangement, self.search.robot, groups)
-
     def _ordered(self, traced: TracedLimbs) -> LimbProgram:
         short = shortened(traced.program, self.search.has_many_joints)
         stages = staged(short, traced.groups)
@@ -258,11 +261,6 @@ class LimbSearch:
         if not self.recipe.accelerates or not hang:
             return start
         return replace(start, choices=replace(start.choices, articulated=True))
-
-    def _rearranged(self, found: Arrangement) -> Iterator[Arrangement]:
-        way = found.choices.articulated
-        for choices in distinct(self.recipe, CHOICES):
-            yield replace(found, choices=replace(choices, articulated=way))
 
     def _alike(self, found: Arrangement, groups: Sequence[Limbs]) -> Iterator[Arrangement]:
         """Each limb's carriers in all limbs of its group; of several groups, the limbs of one number."""

@@ -16,7 +16,7 @@ from psdmc.dynamics.frames import Frame, has_floating_base
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import SingularMatrix, factorize, inner_product
 from psdmc.errors import InternalError
-from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
+from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced, without_bodies
 from psdmc.lower.limb_frames import Place, merged_contacts, one_limb, places
 from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
@@ -26,7 +26,7 @@ from psdmc.program.products import Shares, ThinProducts
 from psdmc.program.program import Program, Slot
 from psdmc.program.signature import THIN, Quantity, Signature
 from psdmc.program.trace import Symbol, Tracer
-from psdmc.recipes.recipe import ByTheta, Recipe
+from psdmc.recipes.recipe import Recipe
 from psdmc.robot.limbs import Limbs
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Placement
 
@@ -229,7 +229,7 @@ class _Trace:
         driven = tuple(place.constant([drives[joint] for joint in place.joints]) for place in self.places)
         choices = arrangement.choices
         return dict(
-            traced(self.recipe, self.robot, self.reframed, inputs, own, driven, choices, unit, _no_theta)
+            traced(self.recipe, self.robot, self.reframed, inputs, own, driven, choices, unit, without_bodies)
         )
 
     def _inputs(self, quantity: Quantity) -> Iterator[Symbol]:
@@ -400,17 +400,13 @@ class _Trace:
             left = len(partials)
             program = self.tracer.finish([*stored, *partials])
             read = set(program.inputs())
-            partials = [each for each in partials if _sum_of(each[0]) in read]
+            partials = [
+                (slot, value)
+                for slot, value in partials
+                if Slot(slot.vector.replace("_partial", "_sum"), slot.index) in read
+            ]
         groups = tuple(
             replace(group.vectors, constants=tuple(self.tracer.lane_constants.get(group.number, ())))
             for group in self.groups
         )
         return TracedLimbs(program, groups, self.products)
-
-
-def _sum_of(partial: Slot) -> Slot:
-    return Slot(partial.vector.replace("_partial", "_sum"), partial.index)
-
-
-def _no_theta() -> ByTheta:
-    return ByTheta([], (), ())

@@ -80,7 +80,8 @@ def reframe(chain: Mechanism, feet: Sequence[Foot], turns_base: bool = True) -> 
     feet        for each joint, whether the frame's origin is on the common normal to the previous axis or to the next axis
     turns_base  whether the base may be turned about the first axis, to align it with gravity
     """
-    placed, reach = _placed_at_zero(chain), _reach(chain)
+    placed = _placed_at_zero(chain)
+    reach = sum(length(joint.placement.translation) for joint in chain.joints) or 1.0
     axes = [clean_direction(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
     first = _first_x(chain, placed[0], axes[0]) if turns_base else placed[0].rotation[:, 0]
@@ -90,7 +91,8 @@ def reframe(chain: Mechanism, feet: Sequence[Foot], turns_base: bool = True) -> 
         outer, foot = (before[0], origins[0]) if parent == BASE else (after[parent], origins[parent])
         rotation = np.eye(3) if i == 0 else _constant(chain, i, times(outer.T, before[i]))
         offset = np.zeros(3) if i == 0 else times(outer.T, origins[i] - foot)
-        angle = _angle_about_z(times(before[i].T, after[i]))
+        turn = times(before[i].T, after[i])
+        angle = float(angle_of(turn[1, 0], turn[0, 0]))
         quarters = round(angle / (np.pi / 2))
         rest = angle - quarters * (np.pi / 2)
         frames.append(
@@ -198,10 +200,6 @@ def _is_wide(chain: Mechanism, body: int) -> bool:
     return body != BASE and not chain.joints[body].type.about_z
 
 
-def _reach(chain: Mechanism) -> float:
-    return sum(length(joint.placement.translation) for joint in chain.joints) or 1.0
-
-
 def _origins(
     chain: Mechanism, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
 ) -> list[Array]:
@@ -290,10 +288,6 @@ def _constant(chain: Mechanism, i: int, rotation: Array) -> Array:
     if _is_wide(chain, i) or _is_wide(chain, chain.parents[i]):
         return exact_rotation(rotation)
     return constant_rotation(rotation)
-
-
-def _angle_about_z(rotation: Array) -> float:
-    return float(angle_of(rotation[1, 0], rotation[0, 0]))
 
 
 # Common normals of two joint axes
@@ -396,12 +390,9 @@ def clean_direction(direction: Array) -> Array:
 def clean_lengths(lengths: Array, scale: float) -> Array:
     """Return lengths without rounding errors. Lengths that are nearly zero become zero. Lengths that are nearly a short
     decimal become this decimal, so that equal lengths stay equal."""
-    return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
-
-
-def _decimal(lengths: Array, scale: float) -> Array:
-    nearest = np.round(lengths, DECIMALS)
-    return np.asarray(np.where(np.abs(nearest - lengths) <= ROUNDING * scale, nearest, lengths), np.float64)
+    cleaned = np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths)
+    nearest = np.round(cleaned, DECIMALS)
+    return np.asarray(np.where(np.abs(nearest - cleaned) <= ROUNDING * scale, nearest, cleaned), np.float64)
 
 
 def exact_rotation(rotation: Array) -> Array:

@@ -199,7 +199,7 @@ class Search:
             descent.consider(iter([accurate]))
         if start is not None:
             start = self._by_the_cheaper_way(recipe, start, scoring)
-            descent.consider(_rearranged(start, distinct(recipe, CHOICES)))
+            descent.consider(with_choices(start, distinct(recipe, CHOICES)))
             if self.is_large:
                 descent.consider(self._anew(descent.arrangement.choices))
         else:
@@ -330,7 +330,7 @@ class Search:
         the best become PROGRAMs. The candidates most similar to the given arrangement (frames, parameters, options)
         come first. Counting ends when the counted candidates have OPERATIONS operations together.
         """
-        choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
+        choices = list(with_choices(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
         recorded: dict[int, Recording] = {}
         best: set[int] = set()
@@ -357,7 +357,8 @@ class Search:
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
         reframed = self.geometry.reframed(feet)
         space = self.geometry.space(reframed)
-        carriers = space.lightest(_weights(space))
+        weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
+        carriers = space.lightest(weights)
         transfer = space.transfer(carriers)
         plain = Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0])
         for choices in _felt(plain, CHOICES):
@@ -384,17 +385,13 @@ class Search:
                 yield replace(found, carriers=carriers, transfer=transfer)
 
 
-def _weights(space: CarrierSpace) -> list[float]:
-    return [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
-
-
 def _changes(one: Choices, other: Choices) -> int:
     """How many choices two arrangements of a recursion differ in."""
     return sum(map(ne, astuple(one), astuple(other)))
 
 
-def _rearranged(found: Arrangement, choices: Iterable[Choices]) -> Iterator[Arrangement]:
-    """Return the arrangement with other choices, but the same algorithm for accelerations."""
+def with_choices(found: Arrangement, choices: Iterable[Choices]) -> Iterator[Arrangement]:
+    """Return the arrangement with each of these options of the recursion, but the same algorithm for accelerations."""
     way = found.choices.articulated
     return (replace(found, choices=replace(each, articulated=way)) for each in choices)
 

@@ -7,7 +7,7 @@ with the results here. A new PROGRAM also has the outputs of the given PROGRAM.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -91,11 +91,18 @@ def jacobians(program: Program, blocks: Sequence[Block], mode: Mode) -> Program:
     operations for each column, reverse mode for each row.
     """
     replay = _Replay(program)
-    columns = _columns if mode == "forward" else _rows
     entries: dict[tuple[str, int, int], Value] = {}
     for block in blocks:
-        for i, j, value in columns(replay, block):
-            entries[block.name, i, j] = value
+        of = [(slot.index, value) for slot, value in replay.outputs if slot.vector == block.of]
+        by = replay.vector(block.by, block.columns)
+        if mode == "forward":
+            for j, symbol in enumerate(by):
+                moved = slopes([value for _, value in of], [symbol], [1.0])
+                entries |= {(block.name, i, j): slope for (i, _), slope in zip(of, moved, strict=True)}
+        else:
+            for i, value in of:
+                (row,) = gradients([value], [1.0], [by])
+                entries |= {(block.name, i, j): slope for j, slope in enumerate(row)}
     stored = [
         (Slot(block.name, i * block.columns + j), entries.get((block.name, i, j), 0.0))
         for block in blocks
@@ -103,20 +110,6 @@ def jacobians(program: Program, blocks: Sequence[Block], mode: Mode) -> Program:
         for j in range(block.columns)
     ]
     return replay.finish(stored)
-
-
-def _columns(replay: _Replay, block: Block) -> Iterator[tuple[int, int, Value]]:
-    of = [(slot.index, value) for slot, value in replay.outputs if slot.vector == block.of]
-    for j, symbol in enumerate(replay.vector(block.by, block.columns)):
-        moved = slopes([value for _, value in of], [symbol], [1.0])
-        yield from ((i, j, slope) for (i, _), slope in zip(of, moved, strict=True))
-
-
-def _rows(replay: _Replay, block: Block) -> Iterator[tuple[int, int, Value]]:
-    by = [replay.vector(block.by, block.columns)]
-    for slot, value in replay.outputs:
-        if slot.vector == block.of:
-            yield from ((slot.index, j, slope) for j, slope in enumerate(gradients([value], [1.0], by)[0]))
 
 
 class _Replay:

@@ -88,12 +88,14 @@ def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequen
                 value = _replaced(tracer, index, arguments, changed)
                 if not _is_value(value, index):
                     changed[index] = value
-    return [
-        _signed(changed[value.index], value)
-        if isinstance(value, Symbol) and value.index in changed
-        else value
-        for value in values
-    ]
+    found: list[Value] = []
+    for value in values:
+        if isinstance(value, Symbol) and value.index in changed:
+            own = changed[value.index]
+            found.append(-own if value.negative else own)
+        else:
+            found.append(value)
+    return found
 
 
 def _is_value(value: Value, index: int) -> bool:
@@ -110,7 +112,3 @@ def _replaced(tracer: Tracer, index: int, arguments: tuple[int, ...], changed: M
     op = tracer.steps[index][0]
     value: Value = op.numbers(*own) if op.written else op(*own)
     return value
-
-
-def _signed(value: Value, symbol: Symbol) -> Value:
-    return -value if symbol.negative else value

@@ -23,12 +23,9 @@ FORMAT = 6
 def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
     """Return the JSON text of kernels in their order. Constants can be read back bit for bit."""
     # One kernel at a time: lists of all of a large robot's instructions together take more memory than its kernels.
-    entries = ",".join(_text(_kernel_to_plain(kernel)) for kernel in kernels.values())
+    plain = map(_kernel_to_plain, kernels.values())
+    entries = ",".join(json.dumps(each, separators=(",", ":"), allow_nan=False) for each in plain)
     return f'{{"format":{FORMAT},"kernels":[{entries}]}}'
-
-
-def _text(plain: Any) -> str:
-    return json.dumps(plain, separators=(",", ":"), allow_nan=False)
 
 
 def _kernel_to_plain(kernel: Kernel) -> dict[str, Any]:

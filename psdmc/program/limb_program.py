@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from weakref import proxy
 
 from psdmc.program.interpret import Value, replayed
@@ -106,9 +106,6 @@ class LimbProgram:
     least: int = 2
     products: tuple[ThinProducts, ...] = ()
     checked: bool = False
-
-    def with_least(self, least: int) -> LimbProgram:
-        return replace(self, least=least)
 
 
 def unpacked(limbs: LimbProgram) -> Program:
