@@ -85,7 +85,9 @@ def feasible_point(blocks: Sequence[Block], z: Array) -> Array | None:
     rounder = [_rounder(block) for block in blocks]
     shifted = [replace(block, slopes=np.concatenate([block.slopes, block.near[None]])) for block in rounder]
     first = 2.0 * max(_shift(block, z) for block in rounder)
-    shifted.append(_above(-first, len(z), first))  # or the shift might have no least value
+    # Another block keeps the shift above -first, or it might have no least value.
+    slopes = np.append(np.zeros(len(z)), 1.0).reshape(-1, 1, 1)
+    shifted.append(Block(np.array([[first]]), slopes, np.array([[first]]), 1.0))
     point, pull = np.append(z, first), _pull(shifted)
     sharpness, size = 1.0 / first, sum(len(block.near) for block in shifted)
     while size / sharpness > MARGIN * first:
@@ -97,11 +99,6 @@ def feasible_point(blocks: Sequence[Block], z: Array) -> Array | None:
             return None
         sharpness *= SHARPER
     return None
-
-
-def _above(least: float, k: int, size: float) -> Block:
-    """The block that keeps the last of k + 1 coordinates above `least`."""
-    return Block(np.array([[-least]]), np.append(np.zeros(k), 1.0).reshape(-1, 1, 1), np.array([[size]]), 1.0)
 
 
 def _likeness(blocks: Sequence[Block], z: Array) -> float:

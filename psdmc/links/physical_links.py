@@ -109,7 +109,10 @@ def _nearest(model: DynamicsModel, theta: Array) -> Array | None:
     """(n, 11) the solution; None where there is none."""
     span = model.mechanism.parameter_span
     rows, sides = _equations(model, theta)
-    start, free = _coordinates(rows, sides, known_inner(model))
+    # The point nearest to the file's that fulfils the equations, and directions in which they stay fulfilled.
+    _, values, axes = np.linalg.svd(rows)
+    rank = int(np.sum(values > np.finfo(float).eps * max(rows.shape) * values.max(initial=0.0)))
+    start, free = _corrected(rows, sides, known_inner(model)), axes[rank:].T
     z = nearest_definite(_blocks(model, span @ start, span @ free), np.zeros(free.shape[1]))
     if z is None:
         return None
@@ -155,13 +158,6 @@ def _equations(model: DynamicsModel, theta: Array) -> tuple[Array, Array]:
         for row in flat_equations(span, PARAMETERS_PER_LINK * link)
     ]
     return np.vstack([model.B @ span, *flat]), np.concatenate([theta, np.zeros(len(flat))])
-
-
-def _coordinates(rows: Array, sides: Array, inner: Array) -> tuple[Array, Array]:
-    """The point nearest to `inner` that fulfils the equations, and directions in which they stay fulfilled."""
-    _, values, axes = np.linalg.svd(rows)
-    rank = int(np.sum(values > np.finfo(float).eps * max(rows.shape) * values.max(initial=0.0)))
-    return _corrected(rows, sides, inner), axes[rank:].T
 
 
 def _corrected(rows: Array, sides: Array, inner: Array) -> Array:

@@ -198,7 +198,11 @@ def from_json(value: object) -> Calibrated:
         json.whole(content["schema"], "the calibration's schema", 1, SCHEMA)
     else:
         content = upgraded(content)
-    parameters = _rows(content, "base_parameters", _parameter)
+    parameters = _rows(
+        content,
+        "base_parameters",
+        lambda row: _of(ParameterRow, row, visibility=_remark_of(_part(row, "visibility"))),
+    )
     friction = _rows(content, "friction", _number)
     prediction = _maybe(content, "prediction", _prediction_of)
     _require_laws(friction, LAWS if prediction is None else prediction.laws)
@@ -273,10 +277,6 @@ def _of(kind: Callable[..., Row], value: object, **given: Any) -> Row:
         for each in names
     }
     return kind(**read, **given)
-
-
-def _parameter(row: object) -> ParameterRow:
-    return _of(ParameterRow, row, visibility=_remark_of(_part(row, "visibility")))
 
 
 def _number(row: object) -> NumberRow:

@@ -14,6 +14,9 @@ from psdmc.model.calibrated import by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.limits import shown
 
+SLOWEST, FASTEST = 1e-9, 1e9
+"""rad/s or m/s: bounds of the smoothing speed."""
+
 
 def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
     """Return sentences about what a calibration found in addition to rigid bodies and `linear_friction`: springs, and
@@ -40,14 +43,6 @@ def linear_friction(model: DynamicsModel) -> Friction:
     return _friction_of(model, model.joint_names)
 
 
-SLOWEST, FASTEST = 1e-9, 1e9
-"""rad/s or m/s: bounds of the smoothing speed."""
-
-
-def _is_speed(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and SLOWEST <= value <= FASTEST
-
-
 def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = None) -> FrictionInDynamics:
     """Return the friction that the model's calibration found, as a part of the dynamics. Joints of several coordinates,
     such as a floating base, and mimic joints have no friction of their own.
@@ -57,7 +52,8 @@ def friction_in_dynamics(model: DynamicsModel, smoothing_speed: float | None = N
 
     Raises InputError as `linear_friction` does, and if the smoothing speed is not a number within its bounds.
     """
-    if smoothing_speed is not None and not _is_speed(smoothing_speed):
+    is_number = isinstance(smoothing_speed, int | float) and not isinstance(smoothing_speed, bool)
+    if smoothing_speed is not None and not (is_number and SLOWEST <= smoothing_speed <= FASTEST):
         raise InputError(
             f"the smoothing speed is {smoothing_speed!r}, expected a number of rad/s from {SLOWEST:g} to {FASTEST:g}",
             "such as 0.03",

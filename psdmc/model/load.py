@@ -91,7 +91,9 @@ def load_bytes(data: bytes, source: Path) -> DynamicsModel:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):
             raise BrokenArchiveError("its content does not match its hash")
-        return model_from(arrays, _migrated(manifest))
+        while manifest["schema"] < SCHEMA:
+            manifest = _MIGRATIONS[manifest["schema"]](manifest)
+        return model_from(arrays, manifest)
     except BrokenArchiveError as error:
         raise _damaged(source, str(error)) from error
     except (ValueError, RecursionError) as error:
@@ -147,12 +149,6 @@ def _check_schema(source: Path, manifest: Any) -> None:
             f"{source}: model schema {reprlib.repr(schema)}, this psdmc reads up to {SCHEMA}",
             f"install psdmc {reprlib.repr(manifest.get('psdmc', ''))} or newer, or derive the model again",
         )
-
-
-def _migrated(manifest: dict[str, Any]) -> dict[str, Any]:
-    while manifest["schema"] < SCHEMA:
-        manifest = _MIGRATIONS[manifest["schema"]](manifest)
-    return manifest
 
 
 def _damaged(source: Path, why: str) -> InputError:

@@ -110,7 +110,9 @@ def content_hash(model: Model) -> str:
 
 
 def _arrays(model: Model) -> dict[str, NDArray[Any]]:
-    expansion = model.expansion or _nothing(len(model.mechanism), len(model.B))
+    # Where the model has no E and P, a file holds empty ones.
+    no_exponents = np.zeros((BLOCKS * len(model.mechanism), 0), np.uint8)
+    expansion = model.expansion or Expansion(no_exponents, Entries(*np.zeros((4, 0))), len(model.B))
     joint, row, column, value = expansion.entries
     return {
         "E": expansion.E,
@@ -121,11 +123,6 @@ def _arrays(model: Model) -> dict[str, NDArray[Any]]:
         "P_value": value,
         "B": np.ascontiguousarray(model.B),
     }
-
-
-def _nothing(n: int, l: int) -> Expansion:
-    """The empty expansion that a file holds where the model has no E and P."""
-    return Expansion(np.zeros((BLOCKS * n, 0), np.uint8), Entries(*np.zeros((4, 0))), l)
 
 
 def _manifest(model: Model) -> dict[str, Any]:
