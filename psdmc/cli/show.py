@@ -16,13 +16,13 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.calibrated import WHOLE, Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.equations import BaseParameters
 from psdmc.model.summary import (
-    Summary,
     joined_units,
     limit_text,
     numbers_text,
     range_text,
-    summary,
+    sizes_of,
     term_texts,
 )
 from psdmc.program.cost import cost
@@ -32,47 +32,49 @@ from psdmc.robot.mechanism import POINT, Joint, Mechanism, require_derivable
 
 def print_model(model: DynamicsModel) -> None:
     """Print a summary of a model: its robot, joints, sizes, base parameters, certificate and notes."""
-    found = summary(model)
-    calibrated = model.calibrated
+    robot, calibrated = model.mechanism, model.calibrated
     if calibrated is not None:
         print_calibration(calibrated)
-    print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
-    print_line(f"gravity {numbers_text(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
+    ends = "" if robot.is_serial else f"{len(robot.leaves)} ends, tip "
+    print_line(f"{robot.name}: {robot.base_name} to {ends}{robot.tip_name}, {robot.convention} frames")
+    print_line(f"gravity {numbers_text(robot.gravity.tolist())} m/s^2 in the {robot.base_frame}")
     if model.contacts != dict.fromkeys(model.frame_names, POINT):
         kinds = (
             f"{name} ({'point' if rows == POINT else 'surface'})" for name, rows in model.contacts.items()
         )
         print_line(f"contacts: {', '.join(kinds)}")
-    print("\n".join(_sizes(found)))
+    print("\n".join(_sizes(model)))
     print()
-    print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))
+    print_table(_joints(robot, joint_errors(robot, model.certificate.tolist())))
     print()
-    print_table(_parameters(found, calibrated))
+    print_table(_parameters(model.base_parameters, calibrated))
     for line in _unknowns(model):
         print_line(line)
     print()
     print_loop_base_parameters(model, combinations=True)
-    print_line(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
-    for note in found.notes:
+    print_line(f"largest torque error against Newton-Euler, relative: {max(model.certificate.tolist()):.1e}")
+    for note in robot.notes:
         print_note(note)
     for line in _snapping(model):
         print_line(line)
-    print_line(f"source: {found.source_name or 'not kept'}")
-    if found.source_name:
-        print_line(f"source's sha256: {found.source_sha256}")
-    print_line(f"model hash: {found.content_hash}")
+    source = model.provenance.get("source_name")
+    print_line(f"source: {source or 'not kept'}")
+    if source:
+        print_line(f"source's sha256: {model.provenance.get('source_sha256')}")
+    print_line(f"model hash: {model.content_hash}")
 
 
-def _sizes(found: Summary) -> list[str]:
-    if found.sizes is None or found.p is None:
-        why = "--no-expand" if found.is_serial else "a tree's are only with --expand"
-        if not all(joint.type.about_z for joint in found.joints):
+def _sizes(model: DynamicsModel) -> list[str]:
+    expansion = model.expansion
+    if expansion is None:
+        why = "--no-expand" if model.mechanism.is_serial else "a tree's are only with --expand"
+        if not all(kind.about_z for kind in model.mechanism.types):
             why = "they are of joints of one coordinate"
-        return [f"l = {found.l} base parameters; monomials not expanded ({why})"]
-    parts = ", ".join(f"{count} {kind}" for kind, count in found.sizes._asdict().items())
+        return [f"l = {model.l} base parameters; monomials not expanded ({why})"]
+    parts = ", ".join(f"{count} {kind}" for kind, count in sizes_of(expansion.E)._asdict().items())
     return [
-        f"p = {found.p} monomials ({parts})",
-        f"l = {found.l} base parameters, {found.entries} entries of P",
+        f"p = {model.p} monomials ({parts})",
+        f"l = {model.l} base parameters, {len(expansion.entries.value)} entries of P",
     ]
 
 
@@ -118,12 +120,12 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
     return Table(heads, rows)
 
 
-def _parameters(found: Summary, calibrated: Calibrated | None) -> Table:
+def _parameters(parameters: BaseParameters, calibrated: Calibrated | None) -> Table:
     """theta_b, numbered from 0 as in the generated header and in Python."""
-    stds = standard_deviations(calibrated, len(found.base_parameters))
+    stds = standard_deviations(calibrated, len(parameters))
     heads = ("theta_b", "value", *(["+-"] if calibrated else []), "unit", "equation, about the link frames")
     rows = []
-    for index, (parameter, std) in enumerate(zip(found.base_parameters, stds, strict=True)):
+    for index, (parameter, std) in enumerate(zip(parameters, stds, strict=True)):
         value = "unknown" if parameter.value is None else f"{parameter.value:.6g}"
         given = [std] if calibrated else []
         rows.append((str(index), value, *given, parameter.unit, parameter.equation))
@@ -331,32 +333,33 @@ def print_json(kind: str, content: dict[str, Any]) -> None:
 
 def model_json(model: DynamicsModel) -> dict[str, Any]:
     """Return what `psdmc show --json` prints for a model."""
-    found, robot = summary(model), model.mechanism
-    errors = joint_errors(robot, found.certificate)
+    robot, expansion, kept = model.mechanism, model.expansion, model.provenance
+    certificate = model.certificate.tolist()
+    errors = joint_errors(robot, certificate)
     joints = [{**joint, "error": error} for joint, error in zip(_joint_rows(robot), errors, strict=True)]
-    values = model.provenance.get("snap_torque_change")
+    values = kept.get("snap_torque_change")
     return {
-        "name": found.name,
-        "base": found.base,
-        "tip": found.tip,
-        "convention": found.convention,
-        "gravity_m_s2": list(found.gravity),
+        "name": robot.name,
+        "base": robot.base_name,
+        "tip": robot.tip_name,
+        "convention": robot.convention,
+        "gravity_m_s2": robot.gravity.tolist(),
         "joints": joints,
         "frames": [frame.name for frame in robot.frames],
         "contacts": model.contacts,
-        "p": found.p,
-        "l": found.l,
-        "monomials": None if found.sizes is None else found.sizes._asdict(),
-        "entries_of_P": found.entries,
+        "p": model.p,
+        "l": model.l,
+        "monomials": None if expansion is None else sizes_of(expansion.E)._asdict(),
+        "entries_of_P": None if expansion is None else len(expansion.entries.value),
         "base_parameters": model.base_parameters.plain(),
         "loop_base_parameters": _loop_base_parameters_json(model),
-        "largest_torque_error": max(found.certificate),
+        "largest_torque_error": max(certificate),
         "snap_torque_change": None if values is None else [_finite(float(value)) for value in values],
-        "notes": list(found.notes),
+        "notes": list(robot.notes),
         "calibration": None if model.calibrated is None else document(model.calibrated),
-        "source": {"name": found.source_name, "sha256": found.source_sha256},
-        "options": _plain(model.provenance.get("options")),
-        "model_hash": found.content_hash,
+        "source": {"name": kept.get("source_name"), "sha256": kept.get("source_sha256")},
+        "options": _plain(kept.get("options")),
+        "model_hash": model.content_hash,
     }
 
 

@@ -1,10 +1,9 @@
-"""The facts about a model: as plain data for `psdmc show`, as a few lines of text, and as HTML for notebooks."""
+"""A summary of a model in a few lines of text, as HTML for notebooks, and parts of what `psdmc show` prints."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import NamedTuple, Protocol
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.model import store
-from psdmc.model.equations import BaseParameter, BaseParameters
+from psdmc.model.equations import BaseParameters
 from psdmc.model.expansion import BLOCKS, Expansion, RowBlocks
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint, Mechanism
@@ -35,9 +34,6 @@ class Model(store.Model, Protocol):
     @property
     def base_parameters(self) -> BaseParameters: ...
 
-    @property
-    def content_hash(self) -> str: ...
-
     def expanded(self) -> Expansion: ...
 
 
@@ -48,62 +44,6 @@ class Sizes(NamedTuple):
     acceleration: int
     centrifugal: int
     coriolis: int
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """The facts about a model that `psdmc show` prints.
-
-    ends         name of the tip of a serial chain; for a tree, how many end links it has, and the tip
-    sizes        number of monomials by kind; None if the model was derived without E and P
-    entries      non-zero entries of P; None if the model was derived without E and P
-    certificate  for each joint rate, the largest torque error divided by the largest torque
-    """
-
-    name: str
-    convention: str
-    base: str
-    tip: str
-    ends: str
-    is_serial: bool
-    gravity: tuple[float, float, float]
-    joints: tuple[Joint, ...]
-    p: int | None
-    l: int
-    sizes: Sizes | None
-    entries: int | None
-    base_parameters: tuple[BaseParameter, ...]
-    certificate: tuple[float, ...]
-    notes: tuple[str, ...]
-    source_name: str | None
-    source_sha256: str | None
-    content_hash: str
-
-
-def summary(model: Model) -> Summary:
-    """Everything that `psdmc show` prints by default."""
-    chain, kept = model.mechanism, model.provenance
-    gx, gy, gz = chain.gravity.tolist()
-    return Summary(
-        name=chain.name,
-        convention=chain.convention,
-        base=chain.base_name,
-        tip=chain.tip_name,
-        ends=chain.tip_name if chain.is_serial else f"{len(chain.leaves)} ends, tip {chain.tip_name}",
-        is_serial=chain.is_serial,
-        gravity=(gx, gy, gz),
-        joints=chain.joints,
-        p=model.p,
-        l=model.l,
-        sizes=None if model.expansion is None else sizes_of(model.expansion.E),
-        entries=None if model.expansion is None else len(model.expansion.entries.value),
-        base_parameters=model.base_parameters,
-        certificate=tuple(model.certificate.tolist()),
-        notes=chain.notes,
-        source_name=kept.get("source_name"),
-        source_sha256=kept.get("source_sha256"),
-        content_hash=model.content_hash,
-    )
 
 
 def sizes_of(E: NDArray[np.uint8]) -> Sizes:

@@ -9,11 +9,12 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
+from psdmc.cli.show import model_json
 from psdmc.derivation.derive import derive_model, provenance_of
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Expansion
-from psdmc.model.summary import summary, term_texts
+from psdmc.model.summary import term_texts
 from psdmc.robot.load import load_robot_text
 from psdmc.verification.check import check_model
 
@@ -145,14 +146,16 @@ def test_a_model_without_source_is_refused() -> None:
         check_model(derive_model(random_chain(0, "R")))
 
 
-def test_summary() -> None:
-    found = summary(bundled_model("two_link"))
-    assert (found.name, found.p, found.l, found.sizes) == ("two_link", 10, 4, (3, 4, 2, 1))
-    assert found.entries == sum(np.count_nonzero(m.toarray()) for m in bundled_model("two_link").P)
-    assert len(found.certificate) == len(found.joints) == 2
-    assert found.source_name == "two_link.toml"
-    plain = summary(derive_model(random_chain(0, "RR"), expand=False))
-    assert (plain.p, plain.sizes, plain.entries, plain.source_name) == (None, None, None, None)
+def test_what_show_prints_as_json() -> None:
+    found = model_json(bundled_model("two_link"))
+    assert (found["name"], found["p"], found["l"]) == ("two_link", 10, 4)
+    assert list(found["monomials"].values()) == [3, 4, 2, 1]
+    assert found["entries_of_P"] == sum(np.count_nonzero(m.toarray()) for m in bundled_model("two_link").P)
+    assert len(found["joints"]) == 2
+    assert found["source"]["name"] == "two_link.toml"
+    plain = model_json(derive_model(random_chain(0, "RR"), expand=False))
+    assert (plain["p"], plain["monomials"], plain["entries_of_P"]) == (None, None, None)
+    assert plain["source"]["name"] is None
 
 
 def test_terms_in_words() -> None:
