@@ -18,7 +18,7 @@ from psdmc.errors import InputError
 from psdmc.reproducible import cosine, cross, sine, times
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, Array, Loop, Mechanism, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, Loop, Mechanism, NamedFrame, Placement
 
 STEPS, STARTS, TESTS, SEED = 40, 24, 24, 29_013
 """Newton steps, starts near a singular position, random positions of the test, and the seed of both."""
@@ -67,11 +67,12 @@ def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None],
     columns = tuple(i for i in robot.own_joints if robot.joints[i].type.about_z)
     if len(robot.loops) > len(columns):
         return robot  # an error for whoever closes them
-    named = {name for names in follows for name in names or ()} | _passive(robot, robot.loops)
+    named = {name for names in follows for name in names or ()}
+    first = named | {robot.joints[i].name for loop in robot.loops for i in loop.passive}
     depths = [len(robot.path_to(i)) for i in range(len(robot))]
     order = sorted(
         range(len(columns)),
-        key=lambda k: (robot.joints[columns[k]].name in named, depths[columns[k]], columns[k]),
+        key=lambda k: (robot.joints[columns[k]].name in first, depths[columns[k]], columns[k]),
         reverse=True,
     )
     known = Relations(np.zeros((0, len(columns))), np.zeros(0), ())
@@ -92,43 +93,29 @@ def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None],
         linear.append(loop)
     if not linear:
         return robot
-    found = {
-        columns[pivot]: Coordinate(
-            *_split([(columns[k], -row[k]) for k in np.flatnonzero(row).tolist() if k != pivot], offset)
-        )
-        for row, offset, pivot in zip(known.rows.tolist(), known.offsets.tolist(), known.pivots, strict=True)
-        for row in (np.array(row),)
-    }
+    found = {}
+    for row, offset, pivot in zip(known.rows, known.offsets.tolist(), known.pivots, strict=True):
+        shares = [(columns[k], -row[k]) for k in np.flatnonzero(row).tolist() if k != pivot]
+        found[columns[pivot]] = _sum(shares, offset)
     if kept:  # a passive joint that follows none may belong to one of these
         passive = {i for loop in robot.loops for i in loop.passive} - {*found}
         kept = [replace(loop, passive=() if k else tuple(sorted(passive))) for k, loop in enumerate(kept)]
-        named = {name for names in follows for name in names or ()}
-    _require_followers(robot, named, found, source)
+    followers = {robot.joints[i].name for i in found}
+    strange = (named if kept else first) - followers
+    if strange:
+        raise InputError(
+            f"{source}: loops: joint {shown(min(strange))} cannot follow: found followers {', '.join(sorted(followers))}",
+            "name joints of the parallelogram, and leave as many others as it has degrees of freedom",
+        )
     coordinates = tuple(_composed(coordinate, found) for coordinate in robot.coordinates)
     notes = (_note(robot, linear, coordinates),)
     return replace(robot, coordinates=coordinates, loops=tuple(kept), notes=(*robot.notes, *notes))
 
 
-def _passive(robot: Mechanism, loops: Sequence[Loop]) -> set[str]:
-    return {robot.joints[i].name for loop in loops for i in loop.passive}
-
-
-def _split(
-    shares: Sequence[tuple[int, float]], offset: float
-) -> tuple[int, float, float, tuple[tuple[int, float], ...]]:
+def _sum(shares: Sequence[tuple[int, float]], offset: float) -> Coordinate:
+    """The coordinate of a joint that follows the sum of several, each with its ratio."""
     (leader, ratio), *others = shares
-    return leader, float(ratio), offset, tuple((k, float(each)) for k, each in others)
-
-
-def _require_followers(
-    robot: Mechanism, named: set[str], found: Mapping[int, Coordinate], source: str
-) -> None:
-    own = {robot.joints[i].name for i in found}
-    if named - own:
-        raise InputError(
-            f"{source}: loops: joint {shown(min(named - own))} cannot follow: found followers {', '.join(sorted(own))}",
-            "name joints of the parallelogram, and leave as many others as it has degrees of freedom",
-        )
+    return Coordinate(leader, float(ratio), offset, tuple((k, float(each)) for k, each in others))
 
 
 def _composed(coordinate: Coordinate, found: Mapping[int, Coordinate]) -> Coordinate:
@@ -140,7 +127,7 @@ def _composed(coordinate: Coordinate, found: Mapping[int, Coordinate]) -> Coordi
         for k, share in target.shares:
             sums[k] = sums.get(k, 0.0) + ratio * share
     shares = [(k, ratio) for k, ratio in sorted(sums.items()) if ratio != 0.0]
-    return Coordinate(*_split(shares, offset)) if shares else Coordinate(None, 1.0, offset)
+    return _sum(shares, offset) if shares else Coordinate(None, 1.0, offset)
 
 
 def _note(robot: Mechanism, loops: Sequence[Loop], coordinates: Sequence[Coordinate]) -> str:
@@ -166,7 +153,7 @@ Placements = tuple[Array, Array]
 
 def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequence[int]) -> Relations | None:
     """The relations between the positions of the loop's joints; None if the loop does not close linearly."""
-    ends = [_path(robot, end) for end in (loop.first, loop.second)]
+    ends = [robot.path_to(end.joint) for end in (loop.first, loop.second)]
     moving = {*ends[0]} ^ {*ends[1]}
     place = {joint: k for k, joint in enumerate(columns)}
     shares = {i: robot.coordinates[i].shares for i in moving}
@@ -209,10 +196,6 @@ def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequenc
         if k == 0:
             return None  # closed and regular at q = 0 of the leaders: this decides how the loop is assembled
     return None
-
-
-def _path(robot: Mechanism, end: NamedFrame) -> tuple[int, ...]:
-    return () if end.joint == BASE else robot.path_to(end.joint)
 
 
 def _placed(

@@ -101,16 +101,12 @@ def _name_of(option: str, what: str) -> Callable[[object], str | None]:
     return checked
 
 
-def _assume_zero(statements: Sequence[str]) -> tuple[str, ...]:
-    if not _are_texts_in_order(statements):
-        raise InputError(f"assume-zero is {shown(statements)}, expected texts", "such as link5:mx")
-    return tuple(statements)
-
-
-def _unknown(links: Sequence[str]) -> tuple[str, ...]:
-    if not _are_texts_in_order(links):
-        raise InputError(f"unknown is {shown(links)}, expected links' names", 'such as ["forearm"], or "all"')
-    return tuple(dict.fromkeys(links))
+def _texts(values: Any, said: str, expected: str, hint: str) -> tuple[str, ...]:
+    """Check a list of texts. One text is refused, as a sequence of others; so are tables and sets, whose order says
+    nothing."""
+    if isinstance(values, str | Mapping | Set | Iterator) or not _all_are_texts(values):
+        raise InputError(f"{said} {shown(values)}, expected {expected}", hint)
+    return tuple(values)
 
 
 def _floating(floating: object) -> bool:
@@ -119,18 +115,16 @@ def _floating(floating: object) -> bool:
     return floating
 
 
-def _frames(frames: Sequence[str]) -> tuple[str, ...]:
-    if not _are_texts_in_order(frames):
-        raise InputError(f"frames are {shown(frames)}, expected links' names", "such as tcp,camera")
-    return _each_once("frame", frames)
-
-
-def _each_once(what: str, given: Sequence[str]) -> tuple[str, ...]:
-    names = tuple(given)
+def _each_once(what: str, names: Sequence[str]) -> None:
     twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
         raise InputError(f"{what} {shown(twice[0])} is named twice", "name each once")
-    return names
+
+
+def _frames(frames: object) -> tuple[str, ...]:
+    found = _texts(frames, "frames are", "links' names", "such as tcp,camera")
+    _each_once("frame", found)
+    return found
 
 
 def parsed_contact(text: str) -> tuple[str, int]:
@@ -146,13 +140,10 @@ def parsed_contact(text: str) -> tuple[str, int]:
     return name, int(rows)
 
 
-def _contacts(contacts: Sequence[str]) -> tuple[str, ...]:
-    if not _are_texts_in_order(contacts):
-        raise InputError(
-            f"contacts are {shown(contacts)}, expected links' names", 'such as ["lf_foot", "rf_foot:6"]'
-        )
-    _each_once("contact", [parsed_contact(text)[0] for text in contacts])
-    return tuple(contacts)
+def _contacts(contacts: object) -> tuple[str, ...]:
+    found = _texts(contacts, "contacts are", "links' names", 'such as ["lf_foot", "rf_foot:6"]')
+    _each_once("contact", [parsed_contact(text)[0] for text in found])
+    return found
 
 
 def _loops(tables: object) -> tuple[Mapping[str, Any], ...]:
@@ -248,11 +239,6 @@ def _xacro_args(given: Mapping[str, object] | None) -> dict[str, str]:
     }
 
 
-def _are_texts_in_order(values: object) -> bool:
-    """Not one text, which is a sequence of others; not a table or a set, which are in no order that means something."""
-    return not isinstance(values, str | Mapping | Set | Iterator) and _all_are_texts(values)
-
-
 def _all_are_texts(values: object) -> bool:
     return isinstance(values, Iterable) and all(isinstance(value, str) for value in values)
 
@@ -312,8 +298,10 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
     "base": _name_of("base", "link"),
     "tip": _name_of("tip", "link"),
     "root": _name_of("root", "body"),
-    "assume_zero": _assume_zero,
-    "unknown": _unknown,
+    "assume_zero": lambda texts: _texts(texts, "assume-zero is", "texts", "such as link5:mx"),
+    "unknown": lambda links: tuple(
+        dict.fromkeys(_texts(links, "unknown is", "links' names", 'such as ["forearm"], or "all"'))
+    ),
     "floating": _floating,
     "drive_inertia": _drive_inertia,
     "gravity": _gravity,

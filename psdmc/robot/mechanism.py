@@ -222,14 +222,16 @@ class Mechanism:
     @property
     def q_names(self) -> tuple[str, ...]:
         """Names of the nq entries of q: the joint's name, or 'joint.x' and so on if the joint has several coordinates."""
-        own = (self.joints[i] for i in self.own_joints)
-        return tuple(name for joint in own for name in _entry_names(joint.name, joint.type.q_names))
+        return tuple(
+            name for joint in self.leading_joints for name in _entry_names(joint.name, joint.type.q_names)
+        )
 
     @property
     def v_names(self) -> tuple[str, ...]:
         """Names of the nv entries of rates, accelerations and torques: the joint's name, or 'joint.vx' and so on."""
-        own = (self.joints[i] for i in self.own_joints)
-        return tuple(name for joint in own for name in _entry_names(joint.name, joint.type.v_names))
+        return tuple(
+            name for joint in self.leading_joints for name in _entry_names(joint.name, joint.type.v_names)
+        )
 
     @property
     def tip_frame(self) -> NamedFrame:
@@ -262,18 +264,17 @@ class Mechanism:
     @property
     def nq(self) -> int:
         """Length of q: the number of coordinates of all joints except mimic joints."""
-        return sum(self.joints[i].type.nq for i in leaders(self.coordinates))
+        return sum(kind.nq for kind in self.own_types)
 
     @property
     def nv(self) -> int:
         """Length of qd, qdd and tau: the number of rates of all joints except mimic joints."""
-        return sum(self.joints[i].type.nv for i in leaders(self.coordinates))
+        return sum(kind.nv for kind in self.own_types)
 
     @property
     def rate_joints(self) -> tuple[int, ...]:
         """Return the index of the joint for each of the nv rates."""
-        own = leaders(self.coordinates)
-        return tuple(i for i in own for _ in range(self.joints[i].type.nv))
+        return tuple(i for i in self.own_joints for _ in range(self.joints[i].type.nv))
 
     @property
     def leaves(self) -> tuple[int, ...]:

@@ -298,9 +298,7 @@ def _limits(joint: Element, kind: str) -> Limits:
     lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))
     if kind in MOVABLE and not URDF_TYPES[kind].about_z:
         return Limits()
-    if kind == "continuous" or not written:
-        return Limits(speed=speed, effort=effort, acceleration=acceleration)
-    if lower > upper:
+    if kind == "continuous" or not written or lower > upper:
         return Limits(speed=speed, effort=effort, acceleration=acceleration)
     return Limits(lower=lower, upper=upper, speed=speed, effort=effort, acceleration=acceleration)
 
