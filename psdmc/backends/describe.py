@@ -41,23 +41,25 @@ _GRAVITY_INPUT = (
 )
 
 
-def frame_lines(info: PackageInfo) -> tuple[str, ...]:
-    """The named frames by number."""
+def axis_lines(info: PackageInfo, signatures: Iterable[Signature], with_frames: bool) -> tuple[str, ...]:
+    """Return lines of text that list the named frames, contacts and closed loops by number. Contacts and loops are left
+    out if no function has arrays over them, and frames unless `with_frames`."""
     numbered = (f"  {i}  {name}" for i, name in enumerate(info.frames))
-    return ("", "Frames, in the order of every array over them:", *numbered)
+    frames = ("", "Frames, in the order of every array over them:", *numbered) if with_frames else ()
+    return (*frames, *(_contact_lines(info) if uses_contacts(signatures) else ()))
 
 
-def contact_lines(info: PackageInfo) -> tuple[str, ...]:
+def _contact_lines(info: PackageInfo) -> tuple[str, ...]:
     """The contacts by number, with their rows, and the closed loops."""
     ends = accumulate(rows for _, rows in info.contacts)
     numbered = (
         f"  {i}  {name}, {'a point' if rows == POINT else 'a surface'}: rows {end - rows} to {end - 1}"
         for i, ((name, rows), end) in enumerate(zip(info.contacts, ends, strict=True))
     )
-    return ("", "Contacts, in the order of every array over them:", *numbered, *loop_lines(info))
+    return ("", "Contacts, in the order of every array over them:", *numbered, *_loop_lines(info))
 
 
-def loop_lines(info: PackageInfo) -> tuple[str, ...]:
+def _loop_lines(info: PackageInfo) -> tuple[str, ...]:
     """The closed loops by number, with their rows; none without loops."""
     if not info.loops:
         return ()

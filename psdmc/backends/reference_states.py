@@ -118,8 +118,9 @@ def reference_states(
         thetas = theta_b * (1.0 + np.arange(len(given["q"])) / STEPS)[:, None]
         own = [made(recipe) for recipe in RECIPES.values() if f"{recipe.name}{THETA_ROWS}" in functions]
         robots_by_rows = [RobotOnArrays.of(model, theta) for theta in thetas]
-        added, values = _by_rows(own, robots_by_rows, given, solvable, friction)
-        given |= {THETAS.name: thetas, **added}
+        values = _by_rows(own, robots_by_rows, given, solvable, friction)
+        tau_rows = f"{TAU.name}{THETA_ROWS}"
+        given |= {THETAS.name: thetas, tau_rows: values.pop(tau_rows)}
         expected |= values
     return ReferenceStates(given, expected, theta_b)
 
@@ -138,7 +139,7 @@ def _by_rows(
     given: Mapping[str, Array],
     solvable: bool,
     friction: FrictionInDynamics | None,
-) -> tuple[dict[str, Array], dict[str, Array]]:
+) -> dict[str, Array]:
     """The torques, and the outputs of the functions' variants by rows, one robot per state."""
     rows = []
     for k, robot in enumerate(robots):
@@ -146,9 +147,7 @@ def _by_rows(
         one[TAU.name] = _motor_torques(robot, one, friction)
         values = _values(recipes, robot, one, THETA_ROWS, solvable)
         rows.append({f"{TAU.name}{THETA_ROWS}": one[TAU.name], **values})
-    whole = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-    label = f"{TAU.name}{THETA_ROWS}"
-    return {label: whole.pop(label)}, whole
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def _drawn(model: DynamicsModel, gravity_input: bool) -> dict[str, Array]:

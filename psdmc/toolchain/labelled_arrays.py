@@ -6,7 +6,7 @@ Both libraries are optional. psdmc imports them only if it gets such an array.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import combinations
+from itertools import chain, combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,31 +74,17 @@ def foreign(
     tails: Sequence[tuple[int, ...]],
     dtype: Any,
 ) -> tuple[Any, ...]:
-    """Return the outputs of a function as xarray arrays if an input is an xarray array, else as Dask arrays.
-
-    tails  shape of each output for one state
-    """
-    if any(_room(given) == "xarray" for given in inputs):
-        return by_names(call, axes, function, inputs)
-    return in_chunks(call, axes, function, tails, inputs, dtype)
-
-
-def in_chunks(
-    call: Call,
-    axes: RobotAxes,
-    function: Signature,
-    tails: Sequence[tuple[int, ...]],
-    inputs: Sequence[Any],
-    dtype: Any,
-) -> tuple[Any, ...]:
-    """Return the outputs as Dask arrays, which are computed chunk by chunk when their values are needed.
+    """Return the outputs of a function as xarray arrays if an input is an xarray array, else as Dask arrays. Dask computes
+    them chunk by chunk when their values are needed.
 
     call    function that computes the outputs for a chunk of the inputs
     tails   shape of each output for one state
 
-    If chunks divide the axes of one state, such as the joints, they are joined. All inputs get equal chunks of states.
-    Raises InputError if the length of an axis differs from that of the robot, or from that of another input.
+    If Dask's chunks divide the axes of one state, such as the joints, they are joined. All inputs get equal chunks of
+    states. Raises InputError if the length of an axis differs from that of the robot, or from that of another input.
     """
+    if any(_room(given) == "xarray" for given in inputs):
+        return _by_names(call, axes, function, inputs)
     import dask.array
 
     da: Any = dask.array  # untyped
@@ -108,7 +94,10 @@ def in_chunks(
     ]
     own = [len(quantity.axes) for quantity in function.inputs]
     _check_leads(function, arrays, own)
-    arrays = _cut_alike(da, [_uncut(array, k) for array, k in zip(arrays, own, strict=True)], own)
+    whole = [  # one chunk along each of the last axes
+        array.rechunk({-k: -1 for k in range(1, count + 1)}) for array, count in zip(arrays, own, strict=True)
+    ]
+    arrays = _cut_alike(da, whole, own)
     ins = ",".join(map(_core, function.inputs))
     outs = ",".join(map(_core, function.outputs))
     made = {
@@ -169,11 +158,6 @@ def _check_leads(function: Signature, arrays: Sequence[Any], own: Sequence[int])
                 )
 
 
-def _uncut(array: Any, axes: int) -> Any:
-    """Rechunk to one chunk along each of the last axes."""
-    return array.rechunk({-k: -1 for k in range(1, axes + 1)})
-
-
 def _cut_alike(da: Any, arrays: Sequence[Any], axes: Sequence[int]) -> list[Any]:
     """The arrays with the same chunks along each of their common axes of states; `axes`: of one state, of each array."""
     labelled: list[Any] = []
@@ -188,10 +172,10 @@ def _core(quantity: Quantity) -> str:
     return f"({','.join(f'd{axis}' for axis in quantity.axes)})"
 
 
-def by_names(
+def _by_names(
     call: Call, axes: RobotAxes, function: Signature, inputs: Sequence[Any]
 ) -> tuple[xr.DataArray, ...]:
-    """Return the outputs as xarray data arrays, whose dimensions have names.
+    """The outputs as xarray data arrays, whose dimensions have names.
 
     The dimension of joints is 'joint', that of matrix columns 'joint_column', and so on. All other dimensions are batch
     axes and broadcast by name. Names of joints and frames become coordinates.
@@ -214,9 +198,7 @@ def by_names(
         *arrays,
         input_core_dims=cores,
         output_core_dims=[list(dimensions(quantity)) for quantity in function.outputs],
-        exclude_dims={
-            name for core in cores for name in core
-        },  # q and rates of a floating base differ in length
+        exclude_dims=set(chain.from_iterable(cores)),  # q and rates of a floating base differ in length
         dask="allowed",
     )
     several = found if isinstance(found, tuple) else (found,)

@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.backends.c.expressions import CReal, c_real, number, numbers
 from psdmc.backends.c.kernel_view import FunctionView, Prototype
-from psdmc.backends.c.make_kernel_view import make_kernel_view
+from psdmc.backends.c.make_kernel_view import undeclared
 from psdmc.backends.info import BodiesMap, EmitOptions, PackageInfo
 from psdmc.program.kernel import Kernel
 from psdmc.robot.mechanism import Array
@@ -163,7 +163,4 @@ class EstimatorView:
 
 def estimator_view(kernel: Kernel, info: PackageInfo, robot: str, options: EmitOptions) -> EstimatorView:
     """Return the estimator of a package. `options` are those of a package without functions for many states."""
-    made = make_kernel_view(kernel, info.sizes, robot, options)
-    return EstimatorView(
-        robot, c_real(options), FunctionView(made.name, kernel.function.meaning, "", kernel.function, (made,))
-    )
+    return EstimatorView(robot, c_real(options), undeclared(kernel, info.sizes, robot, options))

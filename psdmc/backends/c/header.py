@@ -11,7 +11,7 @@ from textwrap import wrap
 from psdmc.backends.c.expressions import number, rounded_out
 from psdmc.backends.c.kernel_view import FunctionView, KernelView, Prototype
 from psdmc.backends.c.render import c_string
-from psdmc.backends.describe import contact_lines, facts, frame_lines, uses_contacts
+from psdmc.backends.describe import axis_lines, facts
 from psdmc.backends.info import EmitOptions, PackageInfo
 from psdmc.program.kernel import THETA_ROWS
 from psdmc.program.signature import Signature
@@ -37,12 +37,7 @@ def description(
     if any(len(function.signature.outputs) > 1 for function in functions):
         lines += ["Several outputs of one call must not overlap each other."]
     lines += [line for function in functions for line in _failure(function.signature, options.target)]
-    touching = uses_contacts(function.signature for function in functions)
-    return (
-        *lines,
-        *(frame_lines(info) if with_frames else ()),
-        *(contact_lines(info) if touching else ()),
-    )
+    return (*lines, *axis_lines(info, (function.signature for function in functions), with_frames))
 
 
 def _friction(info: PackageInfo, functions: Sequence[FunctionView]) -> tuple[str, ...]:

@@ -122,6 +122,12 @@ def function_views(
     return tuple(views)
 
 
+def undeclared(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> FunctionView:
+    """Return a kernel as a function without further variants, which no header declares."""
+    made = make_kernel_view(kernel, sizes, robot, options)
+    return FunctionView(made.name, kernel.function.meaning, "", kernel.function, (made,))
+
+
 def _shape(function: Signature, sizes: Sizes) -> str:
     numbers = [f"{q.name} is a number" for q in function.inputs if not q.axes]
     told = [q for q in function.inputs if len(q.axes) > 1] + list(function.outputs)

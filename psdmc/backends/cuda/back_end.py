@@ -13,7 +13,7 @@ from psdmc.backends.c.make_kernel_view import is_long, sizes_of
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.render import is_reserved, render
 from psdmc.backends.c.self_test import SelfCheck
-from psdmc.backends.describe import contact_lines, facts, frame_lines, option_items, uses_contacts
+from psdmc.backends.describe import axis_lines, facts, option_items
 from psdmc.backends.manifest import manifest
 from psdmc.backends.protocol import BackEnd, Emission
 from psdmc.backends.reference_states import given_name
@@ -221,8 +221,7 @@ def cuda_package(given: Emission) -> CudaPackage:
     description = (
         *facts(given.info, given.options),
         *ARRAYS,
-        *(frame_lines(given.info) if package.uses_frames else ()),
-        *(contact_lines(given.info) if uses_contacts(signatures) else ()),
+        *axis_lines(given.info, signatures, package.uses_frames),
     )
     return CudaPackage(package, description)
 

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 from jinja2 import Environment
 
 from psdmc.backends.describe import (
-    contact_lines,
+    axis_lines,
     facts,
-    frame_lines,
     option_items,
     uses_contacts,
     uses_frames,
@@ -120,18 +119,14 @@ def crate_view(given: Emission) -> CrateView:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one, of links with inertia")
     if given.options.real != "float64":
         raise InputError("the back end rust writes float64 alone", "leave --real out, or use psdmc emit-c")
-    framed = uses_frames(function.signature for function in functions)
+    signatures = [function.signature for function in functions]
+    framed = uses_frames(signatures)
     version = re.match(r"\d+\.\d+\.\d+", info.psdmc_version)
     return CrateView(
         robot,
         info,
         version[0] if version else "0.0.0",
-        (
-            *facts(info, given.options),
-            ARRAYS,
-            *(frame_lines(info) if framed else ()),
-            *(contact_lines(info) if uses_contacts(f.signature for f in functions) else ()),
-        ),
+        (*facts(info, given.options), ARRAYS, *axis_lines(info, signatures, framed)),
         tuple(_function(function, info) for function in functions),
         tuple(_constants(info, functions, framed)),
         tuple(_inputs(given)),

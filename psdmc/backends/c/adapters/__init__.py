@@ -10,8 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from psdmc.backends.c.adapters import casadi, fmu, mex, ros2, wheel
-from psdmc.backends.c.kernel_view import FunctionView
-from psdmc.backends.c.make_kernel_view import make_kernel_view
+from psdmc.backends.c.make_kernel_view import undeclared
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
@@ -89,6 +88,5 @@ def with_own_kernels(package: PackageView, kernels: Mapping[str, Kernel]) -> Pac
     """
     alone = package.alone
     own = casadi.own_kernels(kernels, package.adapters, package.info, package.target.costs)
-    views = [make_kernel_view(kernel, package.info.sizes, package.robot, alone.options) for kernel in own]
-    functions = (FunctionView(one.name, one.function.meaning, "", one.function, (one,)) for one in views)
+    functions = (undeclared(kernel, package.info.sizes, package.robot, alone.options) for kernel in own)
     return replace(package, private=tuple(functions))
