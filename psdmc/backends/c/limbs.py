@@ -1,5 +1,5 @@
 """The code of a function that computes equal limbs (such as legs) at the same time, as data for the templates. Each
-limb is one lane of a SIMD vector. The data include the C vector types."""
+limb is one lane of a SIMD vector."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The SIMD vectors of a package, and the code of sines and cosines on these vectors, as data for the templates."""
+"""The SIMD vectors of a package, and the code of sines and cosines on these vectors, as data for the templates.
+
+A lane of a vector holds one state, one angle of a state, or one limb such as a leg.
+"""
 
 from __future__ import annotations
 
