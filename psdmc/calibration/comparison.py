@@ -65,7 +65,13 @@ def compare(
         raise InputError("psdmc compares models without joints that follow others", "lock those that do")
     second = _like(first, b)
     require_same_robot(first.mechanism, second.mechanism)
-    require_same_base_parameters(first, second)
+    if first.B.shape != second.B.shape or not np.allclose(
+        first.B, second.B, rtol=SAME_PLACE, atol=SAME_PLACE
+    ):
+        raise InputError(
+            f"the models have other base parameters: {first.l} and {second.l}",
+            "derive both with the same --drive-inertia, --assume-zero and --unknown",
+        )
     own, other = _side(_name(a, first), first), _side(_name(b, second), second)
     parameters, chi2, freedom = _parameters(first, own, other)
     progress("torques over the workspace")
@@ -240,15 +246,6 @@ def _places(chain: Mechanism) -> list[tuple[Placement, Placement]]:
     return [(place, place @ joint.link_frame) for place, joint in zip(found, chain.joints, strict=True)]
 
 
-def require_same_base_parameters(a: DynamicsModel, b: DynamicsModel) -> None:
-    """Raise InputError unless two models have equal base parameters: equal matrices B."""
-    if a.B.shape != b.B.shape or not np.allclose(a.B, b.B, rtol=SAME_PLACE, atol=SAME_PLACE):
-        raise InputError(
-            f"the models have other base parameters: {a.l} and {b.l}",
-            "derive both with the same --drive-inertia, --assume-zero and --unknown",
-        )
-
-
 # Differences of torques
 
 
@@ -389,7 +386,11 @@ def errors_on_logs(
     motors = motors_of_logs(names, logs, given if one_quantity(logs) == "current" else None)
     measured, errors = [], []
     for side in (a, b):
-        found = side.found or _without_friction(known, side.model)
+        found = side.found
+        if found is None:  # without friction, and with the filter of the other model
+            law = Prediction(LINEAR, {"all": known.step.used}, sign_speed=1.0)
+            none = {(joint, name): 0.0 for joint in names for term in law.terms for name in term.names}
+            found = Delivered(side.model, law, none, {}, {}, Columns())
         found = replace(found, prediction=replace(found.prediction, steps={"all": known.step.used}))
         parts = [predicted_rows(found, log, known.linear.check, motors) for log in logs]
         measured.append(np.concatenate([part.measured for part in parts]))
@@ -404,10 +405,3 @@ def errors_on_logs(
         )
         for k, joint in enumerate(a.model.mechanism.leading_joints)
     )
-
-
-def _without_friction(known: Delivered, model: DynamicsModel) -> Delivered:
-    """A model that was not calibrated, with the filter of one that was."""
-    law = Prediction(LINEAR, {"all": known.step.used}, sign_speed=1.0)
-    none = {(joint, name): 0.0 for joint in model.v_names for term in law.terms for name in term.names}
-    return Delivered(model, law, none, {}, {}, Columns())

@@ -38,8 +38,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
 from psdmc.model.store import save
 from psdmc.progress import Progress, silent
-from psdmc.report.calibrate_plots import excitation_figure
-from psdmc.report.calibrate_report import require_free_numbers, write_report
+from psdmc.report.calibrate_report import excitation_figure, require_free_numbers, write_report
 from psdmc.robot.mechanism import require_axes
 
 

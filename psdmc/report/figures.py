@@ -23,7 +23,7 @@ from psdmc.model.calibrated import Calibrated, NumberRow, ParameterRow, StepQual
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import terms_latex
 from psdmc.progress import Progress, silent
-from psdmc.report.calibrate_plots import MEASURED, PREDICTED, RESIDUAL, thinned
+from psdmc.report.calibrate_report import MEASURED, PREDICTED, RESIDUAL, thinned
 from psdmc.report.drawing import Figure, document
 from psdmc.robot.limits import shown
 

@@ -16,8 +16,7 @@ from psdmc.calibration.compared import Comparison, Curve
 from psdmc.calibration.validation import JointError, Validation
 from psdmc.calibration.verdict.changes import Change
 from psdmc.files import refuse_foreign_file, write_together
-from psdmc.report.calibrate_plots import MEASURED, PREDICTED, RESIDUAL, panel, step_panels
-from psdmc.report.calibrate_report import FigureView
+from psdmc.report.calibrate_report import MEASURED, PREDICTED, RESIDUAL, FigureView, panel, step_panels
 from psdmc.report.calibrate_tables import number, r_squared, table
 from psdmc.report.drawing import Axes, legend_below
 

@@ -254,24 +254,19 @@ def _poses(chain: Mechanism, q: Array) -> Array:
 
 def write_view(view: Viewed, path: str | Path) -> None:
     """Write the 3D page of a robot. Raise InputError without plotly, or if the path has another file."""
-    script = _plotly()
-    require_own_page(path)
-    write_whole(path, page(view, script))
-
-
-def require_own_page(path: str | Path) -> None:
-    """Raise InputError if the path has a file that `psdmc view` did not write."""
-    refuse_foreign_file(path, MARK, "give another name with -o FILE.html, or move the file")
-
-
-def _plotly() -> str:
     try:
         from plotly.offline import get_plotlyjs
     except ImportError:
         raise InputError(
             "psdmc view draws with plotly, which is not installed", "pip install 'psdmc[view]'"
         ) from None
-    return str(get_plotlyjs())
+    require_own_page(path)
+    write_whole(path, page(view, str(get_plotlyjs())))
+
+
+def require_own_page(path: str | Path) -> None:
+    """Raise InputError if the path has a file that `psdmc view` did not write."""
+    refuse_foreign_file(path, MARK, "give another name with -o FILE.html, or move the file")
 
 
 def page(view: Viewed, script: str) -> str:

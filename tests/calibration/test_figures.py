@@ -25,7 +25,7 @@ from psdmc.errors import InputError
 from psdmc.friction.law import Term
 from psdmc.friction.laws import LAWS
 from psdmc.model.calibrated import NumberRow, Remark, by_joint
-from psdmc.report.calibrate_plots import RESIDUAL, excitation_figure
+from psdmc.report.calibrate_report import RESIDUAL, excitation_figure
 from psdmc.report.drawing import document
 from psdmc.report.figures import (
     MARK,

@@ -205,12 +205,20 @@ def delays_of(
 
 
 def _columns(regressor: Regressor, log: Shifted, coupling: Coupling | None) -> Array:
-    """(N, n, l + 3 n) of base parameters, Coulomb and viscous friction and offsets, the motors' friction on the joints."""
-    rigid = regressor.regressor(log.q, log.qd, log.qdd)
-    n = log.q.shape[1]
+    return with_friction(regressor.regressor(log.q, log.qd, log.qdd), log.sign, log.speed, coupling)
+
+
+def with_friction(rigid: Array, sign: Array, speed: Array, coupling: Coupling | None) -> Array:
+    """Return columns (N, n, l + 3 n) of base parameters, Coulomb and viscous friction and offsets of n joints. If motors
+    drive several joints together, friction is that of the motors, as it acts on the joints.
+
+    rigid        (N, n, l) columns of base parameters
+    sign, speed  (N, n) smooth sign of the motors' speed, and this speed
+    """
+    n = rigid.shape[1]
     onto = np.eye(n) if coupling is None else coupling.inverse
-    rubbing = [np.einsum("tk,kj->tjk", part, onto) for part in (log.sign, log.speed)]
-    constant = np.broadcast_to(np.eye(n), (len(log.q), n, n))
+    rubbing = [np.einsum("tk,kj->tjk", part, onto) for part in (sign, speed)]
+    constant = np.broadcast_to(np.eye(n), (len(rigid), n, n))
     return np.concatenate([rigid, *rubbing, constant], axis=2)
 
 

@@ -19,7 +19,7 @@ from scipy import stats
 from scipy.linalg import lapack
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.verdict.effort_checks import CLUSTERS, RANK_TOLERANCE, clustered
+from psdmc.calibration.verdict.effort_checks import CLUSTERS, RANK_TOLERANCE, clustered, with_friction
 from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.errors import InputError
 from psdmc.model import evaluate
@@ -262,12 +262,9 @@ def effort_scale(
 
 def _design(evidence: Evidence) -> Array:
     """(N, n, l + 3 n) of base parameters, and Coulomb and viscous friction and offset of each joint (of its motor)."""
-    n, coupling = evidence.n, evidence.coupling
-    onto = np.eye(n) if coupling is None else coupling.inverse
+    coupling = evidence.coupling
     speed = evidence.qd if coupling is None else coupling.to_motors(evidence.qd)
-    rubbing = [np.einsum("tk,kj->tjk", part, onto) for part in (evidence.sign, speed)]
-    constant = np.broadcast_to(np.eye(n), (len(evidence), n, n))
-    return np.concatenate([evidence.columns(), *rubbing, constant], axis=2)
+    return with_friction(evidence.columns(), evidence.sign, speed, coupling)
 
 
 def _hypotheses(
