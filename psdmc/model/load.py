@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from psdmc.errors import InputError
 from psdmc.files import read_file
-from psdmc.model import json_values
 from psdmc.model.calibrated import Calibrated
 from psdmc.model.calibrated_json import from_json
 from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
+from psdmc.model.json_values import entries, flag, number, numbers, part, record, text
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 from psdmc.robot.inertia import leading_rows
 from psdmc.robot.load_options import LoadOptions
@@ -36,7 +36,7 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 
 def _with_calibration(manifest: dict[str, Any]) -> dict[str, Any]:
     """The manifest with the calibration beside the provenance, which psdmc 0.2 kept it in."""
-    provenance = json_values.record(manifest.get("provenance", {}), "the provenance")
+    provenance = record(manifest.get("provenance", {}), "the provenance")
     rest = {name: value for name, value in provenance.items() if name != "calibration"}
     found = {"calibration": provenance["calibration"]} if "calibration" in provenance else {}
     return {**manifest, "provenance": rest, **found, "schema": 3}
@@ -282,13 +282,11 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
     """Return the model from the arrays and the manifest (a JSON text) of a file. Raises ValueError that says which part
     is wrong, what was found and what was expected."""
     _check_kinds(arrays)
-    chain = chain_from_json(json_values.part(manifest, "chain", "the manifest"))
+    chain = chain_from_json(part(manifest, "chain", "the manifest"))
     l = arrays["B"].shape[0]
-    is_expanded = json_values.flag(json_values.part(manifest, "expanded", "the manifest"), "'expanded'")
-    is_known = json_values.flag(
-        json_values.part(manifest, "theta_b_known", "the manifest"), "'theta_b_known'"
-    )
-    certificate = json_values.part(manifest, "certificate", "the manifest")
+    is_expanded = flag(part(manifest, "expanded", "the manifest"), "'expanded'")
+    is_known = flag(part(manifest, "theta_b_known", "the manifest"), "'theta_b_known'")
+    certificate = part(manifest, "certificate", "the manifest")
     _check_base_parameters(arrays, chain, l, is_known)
     if is_expanded and not all(kind.about_z for kind in chain.types):
         raise ValueError("E and P are of joints of one coordinate, and a joint has several")
@@ -297,8 +295,8 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
         theta_b=arrays["theta_b"] if is_known else None,
         B=arrays["B"],
         mechanism=chain,
-        certificate=json_values.numbers(certificate, "the certificate", chain.nv),
-        provenance=_provenance(json_values.part(manifest, "provenance", "the manifest"), chain),
+        certificate=numbers(certificate, "the certificate", chain.nv),
+        provenance=_provenance(part(manifest, "provenance", "the manifest"), chain),
         calibrated=_calibrated(manifest, chain),
     )
 
@@ -360,21 +358,19 @@ def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
 
 def _provenance(value: object, chain: Mechanism) -> dict[str, Any]:
     """The model's origin, checked as far as psdmc reads it again."""
-    found = json_values.record(value, "the provenance")
+    found = record(value, "the provenance")
     for name in ("source_text", "source_sha256", "source_name"):
         if found.get(name) is not None:
-            json_values.text(found[name], f"the provenance's {name}")
+            text(found[name], f"the provenance's {name}")
     if found.get("source_format", "urdf") not in ("urdf", "dh"):
         raise ValueError("the provenance's source_format is neither urdf nor dh")
     if "options" in found:
-        _check_options(json_values.record(found["options"], "the provenance's options"), chain)
-    for snap in json_values.entries(found.get("snapped", []), "the provenance's snapped", MOST_ROWS):
-        json_values.text(json_values.part(snap, "where", "a snapped rotation"), "a snapped rotation's place")
-        json_values.number(
-            json_values.part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle"
-        )
+        _check_options(record(found["options"], "the provenance's options"), chain)
+    for snap in entries(found.get("snapped", []), "the provenance's snapped", MOST_ROWS):
+        text(part(snap, "where", "a snapped rotation"), "a snapped rotation's place")
+        number(part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle")
     if found.get("snap_torque_change") is not None:
-        json_values.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", chain.nv)
+        numbers(found["snap_torque_change"], "the provenance's snap_torque_change", chain.nv)
     return found
 
 
@@ -385,24 +381,24 @@ def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
         raise ValueError(f"the provenance has an option '{foreign[0]}'")
     for name in ("base", "tip", "root"):
         if options.get(name) is not None:
-            json_values.text(options[name], f"the option {name}")
+            text(options[name], f"the option {name}")
     if options.get("gravity") is not None:
-        json_values.numbers(options["gravity"], "the option gravity", 3)
+        numbers(options["gravity"], "the option gravity", 3)
     if not isinstance(options.get("drive_inertia", False), bool):
         driven = sum(kind.about_z for kind in chain.types)
-        json_values.numbers(options["drive_inertia"], "the option drive_inertia", driven)
-    for statement in json_values.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
-        json_values.text(statement, "an entry of the option assume_zero")
-    json_values.number(options.get("snap", 0.0), "the option snap")
-    for table in json_values.entries(options.get("loops", []), "the option loops", MOST_ROWS):
-        json_values.record(table, "an entry of the option loops")
+        numbers(options["drive_inertia"], "the option drive_inertia", driven)
+    for statement in entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
+        text(statement, "an entry of the option assume_zero")
+    number(options.get("snap", 0.0), "the option snap")
+    for table in entries(options.get("loops", []), "the option loops", MOST_ROWS):
+        record(table, "an entry of the option loops")
     for option in ("frames", "contacts"):
-        for name in json_values.entries(options.get(option, []), f"the option {option}", MOST_ROWS):
-            json_values.text(name, f"the option {option}")
-    for value in json_values.record(options.get("lock", {}), "the option lock").values():
-        json_values.number(value, "an entry of the option lock")
-    for text in json_values.record(options.get("xacro_args", {}), "the option xacro_args").values():
-        json_values.text(text, "an entry of the option xacro_args")
-    json_values.flag(options.get("floating", False), "the option floating")
+        for name in entries(options.get(option, []), f"the option {option}", MOST_ROWS):
+            text(name, f"the option {option}")
+    for value in record(options.get("lock", {}), "the option lock").values():
+        number(value, "an entry of the option lock")
+    for value in record(options.get("xacro_args", {}), "the option xacro_args").values():
+        text(value, "an entry of the option xacro_args")
+    flag(options.get("floating", False), "the option floating")
     if options.get("tool") is not None:
-        json_values.numbers(options["tool"], "the option tool", 6)
+        numbers(options["tool"], "the option tool", 6)
