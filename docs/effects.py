@@ -34,12 +34,11 @@ from psdmc.lower.reframe import reframe
 from psdmc.lower.search import Search, all_feet
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import SINGLE, cost
-from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.passes.fuse_sums import cycles, fuse_sums
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import LAST, LONGEST, ROUND, Pass, optimize
 from psdmc.program.program import Op, Program, Slot
-from psdmc.program.slopes import TurnedPairs
+from psdmc.program.slopes import Block, TurnedPairs, jacobians
 from psdmc.program.trace import Tracer
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.presets import COSTS

@@ -21,9 +21,9 @@ from psdmc.friction.joints import Friction, ordered
 from psdmc.friction.law import At, Term
 from psdmc.friction.laws import LAWS
 from psdmc.friction.terms import STATE_LAW, named, options_of, state_programs
-from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Program, Slot
+from psdmc.program.slopes import Block, jacobians
 from psdmc.program.trace import Tracer
 from psdmc.toolchain.compiler_command import find_compiler
 

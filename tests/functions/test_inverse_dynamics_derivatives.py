@@ -7,9 +7,9 @@ import pytest
 from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 
 from psdmc.lower.kernels import lower
-from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Op
+from psdmc.program.slopes import Block, jacobians
 
 NAMES = ("dtau_dq", "dtau_dqd", "dtau_dqdd")
 

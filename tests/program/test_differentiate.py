@@ -7,9 +7,9 @@ import pytest
 from fifty_digits import fifty_digit_jacobian
 
 from psdmc.program.cost import cost
-from psdmc.program.differentiate import Block, jacobians, jvp, vjp
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Program, check
+from psdmc.program.slopes import Block, jacobians, jvp, vjp
 from psdmc.program.text import parse, show
 
 QUOTIENT = parse("""

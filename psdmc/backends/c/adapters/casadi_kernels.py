@@ -14,12 +14,12 @@ from itertools import product
 from math import prod
 
 from psdmc.backends.info import PackageInfo
-from psdmc.program.differentiate import Block, jacobians, vjp
 from psdmc.program.interpret import Value, replayed
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature, Sizes
+from psdmc.program.slopes import Block, jacobians, vjp
 from psdmc.program.trace import Tracer
 from psdmc.target.target import Costs
 
