@@ -229,16 +229,13 @@ class LimbSearch:
         if kept is None:
             return -math.inf
         try:
-            before, behind = (self._weight_of_part(each, groups, kept) for each in (found, candidate))
+            before, behind = (
+                self._weight(*branches.part(each, kept), limbs_in(groups, kept))
+                for each in (found, candidate)
+            )
         except SingularMatrix:  # what the branches hang on has its inertia from others
             return -math.inf
         return best.weight - before + behind
-
-    def _weight_of_part(
-        self, arrangement: Arrangement, groups: tuple[Limbs, ...], kept: tuple[int, ...]
-    ) -> float:
-        part, robot = self.search.branches.part(arrangement, kept)
-        return self._weight(part, robot, limbs_in(groups, kept))
 
     def _ordered(self, traced: TracedLimbs) -> LimbProgram:
         short = shortened(traced.program, self.search.has_many_joints)

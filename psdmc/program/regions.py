@@ -101,9 +101,7 @@ def drop_unread(body: Regions) -> Regions:
     Keeps: outputs, bit for bit.
     """
     while True:
-        read: set[str] = set()
-        _collect_read(body.regions, {}, read)
-        kept = read.union(_called(body.regions))
+        kept = _touched(body.regions, _read_by, {}) | _called(body.regions)
         dead = frozenset(body.arrays) - kept
         regions = _without(body.regions, dead)
         if regions == body.regions:
@@ -113,21 +111,32 @@ def drop_unread(body: Regions) -> Regions:
     return replace(body, arrays=arrays)
 
 
-def _collect_read(regions: Sequence[Region], roots: Mapping[str, str], read: set[str]) -> None:
-    """Adds the arrays that regions read; `roots` are those that slices are parts of."""
+Touch = Callable[[Straight | Call], list[str]]
+"""Names the arrays and slices that a region reads, or writes."""
+
+
+def _touched(regions: Sequence[Region], touch: Touch, roots: Mapping[str, str]) -> set[str]:
+    """Return the arrays that regions read, or write; `roots` are those that slices are parts of."""
+    found: set[str] = set()
     for region in regions:
         if isinstance(region, For):
             inner = {each.name: roots.get(each.array, each.array) for each in region.slices}
-            _collect_read(region.regions, {**roots, **inner}, read)
+            found |= _touched(region.regions, touch, {**roots, **inner})
         else:
-            names = _read_by(region)
-            read.update(roots.get(name, name) for name in names)
+            found.update(roots.get(name, name) for name in touch(region))
+    return found
 
 
 def _read_by(region: Straight | Call) -> list[str]:
     if isinstance(region, Straight):
         return [slot.vector for slot in region.program.inputs()]
     return [name for name, _ in region.given]
+
+
+def _written_by(region: Straight | Call) -> list[str]:
+    if isinstance(region, Straight):
+        return [slot.vector for slot, _ in region.program.outputs]
+    return [name for name, _ in region.found]
 
 
 def read_late(body: Regions, inputs: Sequence[str], outputs: Sequence[str], theta: str) -> tuple[str, ...]:
@@ -138,26 +147,12 @@ def read_late(body: Regions, inputs: Sequence[str], outputs: Sequence[str], thet
     """
     written, late = False, set[str]()
     for region in body.regions:
-        read, found = set[str](), set[str]()
-        _collect_read((region,), {}, read)
-        _collect_written((region,), {}, found)
+        read, found = (_touched((region,), touch, {}) for touch in (_read_by, _written_by))
         is_loop = isinstance(region, For)
         if written or (is_loop and found.intersection(outputs)):
             late |= read | ({theta} if _called((region,)) else set())
         written = written or bool(found.intersection(outputs))
     return tuple(name for name in inputs if name in late)
-
-
-def _collect_written(regions: Sequence[Region], roots: Mapping[str, str], written: set[str]) -> None:
-    """Adds the arrays that regions write; `roots` are those that slices are parts of."""
-    for region in regions:
-        if isinstance(region, For):
-            inner = {each.name: roots.get(each.array, each.array) for each in region.slices}
-            _collect_written(region.regions, {**roots, **inner}, written)
-        elif isinstance(region, Call):
-            written.update(roots.get(name, name) for name, _ in region.found)
-        else:
-            written.update(roots.get(slot.vector, slot.vector) for slot, _ in region.program.outputs)
 
 
 def _called(regions: Sequence[Region]) -> set[str]:
@@ -201,11 +196,7 @@ def _named(regions: Sequence[Region]) -> set[str]:
         if isinstance(region, For):
             found |= _named(region.regions) | {each.array for each in region.slices}
         else:
-            found.update(_read_by(region))
-            if isinstance(region, Straight):
-                found.update(slot.vector for slot, _ in region.program.outputs)
-            else:
-                found.update(name for name, _ in region.found)
+            found.update((*_read_by(region), *_written_by(region)))
     return found
 
 

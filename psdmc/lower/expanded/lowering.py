@@ -3,7 +3,7 @@ polynomials (PSDM-2021, section 4.1)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from psdmc.lower.expanded.diagram import (
     NOTHING,
     ONE,
     Diagram,
-    Level,
     nested_horner,
     operations,
     with_constants,
@@ -87,7 +86,8 @@ def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool, noise: float
         yield from _in_all_orders(symbolic, base_first(n))
         return
     values = dict(enumerate(known_parameters(model).tolist(), start=BLOCKS * n))
-    present = _without_zero_rows(symbolic, values)
+    zero = [row for row, value in values.items() if value == 0.0]
+    present = symbolic.where(np.asarray(~symbolic.exponents[zero].any(axis=0)))
     yield from (with_constants(diagram, values) for diagram in _in_all_orders(present, base_first(n)))
     baked = _part(part, with_gravity(baked_torque_terms(model, noise), model.mechanism), n)
     yield from _in_all_orders(baked, base_first(n))
@@ -95,12 +95,6 @@ def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool, noise: float
 
 def _in_all_orders(terms: Terms, joints: Joints) -> Iterator[Diagram]:
     return (nested_horner(terms, order) for order in candidates(joints, len(terms.exponents)))
-
-
-def _without_zero_rows(terms: Terms, values: Mapping[int, float]) -> Terms:
-    """The terms whose parameter is not zero."""
-    zero = [row for row, value in values.items() if value == 0.0]
-    return terms.where(np.asarray(~terms.exponents[zero].any(axis=0)))
 
 
 def _part(part: Polynomials, torque: Terms, n: int) -> Terms:
@@ -179,16 +173,13 @@ def candidates(joints: Joints, rows: int) -> Iterator[Order]:
     for blocks in TRIGONOMETRY:
         position = _by_joint(joints, blocks, n)
         for rates in (joints[::-1], joints):
-            yield _by_block(rates, (4, 3), n) + position + parameters
+            motion = tuple(block * n + joint for block in (4, 3) for joint in rates)
+            yield motion + position + parameters
         yield _by_joint(joints, (4, 3, *blocks), n) + parameters
 
 
 def _by_joint(joints: Sequence[int], blocks: Sequence[int], n: int) -> Order:
     return tuple(block * n + joint for joint in joints for block in blocks)
-
-
-def _by_block(joints: Sequence[int], blocks: Sequence[int], n: int) -> Order:
-    return tuple(block * n + joint for block in blocks for joint in joints)
 
 
 def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
@@ -209,20 +200,16 @@ def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Sca
     """Return the value of each polynomial of the diagram by its number, from the values of the variables (rows)."""
     nodes: dict[int, Scalar] = {NOTHING: 0.0, ONE: 1.0}
     for level in diagram.levels:
-        _compute_level(nodes, level, rows[level.row])
+        row, parts = rows[level.row], zip(level.child.tolist(), level.ratio.tolist(), strict=True)
+        for number, (child, ratio) in enumerate(parts, start=level.first):
+            scaled = [None if c == NOTHING else nodes[c] * r for c, r in zip(child, ratio, strict=True)]
+            nodes[number] = _horner(scaled, row)
     return {
         output: nodes[root] * factor
         for output, root, factor in zip(
             diagram.output.tolist(), diagram.root.tolist(), diagram.factor.tolist(), strict=True
         )
     }
-
-
-def _compute_level(nodes: dict[int, Scalar], level: Level, row: Scalar) -> None:
-    parts = zip(level.child.tolist(), level.ratio.tolist(), strict=True)
-    for number, (child, ratio) in enumerate(parts, start=level.first):
-        scaled = [None if c == NOTHING else nodes[c] * r for c, r in zip(child, ratio, strict=True)]
-        nodes[number] = _horner(scaled, row)
 
 
 def _horner(parts: Sequence[Scalar | None], row: Scalar) -> Scalar:
