@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from psdmc import processes
+from psdmc import workers
 from psdmc.errors import ToolchainError
 from psdmc.workers import in_a_new_process, in_processes
 
@@ -69,7 +69,7 @@ def test_ctrl_c_while_processes_start_is_heard_behind(threads: int):
         other.start()
 
     def starts() -> None:
-        with processes._deaf_to_interrupts():
+        with workers._deaf_to_interrupts():
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.2)
             reached.append("the end of the block")
