@@ -1,11 +1,13 @@
-"""Programs that tests need and a machine may lack; and how to run one that must succeed."""
+"""Programs and robots that tests need and a machine may lack; and how to run a program that must succeed."""
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 import shutil
 import subprocess
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -33,3 +35,15 @@ def run(*words: object, **environment: str) -> str:
     )
     assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     return done.stdout
+
+
+def in_wheel(ending: str) -> Path:
+    """The file of the wheel example-robot-data whose path ends so, as in `ur10_robot.urdf`. Skip the test without it."""
+    try:
+        wheel = importlib.metadata.distribution("example-robot-data")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed")
+    found = sorted(str(file) for file in wheel.files or () if f"/{file}".endswith(f"/{ending}"))
+    if not found:
+        pytest.skip(f"this example-robot-data has no {ending}")
+    return Path(str(wheel.locate_file(found[0])))

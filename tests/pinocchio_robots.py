@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import pinocchio as pin
-import pytest
+from installed import in_wheel
 
 from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION
 from psdmc.robot.mechanism import BASE, PARAMETERS_PER_LINK, Joint, Mechanism, Placement
@@ -70,12 +69,7 @@ class PinocchioRobot:
 
 
 def path_of(name: str) -> str:
-    try:
-        wheel = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-    ends = f"robots/{FILES[name]}"
-    return str(wheel.locate_file(next(p for p in wheel.files or () if str(p).endswith(ends))))
+    return str(in_wheel(f"robots/{FILES[name]}"))
 
 
 @cache

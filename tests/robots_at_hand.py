@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
-import pytest
 from bundled import ROBOTS, robot_path
+from installed import in_wheel
 from random_chains import Oracle, random_chain
 
 from psdmc.derivation.derive import derive_model, provenance_of
@@ -68,11 +66,3 @@ def drawn(seed: int, kinds: str, *, tidy: bool = False, expand: bool = True) -> 
     chain = random_chain(seed, kinds, tidy=tidy, gravity=(1.0, -2.0, -9.0))
     label = f"{kinds}, seed {seed}{', tidy' if tidy else ''}"
     return Subject(label, derive_model(chain, expand=expand), Reference(Oracle(chain).model, "tip"))
-
-
-def in_wheel(file: str) -> Path:
-    try:
-        wheel = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-    return Path(str(wheel.locate_file(next(path for path in wheel.files or () if path.name == file))))

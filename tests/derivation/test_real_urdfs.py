@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import metadata
-from pathlib import Path
-
 import numpy as np
 import pytest
+from installed import in_wheel
 from random_chains import relative_error
 
 from psdmc.derivation.derive import derive_model
@@ -23,22 +21,10 @@ REAL = {
 """File, tip, l."""
 
 
-def wheel_file(name: str) -> Path:
-    try:
-        wheel = metadata.distribution("example-robot-data")
-    except metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-    inside = f"share/example-robot-data/robots/{name}"
-    found = [wheel.locate_file(file) for file in wheel.files or () if str(file).endswith(inside)]
-    if not found:
-        pytest.skip(f"this example-robot-data has no {name}")
-    return Path(str(found[0]))
-
-
 @pytest.mark.parametrize("name", REAL)
 def test_real_robot(name: str) -> None:
     file, tip, l = REAL[name]
-    loaded = load_robot(wheel_file(file), tip=tip)
+    loaded = load_robot(in_wheel(file), tip=tip)
     model, robot = derive_model(loaded.chain), reference(loaded)
     assert model.l == l
     assert model.certificate.max() < 1e-12

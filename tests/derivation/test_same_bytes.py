@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from bundled import bundled_model, robot_path
-from robots_at_hand import in_wheel
+from installed import in_wheel
 from slow_cases import slow_but_for
 
 import psdmc

@@ -3,15 +3,13 @@ too, and the file's numbers in extended precision."""
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-import pytest
 from extended_tree import ROOT_V, ExtendedTree
+from installed import in_wheel
 
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot
@@ -45,15 +43,6 @@ FIGURES = ("rnea", "nle", "gravity", "M", "kinetic", "potential", "cmm")
 Array = np.ndarray
 
 
-def path_of(name: str) -> Path:
-    try:
-        wheel = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-    found = sorted(str(file) for file in wheel.files or () if file.name == name)
-    return Path(str(wheel.locate_file(found[0])))
-
-
 class RealTree:
     """One robot, none of its rotations snapped: exactly the file's.
 
@@ -62,7 +51,7 @@ class RealTree:
     """
 
     def __init__(self, name: str, is_floating: bool = False) -> None:
-        self.loaded: LoadedRobot = load_robot(path_of(name), snap=0.0, floating=is_floating)
+        self.loaded: LoadedRobot = load_robot(in_wheel(name), snap=0.0, floating=is_floating)
         text = self.loaded.source_text.replace('type="continuous"', 'type="revolute"')
         root = [pin.JointModelFreeFlyer()] if is_floating else []
         self.oracle = pin.buildModelFromXML(text, *root, mimic=True)

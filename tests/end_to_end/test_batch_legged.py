@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.util
 import re
 import subprocess
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from installed import in_wheel
 from unoptimised import without_optimisation
 
 from psdmc.compiler import derive, emit_c
@@ -22,10 +22,7 @@ STATES = 4096
 
 @pytest.fixture(scope="module", autouse=True)
 def from_python():
-    try:
-        importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
+    in_wheel("solo12.urdf")
     spec = importlib.util.spec_from_file_location("from_python", EXAMPLE / "from_python.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

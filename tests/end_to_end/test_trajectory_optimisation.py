@@ -11,8 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot
-from installed import need
-from robots_at_hand import in_wheel
+from installed import in_wheel, need
 from unoptimised import without_optimisation
 
 from psdmc.compiler import emit_c

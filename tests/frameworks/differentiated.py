@@ -10,7 +10,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pinocchio as pin
 from bundled import under_gravity
-from robots_at_hand import in_wheel, loaded
+from installed import in_wheel
+from robots_at_hand import loaded
 
 from psdmc.derivation.derive import derive_model
 from psdmc.frameworks.differentiation import rule_of

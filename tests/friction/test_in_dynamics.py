@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
 from command_line import status
+from friction_logs import NOISE, friction_log
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 from urdf_text import LIMIT, inertial, joint, link, urdf
 
 import psdmc
-from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.errors import InputError
 from psdmc.friction.law import Law, Value, cos, sin
@@ -344,37 +344,24 @@ def test_derivatives_at_rest_are_numbers_and_the_slope_of_the_law() -> None:
 
 def test_a_log_s_residual_is_its_noise(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A log of Pinocchio's torques with friction and a ripple is calibrated; the C of the result predicts another log."""
-    model, noise, truth = (
-        bundled_model("two_link_full"),
-        0.05,
-        np.array([[3.0, 1.5], [0.8, 0.3], [0.9, -0.35]]),
-    )
-    logs = []
-    for seed in (3, 4):
-        rng = np.random.default_rng(seed)
-        time = np.arange(0.0, 30.0, 0.005)
-        rates, starts = rng.uniform(1.0, 5.0, (5, 2)), rng.uniform(0.0, 6.0, (5, 2))
-        turning = np.einsum("t,kj->tkj", time, rates) + starts
-        q, qd = 0.22 * np.sin(turning).sum(axis=1), 0.22 * (rates * np.cos(turning)).sum(axis=1)
-        qdd = -0.22 * (rates**2 * np.sin(turning)).sum(axis=1)
-        torque = reference(bundled_robot("two_link_full")).inverse_dynamics(q, qd, qdd)
-        torque += np.tanh(qd / SIGN_SPEED) * (truth[0] + truth[1] * np.abs(qd)) + truth[2] * np.sin(5.0 * q)
-        torque += rng.normal(scale=noise, size=torque.shape)
-        logs.append((q, qd, qdd, torque))
-        write_log(
-            Log("log", model.joint_names, time, q, qd, torque, "motor_torque"), tmp_path / f"{seed}.csv"
-        )
-    model.save(tmp_path / "arm.npz")
+    truth = np.array([[3.0, 1.5], [0.8, 0.3], [0.9, -0.35]])
+
+    def friction(q: Array, qd: Array) -> Array:
+        return np.tanh(qd / SIGN_SPEED) * (truth[0] + truth[1] * np.abs(qd)) + truth[2] * np.sin(5.0 * q)
+
+    (log, _), (other, qdd) = (friction_log(seed, 30.0, friction) for seed in (3, 4))
+    write_log(log, tmp_path / "3.csv")
+    bundled_model("two_link_full").save(tmp_path / "arm.npz")
     shutil.copy(EXAMPLE, tmp_path)
     (tmp_path / "log.toml").write_text('friction = "ripple.py"\n[[log]]\nfile = "3.csv"\n', encoding="utf-8")
     found = tmp_path / "found.npz"
     assert status("calibrate", tmp_path / "arm.npz", tmp_path / "log.toml", "-o", found) == 0
     robot = psdmc.compile(found, friction=True, functions=["inverse_dynamics", "forward_dynamics"])
-    *states, torque = logs[1]
+    states, torque = (other.position, other.velocity, qdd), other.effort
     residual = robot.inverse_dynamics(*states) - torque
-    assert np.sqrt((residual**2).mean(axis=0)) == pytest.approx(noise, rel=0.05)
+    assert np.sqrt((residual**2).mean(axis=0)) == pytest.approx(NOISE, rel=0.05)
     without = psdmc.compile(found, functions=["inverse_dynamics"]).inverse_dynamics(*states) - torque
-    assert np.sqrt((without**2).mean(axis=0)).min() > 10.0 * noise
+    assert np.sqrt((without**2).mean(axis=0)).min() > 10.0 * NOISE
     back = robot.forward_dynamics(*states[:2], robot.inverse_dynamics(*states))
     assert np.allclose(back, states[2], rtol=1e-10, atol=1e-10)
 

@@ -11,7 +11,7 @@ import pytest
 from against_pinocchio import EVERY, matches_pinocchio
 from contact_trees import BRICK, FUNCTIONS, ContactTree, brick, contact_tree, floating_gripper
 from direct import Direct
-from robots_at_hand import in_wheel
+from installed import in_wheel
 from slow_cases import slow_but_for
 from unoptimised import compiled
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 from against_pinocchio import INTERPRETED, SEVERAL, matches_pinocchio, program_matches_pinocchio
 from contact_trees import BRICK, brick, contact_tree
-from robots_at_hand import in_wheel
+from installed import in_wheel
 from slopes_of import are_slopes
 from test_constrained_forward_dynamics import constraints
 from wide_robots import is_pinocchios

@@ -10,7 +10,7 @@ from against_pinocchio import INTERPRETED, SEVERAL, matches_pinocchio, program_m
 from bundled import robot_path
 from contact_trees import BRICK, brick, contact_tree
 from direct import Direct
-from robots_at_hand import in_wheel
+from installed import in_wheel
 from scipy.integrate import solve_ivp
 from unoptimised import compiled, without_optimisation
 from wide_robots import is_pinocchios

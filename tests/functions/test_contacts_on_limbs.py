@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from direct import Direct
-from robots_at_hand import in_wheel
+from installed import in_wheel
 from slow_cases import slow_but_for
 from unoptimised import compiled
 

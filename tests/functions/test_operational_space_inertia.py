@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from direct import Direct, write_sources
-from installed import need
+from installed import in_wheel, need
 from mimic_trees import as_urdf
 from random_trees import TREES, RandomTree
-from robots_at_hand import drawn, in_wheel, subject
+from robots_at_hand import drawn, subject
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 from wide_robots import WideRobot, wide_robot

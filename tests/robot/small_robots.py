@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from pathlib import Path
 
 import numpy as np
-import pytest
 from urdf_text import urdf
 
 from psdmc.dynamics.frames import base_acceleration, frames_of
@@ -32,16 +30,6 @@ def dh(*rows: str, convention: str = "standard") -> str:
 def load_dh(*rows: str, convention: str = "standard", **options: object) -> LoadedRobot:
     text = dh(*rows, convention=convention)
     return load_robot_text(text, "dh", source_name="arm.toml", **options)  # type: ignore[arg-type]
-
-
-def robot_data(name: str) -> Path:
-    """Path of a URDF in the example-robot-data wheel."""
-    try:
-        wheel = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-    found = [file for file in wheel.files or () if file.name == name]
-    return Path(str(wheel.locate_file(found[0])))
 
 
 def torques(chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Array:

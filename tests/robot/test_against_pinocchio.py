@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import EXAMPLES, largest_difference, load_dh, load_urdf, robot_data
+from installed import in_wheel
+from small_robots import EXAMPLES, largest_difference, load_dh, load_urdf
 from urdf_text import joint, link
 
 from psdmc.dynamics.composite_body import mass_matrix
@@ -41,7 +42,7 @@ def test_bundled_robots(file):
 
 @pytest.mark.parametrize(("file", "joints"), FOREIGN.items())
 def test_robots_of_other_people(file, joints):
-    loaded = load_robot(robot_data(file))
+    loaded = load_robot(in_wheel(file))
 
     assert len(loaded.chain) == joints
     assert largest_difference(loaded, snapped=True) < TOLERANCE
@@ -170,7 +171,7 @@ def matrix(placement):
 
 @pytest.mark.parametrize("snapped", [True, False])
 def test_mass_matrix_and_jacobian(snapped):
-    loaded = load_robot(robot_data("quadruped.urdf"), snap=1e-5 if snapped else 0.0, drive_inertia=[0.1] * 8)
+    loaded = load_robot(in_wheel("quadruped.urdf"), snap=1e-5 if snapped else 0.0, drive_inertia=[0.1] * 8)
     chain, oracle = loaded.chain, reference(loaded, snapped=snapped)
     q = np.random.default_rng(3).normal(size=8)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from small_robots import load_dh, load_urdf, robot_data
+from installed import in_wheel
+from small_robots import load_dh, load_urdf
 from urdf_text import INERTIAL, joint, link
 
 from psdmc.errors import InputError
@@ -191,7 +192,7 @@ def test_one_of_two_arms_needs_a_tip():
 
 
 def test_an_arm_of_a_dual_arm_robot_of_the_wheel_needs_a_tip():
-    error = refused(lambda path: load_robot(path, base="base"), robot_data("baxter.urdf"))
+    error = refused(lambda path: load_robot(path, base="base"), in_wheel("baxter.urdf"))
     assert "several chains end in" in error.message
 
 

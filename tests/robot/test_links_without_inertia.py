@@ -10,7 +10,7 @@ import re
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import robot_data
+from installed import in_wheel
 from urdf_text import joint, link, urdf
 
 from psdmc.derivation.derive import derive_model
@@ -152,7 +152,7 @@ def test_what_is_known_of_a_partly_unknown_robot_is_its_known_links() -> None:
 
 
 def test_a_robot_of_example_robot_data_without_inertias_has_pinocchio_s_rank() -> None:
-    text = without_inertia(robot_data("ur5_robot.urdf").read_text())
+    text = without_inertia(in_wheel("ur5_robot.urdf").read_text())
     model = derived(text)
 
     assert "<inertial" not in text
@@ -162,7 +162,7 @@ def test_a_robot_of_example_robot_data_without_inertias_has_pinocchio_s_rank() -
 
 def test_a_quadruped_with_unknown_thighs_has_pinocchio_s_rank() -> None:
     thighs = ("FL_UPPER_LEG", "HR_UPPER_LEG")
-    text = without_inertia(robot_data("solo.urdf").read_text(), *thighs)
+    text = without_inertia(in_wheel("solo.urdf").read_text(), *thighs)
     massless = derived(text, floating=True)
     unknown = derived(text, floating=True, unknown=thighs)
 

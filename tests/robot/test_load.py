@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from small_robots import EXAMPLES, largest_difference, load_dh, load_urdf, robot_data
+from installed import in_wheel
+from small_robots import EXAMPLES, largest_difference, load_dh, load_urdf
 from urdf_text import joint, link
 
 from psdmc.robot.load import load_robot, load_robot_text
@@ -61,14 +62,14 @@ def test_limits_of_a_dh_table():
     ],
 )
 def test_where_a_base_is_named_the_default_tip_is_the_end_of_the_arm(file, base, tip, joints):
-    chain = load_robot(robot_data(file), base=base).chain
+    chain = load_robot(in_wheel(file), base=base).chain
 
     assert (chain.base_name, chain.tip_name, len(chain)) == (base, tip, joints)
     assert chain.is_serial
 
 
 def test_a_gripper_of_two_fingers_ends_the_arm_and_is_said_to():
-    notes = load_robot(robot_data("panda.urdf"), base="panda_link0").chain.notes
+    notes = load_robot(in_wheel("panda.urdf"), base="panda_link0").chain.notes
 
     assert any(note.startswith("tip 'panda_hand': there the chain parts towards") for note in notes)
     assert any("locked at zero" in note and "'panda_finger_joint1'" in note for note in notes)

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pinocchio as pin
 import pytest
-from small_robots import largest_difference, robot_data, torques
+from installed import in_wheel
+from small_robots import largest_difference, torques
 from urdf_text import LIMIT, joint, link, urdf
 
 from psdmc.compiler import derive
@@ -98,7 +99,7 @@ def test_what_is_locked_moves_with_a_chain_and_carries_named_frames() -> None:
 @pytest.mark.slow
 def test_real_robots_with_locked_joints_are_checked_by_both_readers() -> None:
     pytest.importorskip("mujoco")
-    path = robot_data("talos_reduced.urdf")
+    path = in_wheel("talos_reduced.urdf")
     lock = {f"leg_{side}_{k}_joint": 0.1 * k for side in ("left", "right") for k in range(1, 7)}
     model = derive(path, lock=lock)
     assert model.n == 20
@@ -110,7 +111,7 @@ def test_real_robots_with_locked_joints_are_checked_by_both_readers() -> None:
 
 def test_a_locked_branch_leaves_a_chain() -> None:
     held = {"panda_finger_joint1": 0.02, "panda_finger_joint2": 0.02}
-    chain = load_robot(robot_data("panda.urdf"), lock=held).chain
+    chain = load_robot(in_wheel("panda.urdf"), lock=held).chain
     assert chain.is_serial
     assert len(chain) == 7
 

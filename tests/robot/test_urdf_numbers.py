@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio
 import pytest
-from small_robots import largest_difference, load_urdf, robot_data
+from installed import in_wheel
+from small_robots import largest_difference, load_urdf
 from urdf_text import INERTIAL, joint, link, urdf
 
 from psdmc.errors import InputError
@@ -183,7 +184,7 @@ def test_a_body_that_pinocchio_reads_otherwise_is_an_error_that_names_the_link(f
 
 def test_bodies_come_from_the_files_own_numbers(monkeypatch):
     """Not from Pinocchio: a robot whose bodies are not held against it has the same ones."""
-    path = robot_data("tiago.urdf")
+    path = in_wheel("tiago.urdf")
     expected = load_robot(path).chain.parameters
     monkeypatch.setattr("psdmc.robot.urdf.urdf_draft.hold_against_pinocchio", lambda *arguments: None)
     monkeypatch.setattr(pinocchio, "buildModelFromXML", None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from small_robots import robot_data
+from installed import in_wheel
 from urdf_text import joint, link, urdf
 
 from psdmc.dynamics.composite_body import mass_matrix
@@ -35,7 +35,7 @@ def tree_of(text: str, **options: object) -> Mechanism:
 
 @pytest.mark.parametrize("name", REAL)
 def test_real_trees_have_pinocchios_joints_torques_and_mass_matrix(name: str) -> None:
-    text = robot_data(name).read_text(encoding="utf-8")
+    text = in_wheel(name).read_text(encoding="utf-8")
     tree = tree_of(text, snap=0.0)
     # A continuous joint is one angle here, a cosine and a sine in Pinocchio.
     model = pin.buildModelFromXML(text.replace('type="continuous"', 'type="revolute"'), mimic=True)

@@ -21,9 +21,9 @@ from bundled import (
     weighed_model,
 )
 from command_line import typed
+from installed import in_wheel
 from pinocchio_in_casadi import acceleration, inverse_dynamics
 from random_trees import RandomTree
-from robots_at_hand import in_wheel
 from unoptimised import without_optimisation
 
 import psdmc

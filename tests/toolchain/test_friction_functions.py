@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bundled import bundled_model, bundled_robot
+from bundled import bundled_model
 from command_line import status
 from direct import Direct, shared_library, write_sources
+from friction_logs import friction_log
 
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.calibration.api import calibrate
-from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
@@ -26,7 +26,6 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.load import load
 from psdmc.model.store import save
-from psdmc.robot.reference import reference
 from psdmc.toolchain.build_package import build_package
 
 COULOMB, VISCOUS, CURVED, OFFSET = (
@@ -146,18 +145,11 @@ def test_the_cpp_class_has_it_too(arm: DynamicsModel, tmp_path: Path) -> None:
 
 def test_one_log_s_friction_reaches_a_built_package(tmp_path: Path, capsys) -> None:
     """A log of Pinocchio's torques and that friction, calibrated, emitted, built; the self-test compares it."""
-    rng = np.random.default_rng(3)
-    time = np.arange(0.0, 30.0, 0.005)
-    rates, starts = rng.uniform(1.0, 5.0, (5, 2)), rng.uniform(0.0, 6.0, (5, 2))
-    turning = np.einsum("t,kj->tkj", time, rates) + starts
-    q, qd = 0.22 * np.sin(turning).sum(axis=1), 0.22 * (rates * np.cos(turning)).sum(axis=1)
-    qdd = -0.22 * (rates**2 * np.sin(turning)).sum(axis=1)
-    plain = np.tanh(qd / SIGN_SPEED) * (COULOMB + VISCOUS * np.abs(qd)) + OFFSET
-    torque = reference(bundled_robot("two_link_full")).inverse_dynamics(q, qd, qdd) + plain
-    torque += rng.normal(scale=0.05, size=torque.shape)
-    model = bundled_model("two_link_full")
-    log = Log("log", model.joint_names, time, q, qd, torque, "motor_torque")
+    log, _ = friction_log(
+        3, 30.0, lambda q, qd: np.tanh(qd / SIGN_SPEED) * (COULOMB + VISCOUS * np.abs(qd)) + OFFSET
+    )
     write_log(log, tmp_path / "log.csv")
+    model = bundled_model("two_link_full")
     found = calibrate(model, tmp_path / "log.csv")
     values = {(row.joint, row.name): row for row in found.friction}
     for k, joint in enumerate(model.joint_names):

@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot, under_gravity
 from command_line import files_in
-from robots_at_hand import in_wheel
+from installed import in_wheel
 
 import psdmc
 from psdmc.compiler import emit_c

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bundled import bundled_model, bundled_robot
+from bundled import bundled_model
 from command_line import status
 from direct import Direct, shared_library
+from friction_logs import friction_log
 
 from psdmc.backends.c.package import package_view
 from psdmc.backends.info import EmitOptions, package_info
 from psdmc.calibration.columns.columns import read_columns
-from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.errors import InputError
@@ -30,7 +30,6 @@ from psdmc.model.linear_friction import linear_friction
 from psdmc.model.load import load
 from psdmc.model.store import save
 from psdmc.program.interpret import interpret
-from psdmc.robot.reference import reference
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "friction_laws" / "ripple.py"
 COULOMB, VISCOUS, OFFSET = np.array([3.0, 1.5]), np.array([0.8, 0.3]), np.array([-0.4, 0.7])
@@ -48,17 +47,9 @@ def friction(q: np.ndarray, v: np.ndarray) -> np.ndarray:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model, the law, and a log of Pinocchio's torques with that friction and noise; calibrated by the command."""
     folder = tmp_path_factory.mktemp("own_law")
-    rng = np.random.default_rng(8)
-    time = np.arange(0.0, 40.0, 0.005)
-    rates, starts = rng.uniform(1.0, 5.0, (5, 2)), rng.uniform(0.0, 6.0, (5, 2))
-    turning = np.einsum("t,kj->tkj", time, rates) + starts
-    q, qd = 0.22 * np.sin(turning).sum(axis=1), 0.22 * (rates * np.cos(turning)).sum(axis=1)
-    qdd = -0.22 * (rates**2 * np.sin(turning)).sum(axis=1)
-    torque = reference(bundled_robot("two_link_full")).inverse_dynamics(q, qd, qdd) + friction(q, qd)
-    torque += rng.normal(scale=0.05, size=torque.shape)
-    model = bundled_model("two_link_full")
-    write_log(Log("log", model.joint_names, time, q, qd, torque, "motor_torque"), folder / "arm.csv")
-    model.save(folder / "arm.npz")
+    log, _ = friction_log(8, 40.0, friction)
+    write_log(log, folder / "arm.csv")
+    bundled_model("two_link_full").save(folder / "arm.npz")
     shutil.copy(EXAMPLE, folder)
     (folder / "log.toml").write_text('friction = "ripple.py"\n[[log]]\nfile = "arm.csv"\n', encoding="utf-8")
     found, page = folder / "found.npz", folder / "page.html"
