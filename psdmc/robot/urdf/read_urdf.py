@@ -112,6 +112,11 @@ class UrdfRobot:
     free_root: str | None = None
     shapes: tuple[str, ...] = ()
 
+    @property
+    def above(self) -> dict[str, UrdfJoint]:
+        """By link, the joint that it is the child of; the root has none."""
+        return {joint.child: joint for joint in self.joints}
+
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.joints if joint.parent == link)
 

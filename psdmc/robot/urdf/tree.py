@@ -96,8 +96,7 @@ def _tree(robot: UrdfRobot, frames: Sequence[str], source: str) -> Route:
 
 def outward(robot: UrdfRobot) -> Iterator[UrdfJoint]:
     """Yield all joints from the root outward, branch by branch; joints on the same link are sorted by name."""
-    stack = [robot.root]
-    above = {joint.child: joint for joint in robot.joints}
+    stack, above = [robot.root], robot.above
     below: dict[str, list[UrdfJoint]] = {}
     for joint in robot.joints:
         below.setdefault(joint.parent, []).append(joint)
@@ -110,8 +109,7 @@ def outward(robot: UrdfRobot) -> Iterator[UrdfJoint]:
 
 def _last_joints(robot: UrdfRobot) -> list[UrdfJoint]:
     """Movable joints beyond which nothing moves, in the file's order."""
-    above = {joint.child: joint for joint in robot.joints}
-    carrying: set[str] = set()
+    above, carrying = robot.above, set[str]()
     for joint in robot.joints:
         link = joint.parent
         while joint.is_movable and link in above and link not in carrying:
@@ -144,9 +142,7 @@ def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
 
 def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
     """Return the joints from link `start` outward to link `end`; None if `end` is not beyond `start`."""
-    above = {joint.child: joint for joint in robot.joints}
-    path: list[UrdfJoint] = []
-    link = end
+    above, path, link = robot.above, list[UrdfJoint](), end
     while link != start:
         if link not in above:
             return None
@@ -222,21 +218,17 @@ def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
 
 def _refuse_other_planes(route: Route, source: str) -> None:
     """InputError for joints whose <axis> programs understand in different ways."""
-    problems = [
-        f"joint {shown(joint.name)} of type {shown(joint.type)} has <axis> {' '.join(f'{x:g}' for x in joint.axis)}"
-        for joint in route.movable
-        if not _is_only_axis(joint)
-    ]
+    problems = []
+    for joint in route.movable:
+        only, length = URDF_TYPES[joint.type].only_axis, math.hypot(*joint.axis)
+        if only is not None and any(x != length * a for x, a in zip(joint.axis, only, strict=True)):
+            axis = " ".join(f"{x:g}" for x in joint.axis)
+            problems.append(f"joint {shown(joint.name)} of type {shown(joint.type)} has <axis> {axis}")
     if problems:
         raise InputError(
             f"{source}: {'; '.join(problems)}: the plane's normal by the standard, where other readers always take z",
             'write <axis xyz="0 0 1"/>, and turn the plane by rpy of its <origin>',
         )
-
-
-def _is_only_axis(joint: UrdfJoint) -> bool:
-    only, length = URDF_TYPES[joint.type].only_axis, math.hypot(*joint.axis)
-    return only is None or all(x == length * a for x, a in zip(joint.axis, only, strict=True))
 
 
 def _refuse_unsupported(robot: UrdfRobot, route: Route, source: str) -> None:

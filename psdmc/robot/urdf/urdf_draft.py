@@ -402,7 +402,7 @@ class _LinkFrames:
 
     def _carried_by(self, link: str) -> tuple[list[UrdfJoint], UrdfJoint | None]:
         """Fixed joints from the link that a joint moves down to this link, and that joint; None at the root."""
-        above = {joint.child: joint for joint in self.robot.joints}
+        above = self.robot.above
         fixed: list[UrdfJoint] = []
         while link in above and not above[link].is_movable:
             fixed.append(above[link])
