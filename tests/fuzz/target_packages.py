@@ -17,7 +17,7 @@ EARLIER = {"Makefile": "old:\n", "src/b.c": "/* old b.c */\n", "src/stale.c": "/
 NEW = {
     "Makefile": "new:\n",
     "src/b.c": "/* new b.c */\n",
-    MANIFEST: '{"generator": "psdmc", "robot": "arm"}\n',
+    MANIFEST: '{"generator": "psdmc", "robot": "arm", "name": "arm", "model_hash": "new", "joints": []}\n',
 }
 VICTIM, FOREIGN = "/* outside, with a digest that a manifest lists */\n", "/* written by somebody else */\n"
 OTHERS = {"outside/arm/victim.h": VICTIM, "package/src/foreign.c": FOREIGN}
