@@ -151,19 +151,16 @@ def function_errors(
         states = few if any(word in recipe.signature.name for word in SLOW) else given
         errors, scales = _errors(recipe, arrays, robot, states, theta, least)
         limit = solved_limit(condition) if recipe.needs is Needs.POSITIVE_MASS else TORQUE_LIMIT
-        error = float(np.max([*errors.values()]))  # NaN if one of them is
-        if error <= limit:
-            yield Compared(recipe, error, limit)
+        shares = np.array([*errors.values()])
+        if np.all(shares <= limit):
+            yield Compared(recipe, float(shares.max()), limit)
             continue
         rounding = _rounding(recipe, robot, states)
-        limits = [max(limit, TIMES * rounding[name] / scales[name]) for name in errors]
-        worst = int(np.argmax(np.divide([*errors.values()], limits)))
-        remark = (
-            "the limit is what the last digits of Pinocchio's rotations can do"
-            if limits[worst] > limit
-            else ""
-        )
-        yield Compared(recipe, [*errors.values()][worst], limits[worst], remark)
+        limits = np.array([max(limit, TIMES * rounding[name] / scales[name]) for name in errors])
+        worst = int(np.argmax(shares / limits))  # the first NaN if there is one
+        why = "the limit is what the last digits of Pinocchio's rotations can do"
+        own = float(limits[worst])
+        yield Compared(recipe, float(shares[worst]), own, why if own > limit else "")
 
 
 def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvable: bool) -> str | None:
