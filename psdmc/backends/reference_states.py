@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.friction.joints import FrictionInDynamics
 from psdmc.functions import BY_ROWS, DEFAULT, RECIPES
@@ -25,8 +24,7 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.recipes.torques_and_accelerations import pulled, with_friction, with_gravity_input
 from psdmc.reproducible import times
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import Array
 
 COUNT = 4
 """States kept. The self-test repeats them to fill batches, so that four cover every entry without making the package

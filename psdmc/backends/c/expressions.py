@@ -34,6 +34,11 @@ def c_real(options: EmitOptions) -> CReal:
     return "double" if options.real == "float64" else "float"
 
 
+def suffix_of(real: str) -> str:
+    """Return the suffix of C's constants and libm's functions for the C type `real`."""
+    return "" if real == "double" else "f"
+
+
 def rounded_out(value: float, real: str) -> float:
     """Return the value to which a number outside the range of the C type `real` is rounded: infinity, the largest
     number, or zero. Any other number is returned unchanged."""
@@ -57,7 +62,7 @@ def number(value: float | None, real: str) -> str:
     value = rounded_out(value, real)
     if math.isinf(value):
         return f"({real})INFINITY" if value > 0 else f"({real})(-1e300 * 1e300) /* -INFINITY */"
-    return f"{float(value)!r}{'' if real == 'double' else 'f'}"
+    return f"{float(value)!r}{suffix_of(real)}"
 
 
 def numbers(values: Iterable[float], real: str) -> str:

@@ -23,6 +23,7 @@ from psdmc.backends.c.expressions import (
     number,
     numbers,
     rounded_out,
+    suffix_of,
 )
 from psdmc.backends.c.kernel_view import Prototype
 from psdmc.friction.joints import Friction
@@ -120,8 +121,8 @@ class FrictionView:
 
     @property
     def one_joint(self) -> ScalarFunction:
-        suffix = "" if self.real == "double" else "f"
-        return ScalarFunction("joint_friction", self.friction.program(), ("q", "v"), suffix)
+        law = self.friction.program()
+        return ScalarFunction("joint_friction", law, ("q", "v"), suffix_of(self.real))
 
     @property
     def calls(self) -> tuple[CallView, ...]:

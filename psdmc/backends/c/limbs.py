@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from psdmc.backends.c.body import make_body
-from psdmc.backends.c.expressions import literal
+from psdmc.backends.c.expressions import c_real, literal, suffix_of
 from psdmc.backends.c.limb_rows import FOUR, StoreView, store_views
 from psdmc.backends.c.lines import Body
 from psdmc.backends.c.vectors import NamedByCount
@@ -207,7 +207,7 @@ def limbs_view(
 ) -> LimbsView:
     """Return the code of a function that computes equal limbs (such as legs) in SIMD lanes, as data for the templates.
     `sizes` are the lengths of the output vectors."""
-    suffix = "" if options.real == "float64" else "f"
+    suffix = suffix_of(c_real(options))
     read = {slot.vector for stage in limbs.stages for slot in stage.program.inputs()}
     read |= {own[0].vector for group in limbs.groups for _, own in group.inputs}
     groups = {group.number: group for group in limbs.groups}

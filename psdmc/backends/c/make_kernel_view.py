@@ -15,7 +15,7 @@ from psdmc.backends.c.body import (
     without_products,
     zero_outputs,
 )
-from psdmc.backends.c.expressions import c_real, is_call, uniform_of
+from psdmc.backends.c.expressions import c_real, is_call, suffix_of, uniform_of
 from psdmc.backends.c.kernel_view import (
     FunctionView,
     KernelView,
@@ -69,13 +69,12 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         )
         for q in function.outputs
     )
-    suffix = "f" if c_real(options) == "float" else ""
     regions = None
     if kernel.regions is not None:
         single_body = lanes_body = Body((), ())
         lengths = {q.name: sizes.size(q) for q in function.inputs}
         lengths |= dict.fromkeys(kernel.inputs[len(lengths) :], sizes.l)
-        regions = regions_view(kernel.regions, lengths, list(results), robot, suffix)
+        regions = regions_view(kernel.regions, lengths, list(results), robot, suffix_of(c_real(options)))
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body
@@ -200,7 +199,7 @@ def _body(
 ) -> Body:
     """The body. Large outputs are stored as they are computed, as keeping them all until the end would spill them."""
     sizes = {output.name: output.size for output in outputs}
-    suffix = "" if options.real == "float64" else "f"
+    suffix = suffix_of(c_real(options))
     has_matrix = any(output.is_matrix for output in kernel.function.outputs)
     direct = tuple(output.name for output in outputs if output.direct)
     products = kernel.function.products if kernel.before else ()

@@ -10,7 +10,15 @@ from dataclasses import dataclass, replace
 
 from psdmc.backends.c.bodies import BodiesView, EstimatorView, PayloadView
 from psdmc.backends.c.body import calls_of
-from psdmc.backends.c.expressions import LARGEST_FLOAT, CallView, CReal, c_real, call_views, rounded_out
+from psdmc.backends.c.expressions import (
+    LARGEST_FLOAT,
+    CallView,
+    CReal,
+    c_real,
+    call_views,
+    rounded_out,
+    suffix_of,
+)
 from psdmc.backends.c.friction import FrictionView
 from psdmc.backends.c.header import CppClass, Pattern, Table, cpp_classes, description, patterns, tables
 from psdmc.backends.c.kernel_view import FunctionView, KernelView
@@ -132,7 +140,7 @@ class PackageView:
     @property
     def suffix(self) -> str:
         """Suffix of constants and libm functions."""
-        return "" if self.real == "double" else "f"
+        return suffix_of(self.real)
 
     @property
     def vectors(self) -> VectorsView:
