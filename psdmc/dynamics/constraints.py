@@ -29,6 +29,9 @@ from psdmc.dynamics.solve import (
     half_products,
     half_solved,
     inner_product,
+    less,
+    plus,
+    product,
     rest_solved,
     solve,
 )
@@ -253,24 +256,16 @@ class Response(NamedTuple):
 def response(inverse: Rows, jacobian: Rows, compliance: Rows) -> Response:
     """Return the response from M^-1, J, and the inverse of J M^-1 J^T + shift, with zeros where a row is not active."""
     seen = [[inner_product(row, column) for column in inverse] for row in jacobian]
-    push = _product(compliance, seen)
-    back = _product(list(zip(*push, strict=True)), seen)
-    held = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(inverse, back, strict=True)]
+    push = product(compliance, seen)
+    held = less(inverse, product(list(zip(*push, strict=True)), seen))
     return Response(held, push, [list(row) for row in compliance])
 
 
 def changed(own: Response, load: Rows, wanted: Rows) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
     """Return dx (nv rows) and df from the changes dr (nv rows) and dw of a `Response`, with a column per change."""
-    kicked, asked = _product(own.inverse, load), _product(list(zip(*own.push, strict=True)), wanted)
-    held, lost = _product(own.compliance, wanted), _product(own.push, load)
-    motion = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(kicked, asked, strict=True)]
-    forces = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(held, lost, strict=True)]
-    return motion, forces
-
-
-def _product(left: Rows, right: Rows) -> list[list[Scalar]]:
-    columns = list(zip(*right, strict=True))
-    return [[inner_product(row, column) for column in columns] for row in left]
+    kicked, asked = product(own.inverse, load), product(list(zip(*own.push, strict=True)), wanted)
+    held, lost = product(own.compliance, wanted), product(own.push, load)
+    return plus(kicked, asked), less(held, lost)
 
 
 class Constraints(NamedTuple):
@@ -333,4 +328,4 @@ class Constraints(NamedTuple):
         if not self.loops:
             return turn
         own = loop_pushes(self.frames, self.loops, q, forces[first:], self.root)
-        return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(turn, own, strict=True)]
+        return plus(turn, own)

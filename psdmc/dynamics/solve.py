@@ -1,5 +1,5 @@
-"""Factorization of a symmetric positive definite matrix, and solutions from the factors. Loops run entry by entry,
-because the entries can be symbols that record operations.
+"""Sums and products of matrices, factorization of a symmetric positive definite matrix, and solutions from the factors.
+Loops run entry by entry, because the entries can be symbols that record operations.
 
 In a mass matrix, an entry of two joints on different branches is zero at every state and is left out. Parents come
 before children, and elimination goes from the last row up. Elimination of a joint's row changes an entry of two joints
@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from psdmc.dynamics.scalar import Scalar
 
 Rows = tuple[tuple[Scalar, ...], ...]
+
+Matrix = Sequence[Sequence[Scalar]]
 
 
 class SingularMatrix(Exception):
@@ -141,6 +143,27 @@ def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
     for x, y in zip(a, b, strict=True):
         total = total + x * y
     return total
+
+
+def product(a: Matrix, b: Matrix) -> list[list[Scalar]]:
+    """Return a b."""
+    columns = list(zip(*b, strict=True))
+    return [[inner_product(row, column) for column in columns] for row in a]
+
+
+def plus(a: Matrix, b: Matrix) -> list[list[Scalar]]:
+    """Return a + b."""
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def less(a: Matrix, b: Matrix) -> list[list[Scalar]]:
+    """Return a - b."""
+    return [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def negative(a: Matrix) -> list[list[Scalar]]:
+    """Return -a."""
+    return [[-x for x in row] for row in a]
 
 
 def inverse(factors: Factors) -> list[list[Scalar]]:

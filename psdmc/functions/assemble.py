@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +14,9 @@ from psdmc.functions.passive_motion import completed
 from psdmc.program.regions import Column, For, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, Q_GUESS, Q, Signature, Structure, SymmetricMatrix
 from psdmc.recipes.closed_loops import PASSIVE, closer
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.robot.mechanism import Loop, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STEPS = 8
 """Newton steps. From 400 guesses within 0.3 rad, a four-bar and a tree closed to 1e-10 in five steps. The last step shows

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from psdmc.dynamics.momentum_and_energy import first_moment
 from psdmc.dynamics.scalar import add, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
-from psdmc.robot.mechanism import Array
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -31,10 +26,7 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
-    def centre(model: Any, data: Any, q: Array) -> Array:
-        return np.array(pin.centerOfMass(model, data, q))
-
-    return {"c": robot.each(centre, given["q"])}
+    return {"c": robot.each(pin.centerOfMass, given["q"])}
 
 
 RECIPE = Recipe(

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from psdmc.dynamics.momentum_and_energy import about_centre, total_momentum
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
-from psdmc.robot.mechanism import Array
 
 INPUTS = (Q, QD)
 MOMENTUM = Quantity(
@@ -32,10 +27,8 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
-    def momentum(model: Any, data: Any, q: Array, qd: Array) -> Array:
-        return np.array(pin.computeCentroidalMomentum(model, data, q, qd).vector)
-
-    return {"h": robot.each(momentum, given["q"], given["qd"])}
+    found = robot.each(lambda *at: pin.computeCentroidalMomentum(*at).vector, given["q"], given["qd"])
+    return {"h": found}
 
 
 RECIPE = Recipe(

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from psdmc.dynamics.momentum_and_energy import about_centre, total_momentum_rate
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
 from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
-from psdmc.robot.mechanism import Array
 
 INPUTS = (Q, QD, QDD)
 RATE = Quantity(
@@ -32,10 +27,8 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
-    def rate(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:
-        return np.array(pin.computeCentroidalMomentumTimeVariation(model, data, q, qd, qdd).vector)
-
-    return {"hdot": robot.each(rate, given["q"], given["qd"], given["qdd"])}
+    states = (given[name] for name in ("q", "qd", "qdd"))
+    return {"hdot": robot.each(lambda *at: pin.computeCentroidalMomentumTimeVariation(*at).vector, *states)}
 
 
 RECIPE = Recipe(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from psdmc.dynamics.momentum_and_energy import momentum_matrix
@@ -11,7 +9,6 @@ from psdmc.dynamics.scalar import scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
-from psdmc.robot.mechanism import Array
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -32,10 +29,7 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
-    def jacobian(model: Any, data: Any, q: Array) -> Array:
-        return np.reshape(pin.jacobianCenterOfMass(model, data, q), (3, model.nv))
-
-    return {"J": robot.each(jacobian, given["q"])}
+    return {"J": robot.each(lambda *at: np.reshape(pin.jacobianCenterOfMass(*at), (3, -1)), given["q"])}
 
 
 RECIPE = Recipe(

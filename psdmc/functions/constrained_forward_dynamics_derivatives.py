@@ -10,8 +10,9 @@ import numpy as np
 from psdmc.dynamics.arrow import any_limbs, pushed_slopes_of_limbs
 from psdmc.dynamics.constraints import Constraints, changed, contact_slopes, response
 from psdmc.dynamics.constraints import contact_jacobian as contact_jacobian_of
+from psdmc.dynamics.coordinates import flat
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.solve import inner_product, inverse
+from psdmc.dynamics.solve import inner_product, inverse, less, negative
 from psdmc.functions import (
     constrained_forward_dynamics,
     contact_jacobian,
@@ -31,7 +32,6 @@ from psdmc.recipes.contact_derivatives import (
     changed_by_pinocchio,
     changed_on_arrays,
     constraints_of,
-    flat,
     geometry,
     held_inverse,
     pushed_motion,
@@ -71,12 +71,9 @@ def trace(g: Ingredients) -> Outputs:
     by_q, by_qd = of.slopes(q, qd, damped)
     by_q = of.drawn_closed(by_q, q, kp)
     own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
-    loads = (
-        [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)],
-        [[-x for x in row] for row in slopes.by_qd],
-    )
+    loads = (less(turn, slopes.by_q), negative(slopes.by_qd))
     wanted = (
-        [[-x for x in row] for row in by_q],
+        negative(by_q),
         [[-(x + kd * y) for x, y in zip(*rows, strict=True)] for rows in zip(by_qd, jacobian, strict=True)],
     )
     motions, forces = zip(*(changed(own, *each) for each in zip(loads, wanted, strict=True)), strict=True)
@@ -85,7 +82,7 @@ def trace(g: Ingredients) -> Outputs:
     motions = (*motions, own.inverse, by_error)
     forces = (
         *forces,
-        [[-x for x in row] for row in own.push],
+        negative(own.push),
         [[-kp * x for x in row[:first]] for row in own.compliance],
     )
     blocks = dict(zip(NAMES, (*motions, *forces), strict=True))
@@ -110,10 +107,9 @@ def _in_limbs(g: Ingredients) -> Outputs:
     damped = [x + kd * rate for x, rate in zip(motion, qd, strict=True)]
     slopes = contact_slopes(g.frames, g.named, q, qd, damped, g.root)
     by_rate = [[x + kd * y for x, y in zip(*pair, strict=True)] for pair in zip(slopes[1], rows, strict=True)]
-    loads = [[x - y for x, y in zip(*pair, strict=True)] for pair in zip(moving.by_q, turn, strict=True)]
     unit = [[float(i == j) for j in range(nv + count)] for i in range(nv + count)]
     found_by = {
-        "q": arrow.thin([*loads, *scaled(on, slopes[0])], range(nv)),
+        "q": arrow.thin([*less(moving.by_q, turn), *scaled(on, slopes[0])], range(nv)),
         "qd": arrow.thin([*at_rest.by_qd, *scaled(on, by_rate)], range(nv)),
         "tau": arrow.thin([[-x for x in row[:nv]] for row in unit], range(nv)),
         "error": arrow.thin(

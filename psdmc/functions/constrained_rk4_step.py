@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,17 +23,14 @@ from psdmc.program.signature import PIVOTS, Signature
 from psdmc.recipes.contact_derivatives import Counts
 from psdmc.recipes.directions import along
 from psdmc.recipes.loops import added, filled
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import DT, stepped
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
-
 ACCELERATIONS = constrained_forward_dynamics.RECIPE
 
-At = Callable[[Mapping[str, Array]], Arrays]
+At = Callable[[Given], Arrays]
 """Of the state at a stage: the accelerations, the contact forces and the velocities J qd of the contacts."""
 
 
@@ -115,8 +111,8 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequenc
     return Regions(arrays, body, {"reach": REACH, "weight": WEIGHT})
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    def at(there: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
+    def at(there: Given) -> Arrays:
         qdd = robot.accelerations(there["q"], there["qd"], there["tau"])
         rows = jacobian.RECIPE.reference(robot, there)["J"]
         return ACCELERATIONS.reference(robot, {**there, "qdd": qdd}) | {"moved": along(rows, there["qd"])}
@@ -127,8 +123,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return _on_arrays(given, at, moved, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    def at(there: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
+    def at(there: Given) -> Arrays:
         rows = jacobian.RECIPE.pinocchio(robot, there)["J"]
         return ACCELERATIONS.pinocchio(robot, there) | {"moved": along(rows, there["qd"])}
 
@@ -136,7 +132,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 def _on_arrays(
-    given: Mapping[str, Array],
+    given: Given,
     at: At,
     moved: Callable[[Array, Array], Array],
     unit: Callable[[Array], Array],

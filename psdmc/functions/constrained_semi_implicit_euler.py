@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 from psdmc.dynamics.constraints import Constraints
 from psdmc.dynamics.frames import Frame
@@ -12,13 +11,9 @@ from psdmc.functions import constrained_forward_dynamics
 from psdmc.program.regions import Call, Column, Reader, Regions, straight
 from psdmc.program.signature import PIVOTS, Signature
 from psdmc.recipes.contact_derivatives import Counts
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped, turned
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 ACCELERATIONS = constrained_forward_dynamics.RECIPE
 Q, QD, TAU, *HELD = ACCELERATIONS.signature.inputs
@@ -50,17 +45,17 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequenc
     return Regions({"qdd": counts.nv, "pushed": counts.rows}, (call, straight(moved)))
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = ACCELERATIONS.reference(robot, given)
     own = _next(given, found, lambda q, way: turned(robot.frames, q, way))
     return own | {PIVOTS: found[PIVOTS]}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return _next(given, ACCELERATIONS.pinocchio(robot, given), robot.integrated)
 
 
-def _next(given: Mapping[str, Array], found: Arrays, moved: Callable[[Array, Array], Array]) -> Arrays:
+def _next(given: Given, found: Arrays, moved: Callable[[Array, Array], Array]) -> Arrays:
     dt = step_on_arrays(given)
     rates = given["qd"] + dt * found["qdd"]
     return {"q_next": moved(given["q"], dt * rates), "qd_next": rates, "forces": found["forces"]}

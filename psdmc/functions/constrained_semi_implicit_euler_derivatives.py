@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +16,7 @@ from psdmc.program.regions import Call, Regions
 from psdmc.program.signature import PIVOTS, Quantity, Signature
 from psdmc.recipes.contact_derivatives import Counts
 from psdmc.recipes.loops import Block, copied
-from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.steps import (
     DT,
     A,
@@ -30,9 +28,6 @@ from psdmc.recipes.steps import (
     stepped,
 )
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 STEP = constrained_semi_implicit_euler.RECIPE
 ACCELERATIONS = constrained_forward_dynamics_derivatives.RECIPE
@@ -87,19 +82,19 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequenc
     return Regions({**results, "step": 1, **arrays}, (call, *body, *copies))
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     found = STEP.reference(robot, given)
     slopes = slopes_on_arrays(robot.frames, step_on_arrays(given) * found["qd_next"])
     return found | _jacobians(ACCELERATIONS.reference(robot, given), given, slopes)
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = STEP.pinocchio(robot, given)
     slopes = robot.integrated_slopes(given["q"], step_on_arrays(given) * found["qd_next"])
     return found | _jacobians(ACCELERATIONS.pinocchio(robot, given), given, slopes)
 
 
-def _jacobians(found: Arrays, given: Mapping[str, Array], slopes: tuple[Array, Array]) -> Arrays:
+def _jacobians(found: Arrays, given: Given, slopes: tuple[Array, Array]) -> Arrays:
     by_q, by_qd, by_tau, by_error = (found[block.name] for block in OF_RATES)
     nv, both = by_tau.shape[-1], np.concatenate([by_tau, by_error], axis=-1)
     by_state, by_input = semi_implicit_on_arrays(by_q, by_qd, both, step_on_arrays(given), slopes)

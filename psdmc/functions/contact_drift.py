@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from psdmc.dynamics.constraints import contact_drift
 from psdmc.dynamics.scalar import Scalar
+from psdmc.functions.frame_acceleration import accelerations
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
 from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
@@ -21,25 +20,15 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
-    return {"drift": accelerations(robot, given, "LOCAL_WORLD_ALIGNED")}
+    return {"drift": drift(robot, given, "LOCAL_WORLD_ALIGNED")}
 
 
-def accelerations(robot: Reference, given: Given, axes: str) -> Array:
+def drift(robot: Reference, given: Given, axes: str) -> Array:
     """Return Pinocchio's accelerations of the contacts at constant joint rates, (k, rows), along `axes`, a name of
     pinocchio.ReferenceFrame."""
-    import pinocchio as pin
-
-    along = getattr(pin, axes)
-
-    def of_contacts(model: Any, data: Any, q: Array, qd: Array) -> Array:
-        pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
-        found = [
-            pin.getFrameClassicalAcceleration(model, data, frame, along).vector[:rows]
-            for frame, rows in robot.contacts
-        ]
-        return np.concatenate(found)
-
-    return robot.each(of_contacts, given["q"], given["qd"])
+    q, qd = given["q"], given["qd"]
+    found = accelerations(robot, q, qd, np.zeros_like(qd), axes)
+    return robot.of_contacts(found[..., None])[..., 0]
 
 
 RECIPE = Recipe(

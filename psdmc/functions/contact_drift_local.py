@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.kinematics import local_accelerations
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import contact_drift
 from psdmc.program.signature import QD, Q, Signature
 from psdmc.recipes.contacts import LOCAL_ROW_WORDS
-from psdmc.recipes.recipe import Arrays, Outputs, PlacedRobot, Recipe, on_both
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 INPUTS = (Q, QD)
 (ALIGNED,) = contact_drift.RECIPE.signature.outputs
@@ -27,8 +21,8 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
     return {"drift": [value for each, own in pairs for value in own[: each.rows]]}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return {"drift": contact_drift.accelerations(robot, given, "LOCAL")}
+def pinocchio(robot: Reference, given: Given) -> Arrays:
+    return {"drift": contact_drift.drift(robot, given, "LOCAL")}
 
 
 RECIPE = Recipe(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,14 +19,10 @@ from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Signature, Structur
 from psdmc.recipes import contacts as held
 from psdmc.recipes.closed_loops import passive_rates
 from psdmc.recipes.contacts import ACTIVE, Held, held_rows, joined
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.singular_matrices import least_squares
 from psdmc.recipes.torques_and_accelerations import torques
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 BASE_ROWS = 6
 """Rows of tau that belong to a floating base: three forces, then three moments about its origin."""
@@ -136,7 +131,7 @@ def _with_passive(
     return [*found, *of_loops(rest)]
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     without = list(robot.torques(q, qd, qdd, robot.base_acceleration).T)
     loops = robot.chain.loops
@@ -145,7 +140,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     return {name: columns(values, len(q)) for name, values in found.items()}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     """Solve least squares by NumPy. The loops' forces are eliminated by the null space of the passive joints' equations."""
     tau = robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])
     jacobian = contact_jacobian.RECIPE.pinocchio(robot, given)["J"]

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from psdmc.dynamics.constraints import contact_jacobian
 from psdmc.dynamics.scalar import Scalar
+from psdmc.functions import frame_jacobian
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.contacts import ROW_WORDS
 from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
-from psdmc.robot.mechanism import Array
 
 INPUTS = (Q,)
 
@@ -21,15 +17,7 @@ def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
-    import pinocchio as pin
-
-    def jacobian(model: Any, data: Any, q: Array) -> Array:
-        aligned = pin.LOCAL_WORLD_ALIGNED
-        found = [pin.computeFrameJacobian(model, data, q, frame, aligned) for frame, _ in robot.contacts]
-        parts = zip(np.reshape(found, (-1, 6, model.nv)), robot.contacts, strict=True)
-        return np.concatenate([own[:rows] for own, (_, rows) in parts])
-
-    return {"J": robot.each(jacobian, given["q"])}
+    return {"J": robot.of_contacts(frame_jacobian.RECIPE.pinocchio(robot, given)["J"])}
 
 
 RECIPE = Recipe(

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from psdmc.dynamics.kinematics import local_jacobians
 from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import contact_jacobian
 from psdmc.program.signature import Q, Signature
 from psdmc.recipes.contacts import LOCAL_ROW_WORDS
-from psdmc.recipes.recipe import Arrays, Outputs, PlacedRobot, Recipe, on_both
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 INPUTS = (Q,)
 (ALIGNED,) = contact_jacobian.RECIPE.signature.outputs
@@ -26,7 +20,7 @@ def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
     return {"J": [row for each, rows in found for row in rows[: each.rows]]}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     return {"J": robot.of_contacts(robot.local_frame_jacobians(given["q"]))}
 
 

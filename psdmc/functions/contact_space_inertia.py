@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,13 +13,9 @@ from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.functions import delassus
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
 from psdmc.recipes.contacts import ACTIVE, CONSTRAINT_WORDS, CONTACTS, MU, Held, held_rows
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.on_arrays import entries
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques_and_accelerations import MASS_MATRIX
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -38,7 +33,7 @@ def _values(factors: Factors, jacobian: Sequence[Sequence[Scalar]], mask: Held) 
     return {"Lambda": found, PIVOTS: [*factors.pivots, *signs]}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     q, count = list(given["q"].T), len(given["q"])
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     loops = robot.chain.loops
@@ -49,7 +44,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
         return {name: entries(value, count) for name, value in found.items()}
 
 
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     found = delassus.RECIPE.pinocchio(robot, given)["D"]
     masks = held_rows(robot, given)
     for matrix, on, mu in zip(found, masks, np.reshape(given[MU.name], -1), strict=True):

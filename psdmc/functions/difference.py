@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.dynamics.manifold import difference
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
-from psdmc.robot.mechanism import Array
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 FROM, TO = (
     Quantity(
@@ -39,22 +38,15 @@ WAY = Quantity(
 )
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"v": difference(g.frames, g.inputs[FROM.name], g.inputs[TO.name])}
-
-
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    start, end = given[FROM.name], given[TO.name]
-    return {"v": columns(difference(robot.frames, list(start.T), list(end.T)), len(start))}
+def values(robot: PlacedRobot, start: list[Scalar], end: list[Scalar]) -> Outputs:
+    return {"v": difference(robot.frames, start, end)}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
-    def between(model: pin.Model, data: pin.Data, start: Array, end: Array) -> Array:
-        return np.asarray(pin.difference(model, start, end))
-
-    return {"v": robot.each(between, given[FROM.name], given[TO.name])}
+    ends = given[FROM.name], given[TO.name]
+    return {"v": robot.each(lambda model, _, start, end: pin.difference(model, start, end), *ends)}
 
 
 RECIPE = Recipe(
@@ -69,8 +61,7 @@ RECIPE = Recipe(
         summary="Compute the displacement v that leads from q0 to q1: integrate(q0, v) = q1.",
     ),
     "way between two positions",
-    trace,
-    reference,
+    *on_both(values, (FROM, TO)),
     "difference",
     pinocchio,
     matters=(),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from psdmc.dynamics.coordinates import first_rates, leading
+from psdmc.dynamics.coordinates import first_rates, flat, leading
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.kinematics import local_jacobians
 from psdmc.dynamics.scalar import ZERO
-from psdmc.dynamics.solve import inner_product
+from psdmc.dynamics.solve import inner_product, negative
 from psdmc.dynamics.spatial import Body
 from psdmc.functions import (
     forward_dynamics_derivatives,
@@ -81,12 +81,11 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame]) -> Regions:
             ZERO,
             external=on_joint_frames(named, wrenches),
         )
-        turn = [[-x for x in row] for row in massless.by_q]
+        turn = negative(massless.by_q)
         for name, matrix in (("turn", turn), ("push", push)):
             kept[name] = nonzero(list(zip(*matrix, strict=True)))
         load = [tau + inner_product(row, wrenches) for tau, row in zip(read("tau", nv), push, strict=True)]
-        stored = {"turn": [x for row in turn for x in row], "push": [x for row in push for x in row]}
-        return {name: Column(values) for name, values in {"load": load, **stored}.items()}
+        return {"load": Column(load), "turn": Column(flat(turn)), "push": Column(flat(push))}
 
     first = straight(loaded)
     call = Call(
@@ -117,8 +116,7 @@ def reference(robot: RobotOnArrays, given: Given) -> Arrays:
     accelerations = ACCELERATIONS.reference(robot, given)
     by_q, by_qd, by_qdd, by_wrenches = TORQUES.reference(robot, {**given, **accelerations}).values()
     by_tau = inverse(by_qdd)
-    flat = by_wrenches.reshape(*by_tau.shape[:2], -1)
-    last = -times(by_tau, flat).reshape(by_wrenches.shape)
+    last = -times(by_tau, by_wrenches.reshape(*by_tau.shape[:2], -1)).reshape(by_wrenches.shape)
     blocks = (-times(by_tau, by_q), -times(by_tau, by_qd), by_tau, last)
     return accelerations | {output.name: block for output, block in zip(BLOCKS, blocks, strict=True)}
 

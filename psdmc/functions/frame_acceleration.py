@@ -28,15 +28,24 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar], qdd: list[Scal
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
+    return {"a": accelerations(robot, given["q"], given["qd"], given["qdd"])}
+
+
+def accelerations(
+    robot: Reference, q: Array, qd: Array, qdd: Array, axes: str = "LOCAL_WORLD_ALIGNED"
+) -> Array:
+    """Return Pinocchio's accelerations (k, frames, 6) of the named frames along `axes`, a name of
+    pinocchio.ReferenceFrame."""
     import pinocchio as pin
 
-    def accelerations(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:
+    along, frames = getattr(pin, axes), robot.frame_ids
+
+    def of_frames(model: Any, data: Any, q: Array, qd: Array, qdd: Array) -> Array:
         pin.forwardKinematics(model, data, q, qd, qdd)
-        aligned = pin.LOCAL_WORLD_ALIGNED
-        found = [pin.getFrameClassicalAcceleration(model, data, frame, aligned) for frame in robot.frame_ids]
+        found = (pin.getFrameClassicalAcceleration(model, data, frame, along) for frame in frames)
         return np.array([motion.vector for motion in found])
 
-    return {"a": robot.each(accelerations, given["q"], given["qd"], given["qdd"])}
+    return robot.each(of_frames, q, qd, qdd)
 
 
 RECIPE = Recipe(

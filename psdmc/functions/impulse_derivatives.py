@@ -9,10 +9,11 @@ import numpy as np
 from psdmc.dynamics import constraints
 from psdmc.dynamics.arrow import any_limbs, pushed_slopes_of_limbs
 from psdmc.dynamics.constraints import Constraints, changed, contact_slopes, response
+from psdmc.dynamics.coordinates import flat
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import ZERO, Scalar
-from psdmc.dynamics.solve import inverse
+from psdmc.dynamics.solve import inverse, less, negative
 from psdmc.functions import (
     contact_jacobian,
     frame_velocity_derivatives,
@@ -32,9 +33,7 @@ from psdmc.recipes.contact_derivatives import (
     changed_by_pinocchio,
     changed_on_arrays,
     constraints_of,
-    flat,
     geometry,
-    minus,
     responses,
     scaled,
     slopes_on_arrays,
@@ -71,8 +70,7 @@ def trace(g: Ingredients) -> Outputs:
     closed = [x + rate for x, rate in zip(found.motion, before, strict=True)] if g.loops else None
     by_q, _ = of.slopes(q, g.still, seen, closed)
     own = response(inverse(factors), jacobian, Held.of(g).compliance(found.factors))
-    load = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(turn, slopes.by_q, strict=True)]
-    rates_q, impulses_q = changed(own, load, [[-x for x in row] for row in by_q])
+    rates_q, impulses_q = changed(own, less(turn, slopes.by_q), negative(by_q))
     nothing = [[0.0] * len(before) for _ in before]
     rates_v, impulses_v = changed(own, nothing, _reversed(of, jacobian, restitution))
     for i, row in enumerate(rates_v):
@@ -88,7 +86,7 @@ def _reversed(
     first = of.contact_rows
     return [
         *([-(1.0 + restitution) * x for x in row] for row in jacobian[:first]),
-        *([-x for x in row] for row in jacobian[first:]),
+        *negative(jacobian[first:]),
     ]
 
 
@@ -103,14 +101,11 @@ def _in_limbs(g: Ingredients) -> Outputs:
     seen = [x + (1.0 + restitution) * rate for x, rate in zip(change, before, strict=True)]
     by_q, _ = contact_slopes(g.frames, g.named, q, g.still, seen, g.root)
     on = Held.of(g).rows[0]
-    loads = [
-        [x - y for x, y in zip(*rows, strict=True)]
-        for rows in zip(_torque_derivatives(g, change).by_q, turn, strict=True)
-    ]
+    loads = less(_torque_derivatives(g, change).by_q, turn)
     rates = [restitution * each for each in on]
     found = {
         "q": arrow.thin([*loads, *scaled(on, by_q)], range(nv)),
-        BEFORE.name: arrow.thin([*minus(mass), *scaled(rates, jacobian)], range(nv)),
+        BEFORE.name: arrow.thin([*negative(mass), *scaled(rates, jacobian)], range(nv)),
     }
     after = [rate + x for rate, x in zip(before, change, strict=True)]
     return {

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from psdmc.dynamics.manifold import integrated
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
-from psdmc.recipes.steps import Q_NEXT, turned
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
+from psdmc.recipes.steps import Q_NEXT
 
 WAY = Quantity(
     "v",
@@ -19,12 +20,11 @@ WAY = Quantity(
 """Rates times seconds: rad or m."""
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"q_next": integrated(g.frames, g.inputs["q"], g.inputs[WAY.name])}
+INPUTS = (Q, WAY)
 
 
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    return {"q_next": turned(robot.frames, given["q"], given[WAY.name])}
+def values(robot: PlacedRobot, q: list[Scalar], way: list[Scalar]) -> Outputs:
+    return {"q_next": integrated(robot.frames, q, way)}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
@@ -37,7 +37,7 @@ RECIPE = Recipe(
         222,
         "q after v, which are rates times seconds: q + v where joints have one coordinate; quaternions turned by v about "
         "their own axes and made unit ones, also where those of q are not",
-        (Q, WAY),
+        INPUTS,
         (Q_NEXT,),
         theta=False,
         summary="Compute the joint positions q_next after a displacement v of the joints from q. For example, v "
@@ -45,8 +45,7 @@ RECIPE = Recipe(
         normalizes=True,
     ),
     "position after constant rates",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "integrate",
     pinocchio,
     matters=(),

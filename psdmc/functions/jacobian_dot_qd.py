@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from psdmc.dynamics.kinematics import frame_drifts
 from psdmc.dynamics.scalar import Scalar
+from psdmc.functions.frame_acceleration import accelerations
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
-from psdmc.robot.mechanism import Array
 
 INPUTS = (Q, QD)
 
@@ -20,15 +18,8 @@ def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
-    import pinocchio as pin
-
-    def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
-        pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
-        aligned = pin.LOCAL_WORLD_ALIGNED
-        found = [pin.getFrameClassicalAcceleration(model, data, frame, aligned) for frame in robot.frame_ids]
-        return np.array([motion.vector for motion in found])
-
-    return {"drift": robot.each(accelerations, given["q"], given["qd"])}
+    q, qd = given["q"], given["qd"]
+    return {"drift": accelerations(robot, q, qd, np.zeros_like(qd))}
 
 
 RECIPE = Recipe(

@@ -3,32 +3,25 @@ block."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.closed_loops import loop_drift
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.closed_loops import ROW_WORDS, of_loops
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q, QD)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"drift": loop_drift(g.frames, g.loops, g.inputs["q"], g.inputs["qd"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
+    return {"drift": loop_drift(robot.frames, robot.loops, q, qd, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    return {"drift": columns(loop_drift(robot.frames, robot.chain.loops, list(q.T), list(qd.T)), len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def found(model: Any, data: Any, q: Array, qd: Array) -> Array:
@@ -56,7 +49,7 @@ RECIPE = Recipe(
         "loop_drift",
         454,
         "accelerations of the closed loops at constant qd (dJ/dt qd), along the axes of the loops' first frames",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "drift",
@@ -73,8 +66,7 @@ RECIPE = Recipe(
         "(dJ/dt) qd = 0.",
     ),
     "loop drift",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameClassicalAcceleration",
     pinocchio,
     beside="loop_jacobian",

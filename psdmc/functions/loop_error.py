@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.closed_loops import loop_error
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.closed_loops import ROW_WORDS, of_loops
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q,)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"error": loop_error(g.frames, g.loops, g.inputs["q"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    return {"error": loop_error(robot.frames, robot.loops, q, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q = given["q"]
-    return {"error": columns(loop_error(robot.frames, robot.chain.loops, list(q.T)), len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def errors(first: Any, second: Any, rows: tuple[int, ...]) -> Array:
@@ -52,7 +45,7 @@ RECIPE = Recipe(
         "loop_error",
         450,
         "how far the closed loops are from closed: the second frame as seen from the first one, along the first one's axes",
-        (Q,),
+        INPUTS,
         (
             Quantity(
                 "error",
@@ -70,8 +63,7 @@ RECIPE = Recipe(
         "in these directions.",
     ),
     "loop error",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "framesForwardKinematics",
     pinocchio,
     needs=Needs.LOOPS,

@@ -4,19 +4,15 @@ joints."""
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from psdmc.functions import loop_jacobian, passive_motion
 from psdmc.program.signature import PIVOTS, QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.closed_loops import ACCELERATIONS_MEAN, PASSIVE, RATES_MEAN, ROW_WORDS, motion
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.recipes.torques_and_accelerations import torques
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 LOOP_FORCES = Quantity(
     "loop_forces",

@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from psdmc.dynamics.closed_loops import loop_jacobian
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.closed_loops import ROW_WORDS, of_loops
-from psdmc.recipes.on_arrays import RobotOnArrays, matrix
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+INPUTS = (Q,)
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"J": loop_jacobian(g.frames, g.loops, g.inputs["q"], g.root)}
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    return {"J": loop_jacobian(robot.frames, robot.loops, q, robot.root)}
 
 
-def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q = given["q"]
-    return {"J": matrix(loop_jacobian(robot.frames, robot.chain.loops, list(q.T)), len(q))}
-
-
-def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
     def found(model: Any, data: Any, q: Array) -> Array:
@@ -55,7 +48,7 @@ RECIPE = Recipe(
         452,
         "velocities of the closed loops per unit joint rate: of the second frame seen from the first one, along the first "
         "one's axes",
-        (Q,),
+        INPUTS,
         (
             Quantity(
                 "J",
@@ -71,8 +64,7 @@ RECIPE = Recipe(
         "directions that the loop blocks. A motion that keeps the loops closed has J qd = 0.",
     ),
     "loop Jacobian",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "getFrameJacobian",
     pinocchio,
     needs=Needs.LOOPS,

@@ -7,27 +7,20 @@ from typing import Any
 import numpy as np
 
 from psdmc.dynamics.momentum_and_energy import total_momentum
-from psdmc.dynamics.scalar import add, cross, transform
+from psdmc.dynamics.scalar import Scalar, add, cross
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Needs, Outputs, PlacedRobot, Recipe, Reference, on_both
 from psdmc.robot.mechanism import Array
 
+INPUTS = (Q, QD)
 
-def trace(g: Ingredients) -> Outputs:
+
+def values(robot: PlacedRobot, q: list[Scalar], qd: list[Scalar]) -> Outputs:
     """Compute the robot's momentum with the masses and inertias of the links in the robot file. Base parameters give
     the right torques, but not the right momentum."""
-    bodies = g.link_bodies()
-    linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
-    axes, origin = g.root
-    turned = transform(axes, linear)
-    return {"h": (*turned, *add(transform(axes, angular), cross(origin, turned)))}
-
-
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    q, qd = given["q"], given["qd"]
-    linear, angular = total_momentum(robot.frames, robot.solids, list(q.T), list(qd.T))
-    return {"h": entries((*linear, *angular), len(q))}
+    linear, angular = total_momentum(robot.frames, robot.solids(), q, qd)
+    turned = robot.in_base(linear)
+    return {"h": [*turned, *add(robot.in_base(angular), cross(robot.root[1], turned))]}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
@@ -48,7 +41,7 @@ RECIPE = Recipe(
         150,
         "linear momentum (kg m/s), then angular momentum about the base frame's origin (kg m^2/s) of all links, along the "
         "base frame's axes, drive inertias not included",
-        (Q, QD),
+        INPUTS,
         (
             Quantity(
                 "h",
@@ -63,8 +56,7 @@ RECIPE = Recipe(
         summary="Compute the linear momentum of all links, and their angular momentum about the origin of the base frame.",
     ),
     "momentum",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "computeCentroidalMomentum",
     pinocchio,
     needs=Needs.STANDARD,

@@ -5,26 +5,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from psdmc.dynamics.coordinates import neutral
 from psdmc.program.signature import Q, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
 
 
-def trace(g: Ingredients) -> Outputs:
-    return {"q": neutral(g.frames)}
-
-
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    return {"q": columns(neutral(robot.frames), len(given["q"]))}
+def values(robot: PlacedRobot) -> Outputs:
+    return {"q": neutral(robot.frames)}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
     import pinocchio as pin
 
-    return {"q": robot.each(lambda model, data, q: np.asarray(pin.neutral(model)), given["q"])}
+    return {"q": robot.each(lambda model, *_: pin.neutral(model), given["q"])}
 
 
 RECIPE = Recipe(
@@ -43,8 +36,7 @@ RECIPE = Recipe(
         summary="Return the configuration in which no joint has moved.",
     ),
     "neutral position",
-    trace,
-    reference,
+    *on_both(values, ()),
     "neutral",
     pinocchio,
     matters=(),

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from psdmc.functions import loop_drift, loop_jacobian
 from psdmc.program.signature import PIVOTS, QD, QDD, Q, Signature
 from psdmc.recipes.closed_loops import ACCELERATIONS_MEAN, PASSIVE, RATES_MEAN, motion
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Needs, Outputs, Recipe, Reference, RobotOnArrays
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 CLOSED_QD = replace(
     QD, name="qd_closed", means="rates of all joints that keep the loops closed, rad/s or m/s"

@@ -6,21 +6,16 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.dynamics.manifold import tangent
+from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference
+from psdmc.recipes.recipe import Arrays, Given, Outputs, PlacedRobot, Recipe, Reference, on_both
+
+INPUTS = (Q,)
 
 
-def trace(g: Ingredients) -> Outputs:
-    q = g.inputs["q"]
-    columns = [tangent(g.frames, q, [float(i == k) for i in range(len(q))]) for k in range(len(q))]
+def values(robot: PlacedRobot, q: list[Scalar]) -> Outputs:
+    columns = [tangent(robot.frames, q, [float(i == k) for i in range(len(q))]) for k in range(len(q))]
     return {"T": list(zip(*columns, strict=True))}
-
-
-def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-    q = given["q"]
-    columns = [tangent(robot.frames, list(q.T), list(unit)) for unit in np.eye(q.shape[-1])]
-    return {"T": entries(list(zip(*columns, strict=True)), len(q))}
 
 
 def pinocchio(robot: Reference, given: Given) -> Arrays:
@@ -36,7 +31,7 @@ RECIPE = Recipe(
         226,
         "T with v = T dq, the displacement that a small change dq of q makes; q may have quaternions of any length, and T "
         "is zero along them; derivatives along the tangent times T are derivatives by the entries of q",
-        (Q,),
+        INPUTS,
         (
             Quantity(
                 "T",
@@ -53,8 +48,7 @@ RECIPE = Recipe(
         normalizes=True,
     ),
     "map from entries of q to the tangent",
-    trace,
-    reference,
+    *on_both(values, INPUTS),
     "integrate",
     pinocchio,
     matters=(),

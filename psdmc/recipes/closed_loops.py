@@ -9,7 +9,7 @@ Source: Featherstone 2008, chapter 8."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,13 +21,10 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inner_product, inverse_diagonal, solve
 from psdmc.program.operations import Op
 from psdmc.program.signature import QD, QDD, Structure, SymmetricMatrix
+from psdmc.recipes.recipe import Reference
 from psdmc.recipes.singular_matrices import regular
 from psdmc.robot.joints.scalars import root as root_of
 from psdmc.robot.mechanism import Array, Loop
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
-
 
 PASSIVE = SymmetricMatrix(
     "J_p J_p^T",

@@ -7,26 +7,24 @@ w of the active contacts. Derivatives of x and f solve the same equations with t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from psdmc.dynamics.arrow import Arrow
 from psdmc.dynamics.constraints import Constraints, of_active
-from psdmc.dynamics.coordinates import first_rates, leading
+from psdmc.dynamics.coordinates import first_rates, flat, leading
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import factorize
+from psdmc.dynamics.solve import factorize, negative
 from psdmc.program.products import Thin
 from psdmc.program.regions import Column, Reader, Region, Straight, straight
 from psdmc.program.signature import THIN
 from psdmc.recipes.contacts import ACTIVE, MU, Held, dense_solution
 from psdmc.recipes.loops import Block, Product, copied, nonzero
-from psdmc.recipes.on_arrays import RobotOnArrays, matrix
+from psdmc.recipes.on_arrays import matrix
+from psdmc.recipes.recipe import Given, Reference, RobotOnArrays
 from psdmc.reproducible import inverse, times
 from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
 
 Rows = Sequence[Sequence[Scalar]]
 
@@ -79,11 +77,6 @@ def geometry(
     jacobian, turn = of.jacobian(q), of.pushes(q, read(forces, counts.rows))
     kept |= {"J": nonzero(jacobian), "turn": nonzero(list(zip(*turn, strict=True)))}
     return jacobian, {"J": Column(flat(jacobian)), "turn": Column(flat(turn))}
-
-
-def flat(rows: Rows) -> list[Scalar]:
-    """The entries of a matrix, row by row."""
-    return [x for row in rows for x in row]
 
 
 def compliant(of: Constraints, kept: Sequence[Sequence[int]]) -> Straight:
@@ -172,8 +165,8 @@ def thin_outputs(
     thin = [row[:nv] for row in arrow.thin_factors()]
     return {
         **{f"d{motion}_d{by}": [list(row) for row in rows[:nv]] for by, rows in changes.items()},
-        **{f"d{forces}_d{by}": minus(rows[nv:]) for by, rows in changes.items()},
-        THIN: [*thin[:nv], *minus(thin[nv:])],
+        **{f"d{forces}_d{by}": negative(rows[nv:]) for by, rows in changes.items()},
+        THIN: [*thin[:nv], *negative(thin[nv:])],
     }
 
 
@@ -188,13 +181,8 @@ def scaled(factors: Sequence[Scalar], rows: Rows) -> list[list[Scalar]]:
     return [[factor * x for x in row] for factor, row in zip(factors, rows, strict=True)]
 
 
-def minus(rows: Rows) -> list[list[Scalar]]:
-    """Return minus a matrix."""
-    return [[-x for x in row] for row in rows]
-
-
 def changed_on_arrays(
-    robot: RobotOnArrays, given: Mapping[str, Array], loads: Sequence[Array], wanted: Sequence[Array]
+    robot: RobotOnArrays, given: Given, loads: Sequence[Array], wanted: Sequence[Array]
 ) -> tuple[list[Array], list[Array], tuple[Array, Array, Array]]:
     """Return the derivatives of the motion and of the contact forces, in NumPy, for k states. Given are those of the load,
     (k, nv, columns) each, and of the prescribed motion, (k, rows, columns) each.
@@ -252,7 +240,7 @@ def slopes_on_arrays(
 
 def changed_by_pinocchio(
     robot: Reference,
-    given: Mapping[str, Array],
+    given: Given,
     loads: Sequence[Array],
     wanted: Sequence[Array],
     jacobian: Array,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,10 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, inverse, inverse_diagonal
 from psdmc.program.operations import Op
 from psdmc.program.signature import Quantity, Structure, SymmetricMatrix
-from psdmc.recipes.on_arrays import RobotOnArrays, columns, matrix
+from psdmc.recipes.on_arrays import columns, matrix
+from psdmc.recipes.recipe import Given, Ingredients, Reference, RobotOnArrays
 from psdmc.recipes.singular_matrices import regular
 from psdmc.robot.mechanism import Array, Loop, NamedFrame
-
-if TYPE_CHECKING:
-    from psdmc.recipes.recipe import Ingredients
-    from psdmc.robot.reference import Reference
 
 _ROWS = "A contact point has three linear {0}. A contact surface has three linear and then three angular {0}"
 ROW_WORDS = f"along the axes of the base frame. {_ROWS}"
@@ -97,7 +94,7 @@ class Held(NamedTuple):
         return Held(g.named, g.inputs[ACTIVE.name], g.inputs[MU.name][0], g.si, g.loops)
 
     @staticmethod
-    def on_arrays(robot: RobotOnArrays, given: Mapping[str, Array], loops: Sequence[Loop] = ()) -> Held:
+    def on_arrays(robot: RobotOnArrays, given: Given, loops: Sequence[Loop] = ()) -> Held:
         """Return the contacts of many states, in NumPy."""
         mu = np.reshape(given[MU.name], -1)
         return Held(robot.chain.frames, list(given[ACTIVE.name].T), mu, loops=loops)
@@ -193,7 +190,7 @@ class Held(NamedTuple):
 
 def held_on_arrays(
     robot: RobotOnArrays,
-    given: Mapping[str, Array],
+    given: Given,
     wanted: Callable[[Array], Array],
     loops: Sequence[Loop] = (),
 ) -> tuple[Array, Array, Array]:
@@ -226,19 +223,19 @@ def joined(of_contacts: Array, of_loops: Array) -> Array:
     return np.concatenate([of_contacts, of_loops], axis=1)
 
 
-def active_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool_]:
+def active_rows(robot: Reference, given: Given) -> NDArray[np.bool_]:
     """Return which rows of the contacts are active, (k, rows)."""
     return np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
 
 
-def held_rows(robot: Reference, given: Mapping[str, Array]) -> NDArray[np.bool_]:
+def held_rows(robot: Reference, given: Given) -> NDArray[np.bool_]:
     """Return which rows of the contacts are active, and true for each row of the closed loops, (k, rows)."""
     loops = sum(len(rows) for _, _, rows in robot.loops)
     return np.pad(active_rows(robot, given), ((0, 0), (0, loops)), constant_values=True)
 
 
 def dense_solution(
-    robot: Reference, given: Mapping[str, Array], jacobian: Array, load: Array, wanted: Array
+    robot: Reference, given: Given, jacobian: Array, load: Array, wanted: Array
 ) -> tuple[Array, Array]:
     """Return the motion x (k, nv) and the contact forces f (k, rows) for k states. They are the reference for tests.
 

@@ -3,17 +3,10 @@ Users cannot call it, so it is not among psdmc.functions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from psdmc.dynamics.momentum_and_energy import generalized_momentum, load_momentum
 from psdmc.program.signature import QD, Joined, Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.mechanism import Array
-
-if TYPE_CHECKING:
-    from psdmc.robot.reference import Reference
+from psdmc.recipes.on_arrays import entries
+from psdmc.recipes.recipe import Arrays, Given, Ingredients, Outputs, Recipe, Reference, RobotOnArrays
 
 LOADS = {"mass": 4, "inertia": 10}
 """By the word of --estimator, how many of a load's parameters are estimated: mass and first moments; inertias, too."""
@@ -30,7 +23,7 @@ def load_recipe(kind: str) -> Recipe:
         own = generalized_momentum(g.frames, g.bodies, g.drives, q, qd, up)
         return _named(own, load_momentum(g.frames, g.tip, g.tip_body, q, qd, up, count))
 
-    def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    def reference(robot: RobotOnArrays, given: Given) -> Arrays:
         states, up, tip = (
             (list(given["q"].T), list(given["qd"].T)),
             robot.base_acceleration,
@@ -77,7 +70,7 @@ def _by_load(name: str, units: tuple[str, str, str], count: int) -> Quantity:
     return Joined(name, ("+".join(f"{number}*nv" for number, _ in rows),), unit=units[0], parts=parts)
 
 
-def _pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+def _pinocchio(robot: Reference, given: Given) -> Arrays:
     """The robot's own; tests compare the load's with Pinocchio's bodies."""
     import numpy as np
 

@@ -254,6 +254,7 @@ class PlacedRobot:
 
     frames: Sequence[Frame]
     named: Sequence[NamedFrame]
+    loops: Sequence[Loop]
     root: tuple[Matrix, Vector]
     solids: Callable[[], Sequence[Body]]
 
@@ -282,14 +283,15 @@ def on_both(
     and each input as a list."""
 
     def trace(g: Ingredients) -> Outputs:
-        return values(
-            PlacedRobot(g.frames, g.named, g.root, g.link_bodies), *(g.inputs[q.name] for q in inputs)
-        )
+        placed = PlacedRobot(g.frames, g.named, g.loops, g.root, g.link_bodies)
+        return values(placed, *(g.inputs[quantity.name] for quantity in inputs))
 
     def reference(robot: RobotOnArrays, given: Given) -> Arrays:
-        placed = PlacedRobot(robot.frames, robot.chain.frames, AT_BASE, lambda: robot.solids)
+        chain = robot.chain
+        placed = PlacedRobot(robot.frames, chain.frames, chain.loops, AT_BASE, lambda: robot.solids)
         found = values(placed, *(list(given[quantity.name].T) for quantity in inputs))
-        return {name: entries(value, len(given["q"])) for name, value in found.items()}
+        count = len(given[inputs[0].name if inputs else "q"])
+        return {name: entries(value, count) for name, value in found.items()}
 
     return trace, reference
 
