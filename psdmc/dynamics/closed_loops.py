@@ -20,8 +20,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 from psdmc.dynamics.coordinates import (
+    as_tuple,
     both_summed,
     columns_summed,
+    first_rates,
+    flat,
     matrices_summed,
     on_coordinates,
     positions,
@@ -276,14 +279,8 @@ def part_of(
     shared = len([1 for a, b in zip(first, second, strict=False) if a == b])
     kept = sorted((*first[shared:], *second[shared:]))
     number = {joint: k for k, joint in enumerate(kept)}
-    starts = [0]
-    for frame in frames:
-        starts.append(starts[-1] + frame.joint.nv)
-    here = positions(frames, q)
+    starts, here = first_rates(frames), positions(frames, q)
     moved = rates(frames, qd) if qd else [()] * len(frames)
-
-    def flat(values: Sequence[Scalar]) -> list[Scalar]:
-        return [x for j in kept for x in (values[j] if isinstance(values[j], tuple) else (values[j],))]
 
     return Part(
         tuple(replace(frames[j], parent=number.get(frames[j].parent, BASE)) for j in kept),
@@ -291,8 +288,8 @@ def part_of(
             replace(loop.first, joint=number.get(loop.first.joint, BASE)),
             replace(loop.second, joint=number.get(loop.second.joint, BASE)),
         ),
-        flat(here),
-        flat(moved),
+        flat(as_tuple(here[j]) for j in kept),
+        flat(as_tuple(moved[j]) for j in kept),
         AT_BASE if shared else root,
         tuple(starts[j] for j in kept),
         tuple(1 if j in second else -1 for j in kept),

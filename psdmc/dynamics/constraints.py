@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from psdmc.dynamics.closed_loops import loop_error_slopes, loop_jacobian, loop_pushes, loop_slopes
 from psdmc.dynamics.coordinates import both_summed, first_rates, on_coordinates
-from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.frames import Frame, as_vector
 from psdmc.dynamics.kinematics import (
     AT_BASE,
     Root,
@@ -22,7 +22,7 @@ from psdmc.dynamics.kinematics import (
     path_to,
     twists_along,
 )
-from psdmc.dynamics.scalar import Scalar, Vector, add, cross, dot
+from psdmc.dynamics.scalar import Scalar, add, cross, dot
 from psdmc.dynamics.solve import (
     Factors,
     factorize,
@@ -212,7 +212,7 @@ def pushed_slopes(
             continue
         own = list(forces[used : used + each.rows])
         used += each.rows
-        force, moment = _vector(own[:3]), _vector(own[3:]) if each.rows > 3 else None
+        force, moment = as_vector(own[:3]), as_vector(own[3:]) if each.rows > 3 else None
         path = path_to(frames, each.joint)
         numbers, twists = twists_along(path, frames, first, rows)
         pushed = {k: cross(along, force) for k, (along, _) in twists.items()}
@@ -229,11 +229,6 @@ def pushed_slopes(
                 for j in outer:
                     found[i][j] = found[i][j] + dot(twists[i][1], pushed[j])
     return found
-
-
-def _vector(values: Sequence[Scalar]) -> Vector:
-    x, y, z = values
-    return x, y, z
 
 
 class Response(NamedTuple):

@@ -66,6 +66,11 @@ def leading(frames: Sequence[Frame]) -> list[Frame]:
     return [frame for frame in frames if frame.follows is None]
 
 
+def as_tuple(own: Scalar) -> tuple[Scalar, ...]:
+    """Return the values of one joint as a tuple; a single value becomes a tuple with one entry."""
+    return own if isinstance(own, tuple) else (own,)
+
+
 def _dealt(counts: Sequence[int], values: Sequence[Scalar]) -> list[Scalar]:
     if len(values) != sum(counts):
         raise ValueError(f"{len(values)} values for joints that have {sum(counts)}")
@@ -176,6 +181,11 @@ def columns_summed(
 def matrices_summed(frames: Sequence[Frame], matrices: Sequence[Any]) -> list[Any]:
     """Several of these."""
     return [columns_summed(frames, rows) for rows in matrices]
+
+
+def each_summed(gather: Gather) -> Gather:
+    """Return the function that converts each block of a named tuple by `gather`."""
+    return lambda frames, found: type(found)(*(gather(frames, block) for block in found))
 
 
 def both_summed(frames: Sequence[Frame], rows: Sequence[Sequence[Scalar]]) -> tuple[tuple[Scalar, ...], ...]:

@@ -283,12 +283,8 @@ def torque_row(frame: Frame, axis: Axis, composite: Composite) -> Row:
 
     The joint has one rate. The vectors are relative to the origin of the joint.
     """
-    turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
-    parts = []
-    if turn is not None:
-        parts.append(_scaled_row(_turning_row(axis, composite), turn))
-    if slide is not None:
-        parts.append(_scaled_row(_sliding_row(axis, composite), slide))
+    rows = (frame.joint.turn(1.0), _turning_row), (frame.joint.slide(1.0), _sliding_row)
+    parts = [_scaled_row(row(axis, composite), factor) for factor, row in rows if factor is not None]
     return parts[0] if len(parts) == 1 else Row(*(add(x, y) for x, y in zip(*parts, strict=True)))
 
 
@@ -340,16 +336,13 @@ def wrenches_of_motion(frame: Frame, axis: Axis, composite: Composite) -> tuple[
 
     They are the derivatives of the wrench that the bodies' motion requires.
     """
-    turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
-    parts = []
-    if turn is not None:
-        parts.append(
-            (_scaled(_turned_wrench(axis, composite), turn), _scaled(_turning_wrench(axis, composite), turn))
-        )
-    if slide is not None:
-        parts.append(
-            (_scaled(_slid_wrench(axis, composite), slide), _scaled(_sliding_wrench(axis, composite), slide))
-        )
+    turning = frame.joint.turn(1.0), _turned_wrench, _turning_wrench
+    sliding = frame.joint.slide(1.0), _slid_wrench, _sliding_wrench
+    parts = [
+        (_scaled(moved(axis, composite), factor), _scaled(pushed(axis, composite), factor))
+        for factor, moved, pushed in (turning, sliding)
+        if factor is not None
+    ]
     if len(parts) == 1:
         return parts[0]
     (a, b), (c, d) = parts

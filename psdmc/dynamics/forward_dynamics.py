@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.coordinates import any_follows, first_rates, flat, positions, rates
+from psdmc.dynamics.coordinates import any_follows, as_tuple, first_rates, flat, positions, rates
 from psdmc.dynamics.frames import (
     BASE,
     Frame,
@@ -33,7 +33,18 @@ from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transpose
 from psdmc.dynamics.solve import Factors, SingularMatrix, factorize, inner_product, solve
-from psdmc.dynamics.spatial import Body, combined, efforts, own_rates
+from psdmc.dynamics.spatial import (
+    PLACES,
+    Body,
+    Six,
+    combined,
+    efforts,
+    full,
+    half,
+    spun_matrix,
+    spun_six,
+    weighted,
+)
 
 Accelerations = tuple[list[Scalar], tuple[Scalar, ...]]
 """nv accelerations, and the nv pivots of the mass matrix."""
@@ -108,11 +119,11 @@ class _Inward:
         frame, whole = self.frames[i], rigid(self.bodies[i])
         if i in self.beyond:
             whole = both(whole, self.beyond[i])
-        given = own_rates(frame.joint, self.torques[i])
+        given = as_tuple(self.torques[i])
         left = [tau - own for tau, own in zip(given, needed, strict=True)]
         # With I the articulated inertia and S the joint's axes: the columns U = I S, factors of D = S^T U, and D^-1 left.
         rows = rows_of(whole)
-        columns = [_combined(rows, twist) for twist in frame.joint.twists]
+        columns = [[weighted((*v, *w), row) for row in rows] for v, w in frame.joint.twists]
         factors = self._factors(i, columns)
         drive = self.drives[i]
         along = _along(frame) if isinstance(drive, float) and drive == 0.0 else None
@@ -199,20 +210,6 @@ def _along(frame: Frame) -> int | None:
     return weights.index(1.0) if sorted(weights) == [0.0] * 5 + [1.0] else None
 
 
-def _combined(
-    rows: Sequence[Sequence[Scalar]], twist: tuple[Sequence[float], Sequence[float]]
-) -> list[Scalar]:
-    weights = (*twist[0], *twist[1])
-    found = []
-    for row in rows:
-        total: Scalar = 0.0
-        for value, weight in zip(row, weights, strict=True):
-            if weight:
-                total = total + (value if weight == 1.0 else value * weight)
-        found.append(total)
-    return found
-
-
 def _halves(values: Sequence[Scalar]) -> tuple[Vector, Vector]:
     return (values[0], values[1], values[2]), (values[3], values[4], values[5])
 
@@ -246,12 +243,6 @@ def _minus_cross(v: Sequence[Scalar]) -> Matrix:
 
 # Articulated inertias: the wrench per acceleration of a body whose further joints move freely, as symmetric 6 x 6 matrices
 # in blocks.
-Six = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
-"""A symmetric matrix: xx, yy, zz, xy, xz, yz; or a force and a moment, a linear and an angular acceleration."""
-
-_PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-
-
 class Articulated(NamedTuple):
     """The articulated inertia of a body: the wrench that accelerates it while the joints after it are free to move.
 
@@ -303,7 +294,7 @@ def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
     )
     near, far = multiply(skew, mixed), multiply(skew, inertia.mixed)
     angular = tuple(
-        own + (near[i][j] + far[j][i]) for own, (i, j) in zip(inertia.angular, _PLACES, strict=True)
+        own + (near[i][j] + far[j][i]) for own, (i, j) in zip(inertia.angular, PLACES, strict=True)
     )
     return Articulated(inertia.linear, mixed, angular)
 
@@ -329,15 +320,10 @@ def before_turn(inertia: Articulated, turn: Turn | Rotation | None) -> Articulat
         return inertia
     if isinstance(turn, Rotation):
         return rotated(inertia, turn.rows)
-    linear = _turned(inertia.linear, turn)
+    linear = spun_six(inertia.linear, turn)
     # The cross block is not symmetric.
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.mixed
-    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
-    moved, crossed = turn.sine * slope, turn.cosine * slope
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    zx, zy, _ = turn.inward((zx, zy, 0.0))
-    mixed = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
-    return Articulated(linear, mixed, _turned(inertia.angular, turn))
+    mixed = spun_matrix(inertia.mixed, turn)
+    return Articulated(linear, mixed, spun_six(inertia.angular, turn))
 
 
 def rotated(inertia: Articulated, rows: Matrix) -> Articulated:
@@ -350,13 +336,7 @@ def rotated(inertia: Articulated, rows: Matrix) -> Articulated:
         multiply(multiply(rows, part), back)
         for part in (full(inertia.linear), inertia.mixed, full(inertia.angular))
     )
-    return Articulated(_half(linear), mixed, _half(angular))
-
-
-def full(six: Six) -> Matrix:
-    """The symmetric matrix."""
-    xx, yy, zz, xy, xz, yz = six
-    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    return Articulated(half(linear), mixed, half(angular))
 
 
 def rows_of(inertia: Articulated) -> list[list[Scalar]]:
@@ -368,25 +348,11 @@ def rows_of(inertia: Articulated) -> list[list[Scalar]]:
 
 def from_rows(rows: Sequence[Sequence[Scalar]]) -> Articulated:
     """Build an articulated inertia from a 6 x 6 matrix; of its symmetric blocks only the upper triangles are read."""
-    linear = tuple(rows[i][j] for i, j in _PLACES)
+    linear = tuple(rows[i][j] for i, j in PLACES)
     mixed = tuple((row[3], row[4], row[5]) for row in rows[:3])
-    angular = tuple(rows[i + 3][j + 3] for i, j in _PLACES)
+    angular = tuple(rows[i + 3][j + 3] for i, j in PLACES)
     return Articulated(linear, mixed, angular)  # type: ignore[arg-type]
 
 
 def _sum(a: Six, b: Six) -> Six:
     return tuple(x + y for x, y in zip(a, b, strict=True))
-
-
-def _half(rows: Matrix) -> Six:
-    return tuple(rows[i][j] for i, j in _PLACES)
-
-
-def _turned(six: Six, turn: Turn) -> Six:
-    """Symmetric, before a turn about z, products nested: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes
-    c t - xy."""
-    xx, yy, zz, xy, xz, yz = six
-    slope = turn.sine * (xx - yy) + turn.cosine * (xy + xy)
-    moved = turn.sine * slope
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    return (xx - moved, yy + moved, zz, turn.cosine * slope - xy, xz, yz)

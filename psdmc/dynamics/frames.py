@@ -10,7 +10,7 @@ cosine exactly and need no operations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -183,14 +183,14 @@ def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
     `kept` must include all joints that carry or lead one of the joints in it.
     """
     number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
+
+    def renumbered(follows: Follows) -> Follows:
+        return follows._replace(shares=tuple((number[leader], ratio) for leader, ratio in follows.shares))
+
     own = (frames[joint] for joint in kept)
     return tuple(
-        replace(f, parent=number[f.parent], follows=f.follows and _renumbered(f.follows, number)) for f in own
+        replace(f, parent=number[f.parent], follows=f.follows and renumbered(f.follows)) for f in own
     )
-
-
-def _renumbered(follows: Follows, number: Mapping[int, int]) -> Follows:
-    return follows._replace(shares=tuple((number[leader], ratio) for leader, ratio in follows.shares))
 
 
 def what_follows(chain: Mechanism, i: int) -> Follows | None:

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
-from psdmc.dynamics.coordinates import columns_summed, first_rates, matrices_summed, on_coordinates, positions
+from psdmc.dynamics.coordinates import (
+    columns_summed,
+    each_summed,
+    first_rates,
+    matrices_summed,
+    on_coordinates,
+    positions,
+)
 from psdmc.dynamics.frames import (
     BASE,
     IDENTITY,
@@ -284,7 +292,7 @@ def frame_velocity_slopes(
         path = path_to(frames, each.joint)
         own, twists = twists_along(path, frames, first, rows)
         turning = [_sum(scale(twists[k][1], qd[k]) for k in own[j]) for j in path]
-        before = dict(zip(path, _running(turning), strict=True))
+        before = dict(zip(path, accumulate(turning[:-1], add, initial=ZERO), strict=True))
         linear, angular = ZERO, ZERO
         for j in reversed(path):
             for k in own[j]:
@@ -306,11 +314,7 @@ class FrameSlopes(NamedTuple):
     by_qdd: list[list[list[Scalar]]]
 
 
-def _slopes_summed(frames: Sequence[Frame], found: FrameSlopes) -> FrameSlopes:
-    return FrameSlopes(*(matrices_summed(frames, block) for block in found))
-
-
-@on_coordinates(_slopes_summed)
+@on_coordinates(each_summed(matrices_summed))
 def frame_acceleration_slopes(
     frames: Sequence[Frame],
     named: Sequence[NamedFrame],
@@ -383,14 +387,6 @@ def _sum(parts: Iterable[Vector]) -> Vector:
     for other in others:
         first = add(first, other)
     return first
-
-
-def _running(parts: Sequence[Vector]) -> list[Vector]:
-    """For each part the sum of all before it."""
-    sums: list[Vector] = [ZERO]
-    for part in parts[:-1]:
-        sums.append(add(sums[-1], part))
-    return sums
 
 
 def link_wrenches(

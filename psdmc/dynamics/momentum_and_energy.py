@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.coordinates import (
+    as_tuple,
     columns_summed,
+    each_summed,
     first_rates,
     matrices_summed,
     neutral,
@@ -40,7 +42,6 @@ from psdmc.dynamics.spatial import (
     in_previous,
     joined,
     momentum,
-    own_rates,
     shifted,
     turned,
 )
@@ -57,26 +58,9 @@ def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -
     for frame, state, rate in zip(frames, joint_states(frames, q), rates(frames, qd), strict=True):
         before = (ZERO, ZERO) if frame.parent == BASE else found[frame.parent]
         linear, angular = carried(frame, state, before)
-        own_linear, own_angular = combined(frame.joint, own_rates(frame.joint, rate))
+        own_linear, own_angular = combined(frame.joint, as_tuple(rate))
         found.append((add(linear, own_linear), add(angular, own_angular)))
     return found
-
-
-def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
-    """Return a body's momentum m v + w x h, and its angular momentum h x v + I w about the origin of a frame.
-
-    The frame has velocity v and angular velocity w. The body has mass m, first moments h and inertia I about its
-    origin.
-    """
-    linear, (wx, wy, wz) = twist
-    xx, yy, zz, xy, xz, yz = body.second
-    own = (
-        (yy + zz) * wx - xy * wy - xz * wz,
-        (xx + zz) * wy - xy * wx - yz * wz,
-        (xx + yy) * wz - xz * wx - yz * wy,
-    )
-    moved = add(scale(linear, body.mass), cross((wx, wy, wz), body.moment))
-    return moved, add(cross(body.moment, linear), own)
 
 
 @on_coordinates()
@@ -239,11 +223,7 @@ def _mass(bodies: Sequence[Body]) -> Scalar:
     return sum(body.mass for body in bodies)
 
 
-def _summed(frames: Sequence[Frame], found: RateSlopes) -> RateSlopes:
-    return RateSlopes(*(columns_summed(frames, block) for block in found))
-
-
-@on_coordinates(_summed)
+@on_coordinates(each_summed(columns_summed))
 def momentum_rate_slopes(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
@@ -363,7 +343,7 @@ def load_momentum(
     values, total, upto = rates(frames, qd), (ZERO, ZERO), dict[int, Twist]()
     for k in reversed(path):
         own = range(first[k], first[k] + frames[k].joint.nv)
-        for i, rate in zip(own, own_rates(frames[k].joint, values[k]), strict=True):
+        for i, rate in zip(own, as_tuple(values[k]), strict=True):
             total = add(total[0], scale(seen[i][0], rate)), add(total[1], scale(seen[i][1], rate))
         upto |= dict.fromkeys(own, total)
     moving = LinkMotion(total[0], spin_of(Rates(ZERO, total[1])))

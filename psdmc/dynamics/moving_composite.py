@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from psdmc.dynamics.coordinates import as_tuple
 from psdmc.dynamics.frames import Frame, Rotation, Turn, handed_vector, to_previous
 from psdmc.dynamics.motion import LinkMotion, Rates, spin_of
 from psdmc.dynamics.newton_euler import wrench
@@ -32,12 +33,13 @@ from psdmc.dynamics.scalar import (
 from psdmc.dynamics.spatial import (
     Body,
     combined,
+    full,
     handed_body,
     in_previous,
     joined,
-    own_rates,
     shifted,
     spun,
+    spun_matrix,
     turned,
 )
 from psdmc.robot.joints import JointType
@@ -136,12 +138,7 @@ def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite
         return _rotated(composite, turn)
     force, moment = (turn.inward(v) for v in composite.wrench)
     body = spun(composite.body, turn)
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = composite.momenta.second
-    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
-    moved, crossed = turn.sine * slope, turn.cosine * slope
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    zx, zy, _ = turn.inward((zx, zy, 0.0))
-    second = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
+    second = spun_matrix(composite.momenta.second, turn)
     return Composite(body, Momenta(second, turn.inward(composite.momenta.first)), (force, moment))
 
 
@@ -169,15 +166,15 @@ def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scala
     s and ds/dt.
     """
     (u, s), (u_change, s_change) = (
-        combined(joint, own_rates(joint, qd)),
-        combined(joint, own_rates(joint, qdd)),
+        combined(joint, as_tuple(qd)),
+        combined(joint, as_tuple(qdd)),
     )
     body, (second, first), (force, moment) = composite
     pushed = wrench(LinkMotion(add(u_change, cross(s, u)), spin_of(Rates(s, s_change))), body)
     force = add(force, add(pushed[0], cross(s, first)))
     moment = add(moment, add(pushed[1], swept(second, s)))
     rows: list[Vector] = []
-    for row, inertia, h in zip(second, second_rows(body), body.moment, strict=True):
+    for row, inertia, h in zip(second, full(body.second), body.moment, strict=True):
         rows.append(add(row, scale(add(cross(s, inertia), scale(u, h)), 2.0)))
     first = add(first, scale(add(cross(s, body.moment), scale(u, body.mass)), 2.0))
     return Composite(body, Momenta((rows[0], rows[1], rows[2]), first), (force, moment))
@@ -191,12 +188,6 @@ def swept(second: Matrix, s: Vector) -> Vector:
     """
     trace = second[0][0] + second[1][1] + second[2][2]
     return add(scale(s, trace), scale(transform(transpose(second), s), -1.0))
-
-
-def second_rows(body: Body) -> Matrix:
-    """int r r^T dm"""
-    xx, yy, zz, xy, xz, yz = body.second
-    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 def _spinning(composite: Composite, rate: Scalar, acceleration: Scalar) -> Composite:

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.coordinates import both_summed, first_rates, on_coordinates, rates
+from psdmc.dynamics.coordinates import as_tuple, both_summed, each_summed, first_rates, on_coordinates, rates
 from psdmc.dynamics.derivatives import (
     Rows,
     Swept,
@@ -46,10 +46,9 @@ from psdmc.dynamics.moving_composite import (
     both,
     handed_composite,
     moved_to,
-    second_rows,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, scale, transform
-from psdmc.dynamics.spatial import Body, combined, own_rates
+from psdmc.dynamics.spatial import Body, combined, full
 from psdmc.robot.joints import JointType
 
 Motion = tuple[Vector, Vector]
@@ -77,11 +76,7 @@ class SecondDerivatives(NamedTuple):
         return (*rows, *((*q, *still, *still) for q in zip(*q_qdd, strict=True)))
 
 
-def _summed(frames: Sequence[Frame], found: SecondDerivatives) -> SecondDerivatives:
-    return SecondDerivatives(*(both_summed(frames, rows) for rows in found))
-
-
-@on_coordinates(_summed)
+@on_coordinates(each_summed(both_summed))
 def inverse_dynamics_second_derivatives(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
@@ -133,7 +128,7 @@ def _motion_before(
 
 def _after(frame: Frame, motion: Motion, weights: Scalar) -> Motion:
     """The motion of the link beyond a joint, from that of the link before it."""
-    linear, angular = combined(frame.joint, own_rates(frame.joint, weights))
+    linear, angular = combined(frame.joint, as_tuple(weights))
     return add(motion[0], linear), add(motion[1], angular)
 
 
@@ -150,7 +145,7 @@ def _weighted_composites(
     for i in reversed(range(len(frames))):
         frame, step = frames[i], moving.steps[i]
         linear, angular = _after(frame, before[i], weights[i])
-        slide, turning = combined(frame.joint, own_rates(frame.joint, moving.qd[i]))
+        slide, turning = combined(frame.joint, as_tuple(moving.qd[i]))
         if is_leaf[i] and frame.joint.about_z:
             body = leaf_body(moving, i, bodies[i])
             whole = _moments(body, add(moving.axes[i].w, turning), (linear, angular))
@@ -176,7 +171,7 @@ def _weighted_composites(
 
 def _moments(body: Body, w: Vector, motion: Motion) -> Composite:
     """The moments of u over one body, which turns with w."""
-    (linear, angular), h, second = motion, body.moment, second_rows(body)
+    (linear, angular), h, second = motion, body.moment, full(body.second)
     rows = [add(scale(linear, x), cross(angular, row)) for x, row in zip(h, second, strict=True)]
     first = add(scale(linear, body.mass), cross(angular, h))
     b = add(transform(second, cross(w, angular)), cross(cross(w, h), linear))
@@ -235,7 +230,7 @@ def _moved_row(axis: Axis, composite: Composite, w: Matrix, whole: Row, before: 
     swept = add(scale(bend, trace), scale(transform(second, bend), -1.0))
     swept = add(swept, cross(drifting, bent))
     own = add(_turning_twice(w, cross(axis.w, turn)), cross(cross(axis.w, slide), whole.c))
-    own = add(own, transform(second_rows(body), cross(axis.w, bend)))
+    own = add(own, transform(full(body.second), cross(axis.w, bend)))
     return Row(a, add(add(cross(turn, whole.b), swept), scale(own, 2.0)), c)
 
 

@@ -22,6 +22,43 @@ from psdmc.dynamics.scalar import (
 )
 from psdmc.robot.joints import JointType, Twist
 
+Six = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+"""A symmetric 3 x 3 matrix: xx, yy, zz, xy, xz, yz."""
+
+PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Where these entries are in the matrix."""
+
+
+def full(six: Six) -> Matrix:
+    """Return the symmetric matrix with these six entries."""
+    xx, yy, zz, xy, xz, yz = six
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def half(rows: Matrix) -> Six:
+    """Return the six entries of a symmetric matrix."""
+    return tuple(rows[i][j] for i, j in PLACES)
+
+
+def spun_matrix(rows: Matrix, turn: Turn) -> Matrix:
+    """Return R A R^T of a matrix A, given in a joint's rotated frame, with the joint's rotation R about z. Products are
+    nested as in `spun`."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rows
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
+    moved, crossed = turn.sine * slope, turn.cosine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    zx, zy, _ = turn.inward((zx, zy, 0.0))
+    return ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
+
+
+def spun_six(six: Six, turn: Turn) -> Six:
+    """Return R A R^T of a symmetric matrix A, with products nested as in `spun`."""
+    xx, yy, zz, xy, xz, yz = six
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + xy)
+    moved = turn.sine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    return (xx - moved, yy + moved, zz, turn.cosine * slope - xy, xz, yz)
+
 
 class Body(NamedTuple):
     """The mass and the moments of a rigid body, relative to a frame: integrals of 1, r and r r^T over the mass.
@@ -36,7 +73,7 @@ class Body(NamedTuple):
 
     mass: Scalar
     moment: Vector
-    second: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+    second: Six
 
 
 def body_from_parameters(x: Sequence[Scalar]) -> Body:
@@ -82,11 +119,7 @@ def spun(body: Body, turn: Turn | None) -> Body:
     """
     if turn is None:
         return body
-    xx, yy, zz, xy, xz, yz = body.second
-    slope = turn.sine * (xx - yy) + turn.cosine * (xy + xy)
-    moved = turn.sine * slope
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    second = (xx - moved, yy + moved, zz, turn.cosine * slope - xy, xz, yz)
+    second = spun_six(body.second, turn)
     return Body(body.mass, turn.inward(body.moment), second)
 
 
@@ -106,17 +139,13 @@ def in_previous(frame: Frame, body: Body) -> Body:
         yz = sine * cosine * difference + (1.0 - 2.0 * sine * sine) * yz
         xy, xz, _ = Turn(sine, cosine).inward((xy, xz, 0.0))
         return Body(body.mass, moment, (xx, yy - moved, zz + moved, xy, xz, yz))
-    s = rotated_tensor(frame.inward_rows, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
-    return Body(body.mass, moment, (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2]))
+    return Body(body.mass, moment, half(rotated_tensor(frame.inward_rows, full(body.second))))
 
 
 def _rotated(body: Body, rows: Matrix) -> Body:
     """A body about one frame along the axes of another, of which the rows give its own."""
-    xx, yy, zz, xy, xz, yz = body.second
-    second: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    s = multiply(multiply(rows, second), transpose(rows))
-    moment = transform(rows, body.moment)
-    return Body(body.mass, moment, (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2]))
+    second = multiply(multiply(rows, full(body.second)), transpose(rows))
+    return Body(body.mass, transform(rows, body.moment), half(second))
 
 
 def shifted(body: Body, offset: Vector) -> Body:
@@ -186,11 +215,6 @@ def combined(joint: JointType, rates: Sequence[Scalar]) -> tuple[Vector, Vector]
         weighted([(*linear, *angular)[part] for linear, angular in joint.twists], rates) for part in range(6)
     ]
     return (parts[0], parts[1], parts[2]), (parts[3], parts[4], parts[5])
-
-
-def own_rates(joint: JointType, rates: Scalar) -> tuple[Scalar, ...]:
-    """Return the rates of one joint as a tuple; a single rate becomes a tuple with one entry."""
-    return rates if isinstance(rates, tuple) else (rates,)
 
 
 def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:

@@ -6,7 +6,7 @@ is the number zero is zero at every state, for all masses and inertias.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -121,14 +121,9 @@ def regressor_places(chain: Mechanism, lift: Array) -> Places:
     placed = [joint.link_frame for joint in chain.joints]
     q, rates = [SOMETHING] * chain.nq, [SOMETHING] * chain.nv
     rows = regressor(frames_of(chain), placed, needed, q, rates, rates, base_acceleration(chain))
-    return tuple(_in_base_parameters(rows, lift))
-
-
-def _in_base_parameters(rows: tuple[dict[int, Scalar], ...], lift: Array) -> Iterator[tuple[int, int]]:
     parts = [frozenset(np.flatnonzero(column).tolist()) for column in lift.T]
-    for i, row in enumerate(rows):
-        seen = frozenset(k for k, value in row.items() if _differs(value))
-        yield from ((i, j) for j, part in enumerate(parts) if part & seen)
+    seen = [frozenset(k for k, value in row.items() if _differs(value)) for row in rows]
+    return tuple((i, j) for i, own in enumerate(seen) for j, part in enumerate(parts) if part & own)
 
 
 def _lower_triangle(rows: Sequence[Sequence[Scalar]]) -> Places:

@@ -97,10 +97,6 @@ class PassiveJoints(NamedTuple):
             moving[k] = scale * value
         return moving
 
-    def newton_step(self, error: Sequence[Scalar]) -> list[Scalar]:
-        """Return the small motion x of all joints, 0 for those that are not passive, with J x + error = 0."""
-        return self.completed([0.0] * len(self.jacobian[0]), error)
-
     def size(self, step: Sequence[Scalar]) -> Scalar:
         """Return the sum of the squares of a motion of passive joints, in rad and m."""
         parts = [step[k] / scale for k, scale in zip(self.numbers, self.scales, strict=True)]
@@ -162,7 +158,8 @@ def closer(
     step was so short that the loops are now closed within rounding, else -1.
     """
     joints = PassiveJoints.at(frames, loops, q, si, root)
-    step = joints.newton_step(loop_error(frames, loops, q, root))
+    # The small motion x of the passive joints with J x + error = 0.
+    step = joints.completed([0.0] * len(joints.jacobian[0]), loop_error(frames, loops, q, root))
     size = joints.size(step)
     share = 1.0 / root_of(1.0 + size)
     moved = integrated(frames, q, [share * x for x in step])

@@ -106,7 +106,7 @@ class ContactFunction:
                 factorises=signature.factorises,
             ),
             f"{self.values.title}, {title}",
-            self._gradient_trace if ending == "vjp" else self._along_trace,
+            (lambda g: self.gradient_and_adjoint(g)[0]) if ending == "vjp" else self._along_trace,
             lambda robot, given: blocks(self.derivatives.reference(robot, dict(given)), given),
             self.derivatives.against,
             lambda robot, given: blocks(self.derivatives.pinocchio(robot, given), given),
@@ -114,9 +114,6 @@ class ContactFunction:
             matters=self.values.matters,
             closes=True,
         )
-
-    def _gradient_trace(self, g: Ingredients) -> Outputs:
-        return self.gradient_and_adjoint(g)[0]
 
     def gradient_and_adjoint(self, g: Ingredients) -> tuple[Outputs, list[Scalar]]:
         """Return the gradient function's outputs, and the adjoint of the motion. The adjoint has the nv derivatives of the

@@ -223,15 +223,11 @@ def joined(of_contacts: Array, of_loops: Array) -> Array:
     return np.concatenate([of_contacts, of_loops], axis=1)
 
 
-def active_rows(robot: Reference, given: Given) -> NDArray[np.bool_]:
-    """Return which rows of the contacts are active, (k, rows)."""
-    return np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
-
-
 def held_rows(robot: Reference, given: Given) -> NDArray[np.bool_]:
     """Return which rows of the contacts are active, and true for each row of the closed loops, (k, rows)."""
     loops = sum(len(rows) for _, _, rows in robot.loops)
-    return np.pad(active_rows(robot, given), ((0, 0), (0, loops)), constant_values=True)
+    active = np.repeat(given[ACTIVE.name], [rows for _, rows in robot.contacts], axis=1) > 0.5
+    return np.pad(active, ((0, 0), (0, loops)), constant_values=True)
 
 
 def dense_solution(

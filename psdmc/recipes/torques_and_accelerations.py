@@ -12,7 +12,7 @@ import numpy as np
 
 from psdmc.dynamics.arrow import Arrow, eliminated
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.coordinates import flat, joints_of_rates, positions
+from psdmc.dynamics.coordinates import as_tuple, flat, joints_of_rates, positions
 from psdmc.dynamics.derivatives import Derivatives, Rows, inverse_dynamics_derivatives
 from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.frames import part_of, with_carriers
@@ -151,7 +151,7 @@ def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
     rates = tuple(k for k, joint in enumerate(owners) if joint in kept)
     leading = [i for i, frame in enumerate(frames) if frame.follows is None]
     q = dict(zip(leading, positions(frames, g.inputs["q"]), strict=True))
-    own = [q[i] if isinstance(q[i], tuple) else (q[i],) for i in kept if i in q]
+    own = [as_tuple(q[i]) for i in kept if i in q]
     part = replace(
         g,
         frames=part_of(frames, kept),
