@@ -37,7 +37,6 @@ from psdmc.dynamics.joint_steps import (
     Row,
     Step,
     Wrench,
-    accelerating,
     axis_along,
     axis_and_step,
     bending,
@@ -61,7 +60,7 @@ from psdmc.dynamics.moving_composite import (
 )
 from psdmc.dynamics.newton_euler import NO_WRENCHES
 from psdmc.dynamics.scalar import Scalar, Vector, add, cross, dot, scale, transform
-from psdmc.dynamics.spatial import Body, combined, effort, efforts, spun, turned
+from psdmc.dynamics.spatial import Body, combined, effort, efforts, momentum_of, spun, turned
 from psdmc.robot.joints import JointType
 
 Rows = tuple[tuple[Scalar, ...], ...]
@@ -326,7 +325,7 @@ def wrenches_of_motions(
         there = axis_along(axis, number), composite_along(composite, number)
         moved, pushed = (_turned_wrench, _turning_wrench) if turns else (_slid_wrench, _sliding_wrench)
         first, second = ((from_z(f, number), from_z(m, number)) for f, m in (moved(*there), pushed(*there)))
-        bent = accelerating(composite.body, *bending(own, number, turns))
+        bent = momentum_of(composite.body, bending(own, number, turns))
         found.append((first, (add(second[0], bent[0]), add(second[1], bent[1]))))
     return found
 

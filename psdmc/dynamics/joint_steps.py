@@ -258,19 +258,6 @@ def bending(own: Vectors, number: int, turns: bool) -> Vectors:
     return (cross(u, e), cross(s, e)) if turns else (cross(s, e), ZERO)
 
 
-def accelerating(body: Body, linear: Vector, angular: Vector) -> Wrench:
-    """Return the force and moment that give a body at rest the given linear and angular accelerations."""
-    xx, yy, zz, xy, xz, yz = body.second
-    ax, ay, az = angular
-    spun = (
-        (yy + zz) * ax - xy * ay - xz * az,
-        (xx + zz) * ay - xy * ax - yz * az,
-        (xx + yy) * az - xz * ax - yz * ay,
-    )
-    force = add(scale(linear, body.mass), cross(angular, body.moment))
-    return force, add(spun, cross(body.moment, linear))
-
-
 def by_own_axes(
     joint: JointType, axis: Axis, row: Row, rates: Scalar
 ) -> tuple[tuple[Scalar, ...], tuple[Scalar, ...], tuple[Scalar, ...]]:

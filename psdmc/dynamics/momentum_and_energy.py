@@ -42,6 +42,7 @@ from psdmc.dynamics.spatial import (
     in_previous,
     joined,
     momentum,
+    momentum_of,
     shifted,
     turned,
 )

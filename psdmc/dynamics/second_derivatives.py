@@ -37,7 +37,7 @@ from psdmc.dynamics.derivatives import (
     wrenches_of_motions,
 )
 from psdmc.dynamics.frames import BASE, Frame, from_previous, leaves, outward
-from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, accelerating, by_own_axes
+from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, by_own_axes
 from psdmc.dynamics.moving_composite import (
     Composite,
     Momenta,
@@ -48,7 +48,7 @@ from psdmc.dynamics.moving_composite import (
     moved_to,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, scale, transform
-from psdmc.dynamics.spatial import Body, combined, full
+from psdmc.dynamics.spatial import Body, combined, full, momentum_of
 from psdmc.robot.joints import JointType
 
 Motion = tuple[Vector, Vector]
@@ -222,7 +222,7 @@ def _moved_row(axis: Axis, composite: Composite, w: Matrix, whole: Row, before: 
     motion."""
     (slide, turn), (bent, bend) = twist, _bent(before, twist)
     body, (second, first), _ = composite
-    force, moment = accelerating(body, bent, bend)
+    force, moment = momentum_of(body, (bent, bend))
     a = add(add(cross(turn, whole.a), cross(slide, whole.c)), moment)
     c = add(cross(turn, whole.c), force)
     trace = second[0][0] + second[1][1] + second[2][2]

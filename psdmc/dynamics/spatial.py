@@ -15,8 +15,10 @@ from psdmc.dynamics.scalar import (
     Scalar,
     Vector,
     add,
+    cross,
     multiply,
     rotated_tensor,
+    scale,
     transform,
     transpose,
 )
@@ -227,6 +229,23 @@ def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
 def turned_constant(rotation: Matrix, v: tuple[float, float, float]) -> Vector:
     """rotation @ v for a constant v."""
     return (weighted(v, rotation[0]), weighted(v, rotation[1]), weighted(v, rotation[2]))
+
+
+def momentum_of(body: Body, twist: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+    """Return a body's momentum m v + w x h, and its angular momentum h x v + I w about the origin of a frame.
+
+    The frame has velocity v and angular velocity w. The body has mass m, first moments h and inertia I about its origin.
+    Accelerations of a body at rest give likewise the force and the moment that it needs.
+    """
+    linear, (wx, wy, wz) = twist
+    xx, yy, zz, xy, xz, yz = body.second
+    own = (
+        (yy + zz) * wx - xy * wy - xz * wz,
+        (xx + zz) * wy - xy * wx - yz * wz,
+        (xx + yy) * wz - xz * wx - yz * wy,
+    )
+    moved = add(scale(linear, body.mass), cross((wx, wy, wz), body.moment))
+    return moved, add(cross(body.moment, linear), own)
 
 
 def momentum(body: Body, twist: Twist) -> tuple[Vector, Vector]:
