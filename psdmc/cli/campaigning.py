@@ -191,11 +191,10 @@ def simulate(
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
     from psdmc.calibration.campaign_file import listed_runs
-    from psdmc.calibration.simulate_campaign import SimulateOptions, torque_constants_for
-    from psdmc.report.calibrate_commands import simulate_command
+    from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign, torque_constants_for
 
     with steps() as progress:
-        count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
+        count = simulate_campaign(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
     total = len(listed_runs(campaign))
     rest = f", {total - count} up to date" if count < total else ""
     print(f"{campaign}: {count} run{'' if count == 1 else 's'} simulated{rest}")

@@ -1,4 +1,4 @@
-"""Runs the commands `psdmc excite`, `simulate` and `calibrate`: read files, compute, and write files."""
+"""Runs the commands `psdmc excite` and `calibrate`: read files, compute, and write files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,6 @@ from psdmc.calibration.logs.log_files import column_names
 from psdmc.calibration.logs.parts import LOST, on_cluster
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.trajectory import write_trajectory
-from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
@@ -69,17 +68,6 @@ def excite_command(
         write_trajectory(one_period, campaign.parent / "excitation.csv")
         write_whole(campaign.parent / "excitation.svg", picture)
     return plan
-
-
-def simulate_command(
-    plant: str | Path,
-    campaign: str | Path,
-    options: SimulateOptions | None = None,
-    progress: Progress = silent,
-) -> int:
-    """Write the logs of a calibration campaign as a virtual (simulated) robot would record them. Return how many logs
-    were simulated; the others were up to date."""
-    return simulate_campaign(plant, campaign, options or SimulateOptions(), progress)
 
 
 def calibrate_command(

@@ -11,14 +11,13 @@ import pytest
 from bundled import bundled_model
 from quick_campaign import QUICK
 
-from psdmc.calibration.simulate_campaign import SimulateOptions, torque_constants_for
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign, torque_constants_for
 from psdmc.errors import InputError
 from psdmc.model.load import load
 from psdmc.model.store import save
 from psdmc.report.calibrate_commands import (
     calibrate_command,
     excite_command,
-    simulate_command,
     write_actuators,
 )
 
@@ -29,7 +28,7 @@ def test_from_a_model_without_parameters_to_one_with_them(arm, tmp_path: Path):
     folder = tmp_path / "campaign"
 
     found = excite_command(tmp_path / "unknown.npz", folder, replace(QUICK, repeats=1)).found
-    count = simulate_command(arm.plant, folder, SimulateOptions(ideal_sensors=True))
+    count = simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
     record = calibrate_command(
         tmp_path / "unknown.npz",
         [folder],

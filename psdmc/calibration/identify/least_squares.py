@@ -176,36 +176,27 @@ class KeptRows:
 
     def __init__(self, n: int, l: int, held: int) -> None:
         self.shape = (n, l)
-        self._columns, self._noise = RowStore(n * l, held // 2), RowStore(n * l, held // 2)
+        self.columns, self.noise = RowStore(n * l, held // 2), RowStore(n * l, held // 2)
 
     def __len__(self) -> int:
-        return len(self._columns)
+        return len(self.columns)
 
     @property
     def on_disk(self) -> bool:
-        return self._columns.on_disk
+        return self.columns.on_disk
 
     def append(self, columns: Array, noise: Array) -> None:
         """Append k samples. `columns` (k, n joints, l unknowns) are torques per unit of each unknown. `noise` (k, n, l)
         are the columns that sensor noise alone would give."""
-        for store, values in ((self._columns, columns), (self._noise, noise)):
+        for store, values in ((self.columns, columns), (self.noise, noise)):
             store.append(np.ascontiguousarray(values.reshape(len(values), -1)))
 
     def __iter__(self) -> Iterator[Block]:
-        return self.blocks(0, len(self))
+        return iter(self.between(0, len(self)))
 
     def between(self, first: int, end: int) -> Rows:
         """Return the rows of the samples from `first` to before `end`, which are read when they are needed."""
         return _Between(self, first, end)
-
-    def blocks(self, first: int, end: int) -> Iterator[Block]:
-        """Yield the blocks of the samples from `first` to before `end`."""
-        for start in range(first, end, BLOCK_SAMPLES):
-            stop = min(start + BLOCK_SAMPLES, end)
-            shape = (stop - start, *self.shape)
-            yield Block(
-                self._columns.rows(start, stop).reshape(shape), self._noise.rows(start, stop).reshape(shape)
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +208,13 @@ class _Between:
     end: int
 
     def __iter__(self) -> Iterator[Block]:
-        return self.rows.blocks(self.first, self.end)
+        for start in range(self.first, self.end, BLOCK_SAMPLES):
+            stop = min(start + BLOCK_SAMPLES, self.end)
+            shape = (stop - start, *self.rows.shape)
+            yield Block(
+                self.rows.columns.rows(start, stop).reshape(shape),
+                self.rows.noise.rows(start, stop).reshape(shape),
+            )
 
 
 def estimate(

@@ -134,6 +134,11 @@ class LinearProblem:
         return tuple((joint, name) for joint in self.chain.v_names for name in self.friction)
 
     @property
+    def owners(self) -> tuple[tuple[str, str], ...]:
+        """Return the owner and the name of each value after the l base parameters, in the order of `names`."""
+        return (*self.plain, *((unknown.owner, unknown.name) for unknown in self.columns.unknowns))
+
+    @property
     def first_extra(self) -> int:
         return self.l + self.chain.nv * len(self.friction)
 

@@ -172,8 +172,7 @@ class Changes:
             return Change(f"theta_b[{k}]", row.equation, row.unit, value, change, std, torque)
         kept = model.calibrated
         assert kept is not None
-        owners = [*problem.plain, *((unknown.owner, unknown.name) for unknown in problem.columns.unknowns)]
-        owner, name = owners[k - model.l]
+        owner, name = problem.owners[k - model.l]
         rows = {(row.joint, row.name): row for row in (*kept.friction, *kept.springs)}
         row_of = rows.get((owner, name))
         unit = "" if row_of is None else row_of.unit
@@ -316,10 +315,9 @@ def _file_covariance(found: Delivered, fit: LinearResult, solved: Estimate) -> A
     """
     kept, l = found.model.calibrated, found.model.l
     assert kept is not None
-    problem = fit.problem
     believable = found.linear.fit.seen * solved.scale
     stds = by_joint(replace(row, value=row.std) for row in (*kept.friction, *kept.springs))
-    owners = [*problem.plain, *((unknown.owner, unknown.name) for unknown in problem.columns.unknowns)]
+    owners = fit.problem.owners
     worst = max(found.misfit.values(), default=1.0)
     wider = [found.misfit.get(owner, worst) for owner, _ in owners]
     std = np.array([*kept.std, *(stds.get(owner, np.inf) for owner in owners)]) * [*[worst] * l, *wider]

@@ -64,8 +64,10 @@ class Findings:
         self.delays = delays_of(evidence.regressor, evidence.shifted, evidence.coupling, known)
         self.variation: Array = np.std(evidence.torque, axis=0)
         self.speed: Array = np.sqrt(np.mean(evidence.qd**2, axis=0))
-        self.fitted = [_whole_torque(record, name, held_out=False) for name in self.names]
-        self.held_out = [_whole_torque(record, name, held_out=True) for name in self.names]
+        # in the last step, where the whole torque is predicted
+        whole, nothing = record.steps[-1].joints, Quality(float("nan"), float("nan"))
+        self.fitted = [whole[name].fit if name in whole else nothing for name in self.names]
+        self.held_out = [whole[name].held_out if name in whole else nothing for name in self.names]
         self.file_errors = self._file_errors()
         self.overscaled, self.unjudged = self._hidden_scales()
 
@@ -203,11 +205,3 @@ class Findings:
             noise_ratio=self.noise_ratio(k),
             speed=float(self.speed[k]),
         )
-
-
-def _whole_torque(record: Calibration, joint: str, held_out: bool) -> Quality:
-    """The quality in the last step, where the whole torque is predicted."""
-    both = record.steps[-1].joints.get(joint)
-    if both is None:
-        return Quality(float("nan"), float("nan"))
-    return both.held_out if held_out else both.fit
