@@ -137,7 +137,7 @@ def derive(
     from psdmc import compiler
     from psdmc.cli.show import print_loop_base_parameters
     from psdmc.cli.tables import print_note
-    from psdmc.robot.urdf.dependent_joints import parsed as parsed_lock
+    from psdmc.robot.urdf.dependent_joints import parsed_lock
 
     target = output or Path(Path(robot.name.removesuffix(".xacro")).stem + ".npz")
     if robot.suffix == ".npz":

@@ -17,7 +17,7 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.reference import reference
-from psdmc.robot.urdf.dependent_joints import parsed
+from psdmc.robot.urdf.dependent_joints import parsed_lock
 from psdmc.verification.check import check_model
 
 MIMIC = '<mimic joint="r" multiplier="-2" offset="0.25"/>'
@@ -178,12 +178,12 @@ def test_a_position_beyond_the_limits_is_said() -> None:
 
 
 def test_texts_of_the_command_line() -> None:
-    assert parsed(["a=0.5", "b=c=-1e-3"]) == {"a": 0.5, "b=c": -1e-3}
+    assert parsed_lock(["a=0.5", "b=c=-1e-3"]) == {"a": 0.5, "b=c": -1e-3}
     for text in ("a", "a=", "=1", "a=x", "a=nan", "a=inf"):
         with pytest.raises(InputError, match="is no JOINT=VALUE"):
-            parsed([text])
+            parsed_lock([text])
     with pytest.raises(InputError, match="names joint 'a' twice"):
-        parsed(["a=1", "a=2"])
+        parsed_lock(["a=1", "a=2"])
 
 
 def test_a_dh_table_has_nothing_to_lock() -> None:

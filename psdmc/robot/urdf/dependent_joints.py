@@ -180,7 +180,7 @@ def _has_position(joint: UrdfJoint) -> bool:
     return joint.type in URDF_TYPES and URDF_TYPES[joint.type].about_z
 
 
-def parsed(texts: Sequence[str]) -> dict[str, float]:
+def parsed_lock(texts: Sequence[str]) -> dict[str, float]:
     """Return positions by joint name from texts of the command line such as "elbow=0.5" (rad or m)."""
     found: dict[str, float] = {}
     for text in texts:
