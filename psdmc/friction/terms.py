@@ -118,6 +118,9 @@ def with_present_names(
 """The one law with a state: what the friction runs of a campaign are fitted with."""
 
 
+# PROGRAMs of the law with a state
+
+
 def state_programs(law: Law) -> dict[str, tuple[Program, tuple[str, ...]]]:
     """Return the PROGRAMs (lists of operations) 'step', 'pieces' and 'torque' of a friction law, by name. Each comes
     with the names of its inputs, apart from the law's fitted values p.

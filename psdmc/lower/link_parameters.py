@@ -89,6 +89,9 @@ def bodies_from_carriers(
     return bodies, tuple(row[10] for row in rows)
 
 
+# Regressor columns of the parameters, from which carriers are chosen
+
+
 FAIR_GROWTH = 1e3
 """Largest ratio of the carriers' values to theta_b, lengths in the chain's unit. Where it is exceeded the carriers are
 chosen more carefully: nearly parallel axes make columns that are small or nearly equal, and differences of large

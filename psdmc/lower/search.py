@@ -3,7 +3,8 @@ the recursion; these choices together are an arrangement.
 
 The search changes one choice at a time: origins of frames on the axes, options of the recursion, unit of length, and
 nonzero parameters. The result is deterministic. Candidates come in a fixed order, and only a strictly lower cost is
-taken. The budget is a number of traced PROGRAMs, not a time.
+taken. The budget is a number of traced PROGRAMs, not a time. All searches of a model share its Geometry: the frames and
+the carriers that are possible.
 """
 
 from __future__ import annotations
@@ -91,6 +92,9 @@ def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
     singly = [(i,) for i in range(n) if i not in leaves] if n <= LARGE else []
     for moved in [(), *singly, tuple(range(n))]:
         yield tuple("next" if i in moved else "previous" for i in range(n))
+
+
+# The search of one model's functions
 
 
 BUDGET = 600

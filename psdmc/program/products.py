@@ -113,6 +113,9 @@ def in_loops(program: Program, products: tuple[Product, ...], n: int, costs: Cos
     return min(widths) >= SPAN and dense <= DENSE * written
 
 
+# Products of thin factors, for robots with limbs
+
+
 AT_ONCE = 4
 """Columns that C computes at once."""
 
