@@ -49,6 +49,9 @@ Matrix = Sequence[Sequence[Scalar]]
 SMALL = 6
 """Rates of a floating base."""
 
+LEAST_SHARE = 1e-3
+"""The least share of its diagonal entry that a pivot of D must have."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limb:
@@ -293,10 +296,6 @@ def limbs_of(
         own.setdefault(root, []).extend(range(first[number], first[number + 1]))
     core = tuple(own.pop(BASE, ()))
     return core, [(tuple(rates), frames[root].limbs) for root, rates in own.items()]  # type: ignore[misc]
-
-
-LEAST_SHARE = 1e-3
-"""The least share of its diagonal entry that a pivot of D must have."""
 
 
 def eliminated_with_forces(

@@ -44,7 +44,10 @@ from psdmc.dynamics.spatial import turned_constant
 from psdmc.robot.joints import Twist
 from psdmc.robot.mechanism import NamedFrame, Placement
 
-AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
+Root = tuple[Matrix, Vector]
+"""Axes that the first joint frame turns from, as columns in the base frame, and their origin there."""
+
+AT_BASE: Root = (IDENTITY, ZERO)
 """Rotation and origin of the base frame in itself."""
 
 
@@ -153,10 +156,6 @@ def frame_placement(
     rotation, origin = forward_kinematics(frames, q)[body]
     point = add(origin, transform(rotation, as_vector(place.translation.tolist())))
     return multiply(rotation, as_matrix(place.rotation.tolist())), point
-
-
-Root = tuple[Matrix, Vector]
-"""Axes that the first joint frame turns from, as columns in the base frame, and their origin there."""
 
 
 @on_coordinates()

@@ -40,6 +40,19 @@ Twist = tuple[Vector, Vector]
 """Linear velocity of a frame's origin and angular velocity, along the frame's axes."""
 
 
+Long = NDArray[Any]
+"""An array of np.longdouble."""
+
+SEED = 20_210_157
+STATES = 48
+"""Sampled motions, the same for all joints; each joint's torque has at most 11 columns to distinguish."""
+
+EFFECT = 1e-15
+"""Smallest effect of a parameter on a joint's torque, beyond that of other parameters, that counts; lengths in the
+robot's unit, and relative to the largest effect that a parameter of the link has there. Rounding leaves 1e-18;
+evaluating the torque in double leaves as much as this."""
+
+
 class Placed(Protocol):
     """The placement of one frame in another: a Placement, or an object with a rotation and a translation in another
     floating-point precision."""
@@ -162,19 +175,6 @@ def unit_wrench(name: int, motion: LinkMotion) -> tuple[Vector, Vector]:
         (bend_x, -bend_y, turn_z),
     )[name - 4]
     return ZERO, moment
-
-
-Long = NDArray[Any]
-"""An array of np.longdouble."""
-
-SEED = 20_210_157
-STATES = 48
-"""Sampled motions, the same for all joints; each joint's torque has at most 11 columns to distinguish."""
-
-EFFECT = 1e-15
-"""Smallest effect of a parameter on a joint's torque, beyond that of other parameters, that counts; lengths in the
-robot's unit, and relative to the largest effect that a parameter of the link has there. Rounding leaves 1e-18;
-evaluating the torque in double leaves as much as this."""
 
 
 def torque_rows(frames: Sequence[Frame], link_frames: Sequence[Placed], up: Vector) -> Long:

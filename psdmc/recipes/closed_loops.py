@@ -40,6 +40,11 @@ MOVING = ", of which the entries of passive joints are not used"
 RATES_MEAN = f"{QD.means}{MOVING}"
 ACCELERATIONS_MEAN = f"{QDD.means}{MOVING}"
 
+ROW_WORDS = (
+    "along and about the axes of the loop's first frame. There is one {} for each direction that a loop blocks. "
+    "The order is loop by loop, first linear directions (x, y, z), then angular ones (rx, ry, rz)"
+)
+
 
 class PassiveJoints(NamedTuple):
     """The solved equations of passive joints at one position.
@@ -195,12 +200,6 @@ def passive_rates(frames: Sequence[Frame], loops: Sequence[Loop]) -> tuple[list[
     ]
     numbers = [k for k, (joint, _) in enumerate(own) if joint in passive]
     return numbers, [order != 0 for _, order in own]
-
-
-ROW_WORDS = (
-    "along and about the axes of the loop's first frame. There is one {} for each direction that a loop blocks. "
-    "The order is loop by loop, first linear directions (x, y, z), then angular ones (rx, ry, rz)"
-)
 
 
 def of_loops(robot: Reference, values: Callable[[int, int, tuple[int, ...]], Array]) -> Array:
