@@ -27,7 +27,6 @@ from typing import NamedTuple
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.coordinates import as_tuple, both_summed, each_summed, first_rates, on_coordinates, rates
 from psdmc.dynamics.derivatives import (
-    Rows,
     Swept,
     by_axis,
     composites,
@@ -48,6 +47,7 @@ from psdmc.dynamics.moving_composite import (
     moved_to,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, scale, transform
+from psdmc.dynamics.solve import Matrix as Rows
 from psdmc.dynamics.spatial import Body, combined, full, momentum_of
 from psdmc.robot.joints import JointType
 

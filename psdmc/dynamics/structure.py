@@ -6,7 +6,7 @@ is the number zero is zero at every state, for all masses and inertias.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.second_derivatives import SecondDerivatives, inverse_dynamics_second_derivatives
-from psdmc.dynamics.solve import Rows, factorize, inner_product, inverse
+from psdmc.dynamics.solve import factorize, inverse, plus, product
 from psdmc.dynamics.spatial import Body, body_from_parameters
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
 
@@ -91,24 +91,15 @@ def acceleration_hessian_places(chain: Mechanism, lift: Array) -> Places:
     q, rates = [SOMETHING] * chain.nq, [SOMETHING] * nv
     first = inverse_dynamics_derivatives(frames, bodies, drives, q, rates, rates, up)
     second = inverse_dynamics_second_derivatives(frames, bodies, q, rates, rates, rates, up)
-    by_tau = _product(second.by_q_qdd, inverse(factorize(first.by_qdd)))
-    by_q, by_qd = _product(by_tau, first.by_q), _product(by_tau, first.by_qd)
+    by_tau = product(second.by_q_qdd, inverse(factorize(first.by_qdd)))
+    by_q, by_qd = product(by_tau, first.by_q), product(by_tau, first.by_qd)
     found = SecondDerivatives(
-        _sum(second.by_q_q, _sum(by_q, zip(*by_q, strict=True))),
-        _sum(second.by_q_qd, by_qd),
+        plus(second.by_q_q, plus(by_q, list(zip(*by_q, strict=True)))),
+        plus(second.by_q_qd, by_qd),
         second.by_qd_qd,
         by_tau,
     )
     return _lower_triangle(found.hessian)
-
-
-def _product(a: Iterable[Sequence[Scalar]], b: Iterable[Sequence[Scalar]]) -> Rows:
-    columns = list(zip(*b, strict=True))
-    return tuple(tuple(inner_product(row, column) for column in columns) for row in a)
-
-
-def _sum(a: Iterable[Sequence[Scalar]], b: Iterable[Sequence[Scalar]]) -> Rows:
-    return tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(a, b, strict=True))
 
 
 def regressor_places(chain: Mechanism, lift: Array) -> Places:
