@@ -14,7 +14,7 @@ from typer.core import TyperCommand
 
 from psdmc.backends import BACK_ENDS
 from psdmc.cli.arguments import check_output, names
-from psdmc.cli.console import quoted, say_next, say_next_line, steps
+from psdmc.cli.console import one_line, quoted, say_next, say_next_line, steps
 from psdmc.cli.pipeline import CHECK_FAILED_STATUS, ModelFile
 from psdmc.errors import InputError
 from psdmc.target.presets import NATIVE, PRESETS
@@ -160,7 +160,6 @@ def emit(
     from psdmc.backends.c.adapters import remarks
     from psdmc.backends.package_folder import require_own_folder
     from psdmc.backends.protocol import back_end
-    from psdmc.cli.console import one_line
     from psdmc.lower import admitted
     from psdmc.model.linear_friction import beyond_friction
     from psdmc.model.load import load
@@ -184,9 +183,7 @@ def emit(
             trig,  # type: ignore[arg-type]
             target,
             **{"payload": payload, "with": names(adapters), "friction": friction or False, "bodies": bodies},
-            **{"smoothing-speed": smoothing_speed},
-            **{"gravity-input": gravity_input},
-            estimator=estimator,
+            **{"smoothing-speed": smoothing_speed, "gravity-input": gravity_input, "estimator": estimator},
         )
     written = len(changed) - len(changed.removed)
     print(
@@ -225,7 +222,6 @@ def emit(
 def _compare_emitted(model: Path, folder: Path, context: typer.Context) -> None:
     """Say in which files a package differs from what the options that it records give; exit status 5 if it does."""
     from psdmc import compiler
-    from psdmc.cli.console import one_line
 
     typed = {key for key in context.params if str(context.get_parameter_source(key)).endswith("COMMANDLINE")}
     given = {key: context.params[key] for key in sorted(typed - {"model", "output", "check"})}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled import bundled_model
 from command_line import status
 
 from psdmc.calibration.campaign_plan import ROWS_PER_CUTOFF
@@ -14,17 +15,12 @@ from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.motions.trajectory import read_trajectory
-from psdmc.derivation.derive import derive_model
-from psdmc.model.store import save
-from psdmc.robot.load import load_robot
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("model") / "two_link.npz"
-    save(derive_model(load_robot(EXAMPLES / "robots" / "two_link_full.toml").chain), path)
+    bundled_model("two_link_full").save(path)
     return path
 
 

@@ -6,20 +6,18 @@ import json
 from pathlib import Path
 
 import pytest
+from bundled import bundled_model
 from command_line import status
 
 import psdmc
 from psdmc.errors import InputError
-from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.target.presets import PRESETS
-
-ROBOT = Path(__file__).resolve().parents[2] / "examples" / "robots" / "two_link_full.toml"
 
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("model") / "two_link.npz"
-    psdmc.save(psdmc.derive(ROBOT), path)
+    bundled_model("two_link_full").save(path)
     return path
 
 
@@ -78,7 +76,7 @@ def test_help_lists_every_target(capsys: pytest.CaptureFixture[str], monkeypatch
 
 
 def test_adapters_need_shared_libraries(tmp_path: Path) -> None:
-    found: DynamicsModel = psdmc.derive(ROBOT)
+    found = bundled_model("two_link_full")
     with pytest.raises(InputError, match="target cortex-m7 has no shared libraries, which casadi loads"):
         psdmc.emit_c(found, tmp_path / "arm", adapters=["casadi"], target="cortex-m7")
 
