@@ -1,6 +1,6 @@
 """Turns errors and Ctrl-C of the command line into one line, a hint and an exit status. Only --debug shows a traceback.
 
-`psdmc --version` loads this module, so functions import what else they need. While other modules load, Ctrl-C ends
+The option --version loads this module, so functions import what else they need. While other modules load, Ctrl-C ends
 psdmc at once; at any other time it raises Interrupted.
 """
 
