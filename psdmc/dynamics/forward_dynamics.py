@@ -8,6 +8,9 @@ sweep, outward, computes the joint accelerations.
 
 The number of operations per joint is fixed. With a factorized mass matrix, it grows with the square of the number of
 joints that carry a body. Articulated bodies take fewer operations on long limbs.
+
+The derivatives of a floating base's linear acceleration by its orientation and linear velocity need no dynamics
+(`known_derivatives`).
 """
 
 from __future__ import annotations

@@ -40,6 +40,9 @@ placements changes, the largest of DRAWS random changes. The rotations of double
 Pinocchio computes along the base's axes, so this changes its values by as many digits as they cancel: ten, at a mimic
 joint of ratio 1,500 that turns a link of 0.1 m about its centre at 4,500 rad/s."""
 
+LARGEST_LIMIT = 1e-6
+"""If that change allows larger errors, a function is not compared: the limit would come near to the size of mistakes."""
+
 FEW, SLOW = (
     8,
     (
@@ -157,10 +160,13 @@ def function_errors(
             continue
         rounding = _rounding(recipe, robot, states)
         limits = np.array([max(limit, TIMES * rounding[name] / scales[name]) for name in errors])
+        if np.all(shares <= limits) and limits.max() > max(limit, LARGEST_LIMIT):
+            yield Compared(recipe, np.nan, None, "not compared: rounding changes Pinocchio's values too much")
+            continue
         worst = int(np.argmax(shares / limits))  # the first NaN if there is one
-        why = "the limit is what the last digits of Pinocchio's rotations can do"
         own = float(limits[worst])
-        yield Compared(recipe, float(shares[worst]), own, why if own > limit else "")
+        why = f"the limit is {TIMES:g} times the rounding error of Pinocchio's values" if own > limit else ""
+        yield Compared(recipe, float(shares[worst]), own, why)
 
 
 def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvable: bool) -> str | None:
