@@ -118,8 +118,8 @@ def on_coordinates(gather: Gather | None = None) -> Callable[[Callable[P, R]], C
                 return algorithm(*args, **kwargs)
             given = signature.bind(*args, **kwargs)
             values: dict[str, Any] = given.arguments
-            for name in {*POSITIONS, *RATES} & values.keys():
-                if values[name] is not None:
+            for name in (*POSITIONS, *RATES):  # in this order, as it is the order of the generated code
+                if values.get(name) is not None:
                     values[name] = _on_joints(frames, values[name], name in POSITIONS)
             values["frames"] = tuple(replace(frame, follows=None) for frame in frames)
             found: Any = algorithm(*given.args, **given.kwargs)

@@ -12,6 +12,8 @@ from random_trees import TREES, RandomTree
 
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.coordinates import on_coordinates
+from psdmc.dynamics.frames import Follows
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import Coordinate, Following, leaders
@@ -110,3 +112,29 @@ def test_rings_and_followers_of_followers_are_no_coordinates(coordinates, messag
 def test_a_ratio_is_a_number() -> None:
     with pytest.raises(ValueError, match="nan"):
         Coordinate(0, float("nan"))
+
+
+class Noted:
+    """A value that notes when it is multiplied, as a recorded operation does."""
+
+    def __init__(self, name: str, noted: list[str]) -> None:
+        self.name, self.noted = name, noted
+
+    def __mul__(self, ratio: float) -> float:
+        self.noted.append(self.name)
+        return 0.0
+
+
+def test_mimic_joints_values_are_computed_in_one_order_in_all_processes() -> None:
+    """It is the order of the generated code. The order of a set of names changes with PYTHONHASHSEED."""
+    first, second, *_ = RandomTree(21, PARENTS, "RRRRR").frames
+    frames, noted = (first, replace(second, follows=Follows(((0, 2.0),), 0.0))), []
+    names = ("q", "qd", "qdd", "qd_r", "qdd_r", "weights")
+
+    @on_coordinates()
+    def algorithm(frames, weights, qdd_r, qd_r, qdd, qd, q) -> None:
+        pass
+
+    algorithm(frames, **{name: [Noted(name, noted)] for name in names})
+
+    assert noted == [*names]
