@@ -165,7 +165,6 @@ OWN = {
     "derivation/memory.py": "the kernel's figures",
     "backends/render.py": "psdmc's own templates",
     "backends/c/render.py": "psdmc's own words",
-    "report/bench_page.py": "psdmc's own templates",
     "robot/dh.py:write_new_robot": "psdmc's own template",
     "toolchain/cache_room.py": "the user's own cache, by its size",
     "toolchain/direct_calls.py": "psdmc's own sources",

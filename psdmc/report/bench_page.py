@@ -241,8 +241,8 @@ def page(result: BenchResult, command: str = COMMAND) -> str:
         "colours": COLOURS,
         "busy": [case.name for case in (*result.cases, *result.scaling) if not case.idle],
     }
-    pages = environment().overlay(autoescape=True, keep_trailing_newline=False)
-    return pages.get_template("report/bench.html.jinja").render(**view)
+    template = environment().overlay(autoescape=True).get_template("report/bench.html.jinja")
+    return template.render(**view)
 
 
 def _section(result: BenchResult, index: int) -> RobotSection:

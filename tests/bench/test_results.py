@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 
+import jinja2
 import pytest
 from made_up_bench import made_up_result
 
@@ -82,6 +83,17 @@ def test_plots_take_the_pages_ink(result):
 
 def test_the_same_result_gives_the_same_page(result):
     assert page(result) == page(result)
+
+
+def test_the_page_needs_only_options_that_jinja_3_1_0_has(result, monkeypatch):
+    overlay = jinja2.Environment.overlay
+
+    def first(self, *, autoescape):
+        return overlay(self, autoescape=autoescape)
+
+    monkeypatch.setattr(jinja2.Environment, "overlay", first)
+
+    assert page(result).endswith("</html>\n")
 
 
 def test_an_unwritable_page_is_one_clear_error(result, tmp_path):

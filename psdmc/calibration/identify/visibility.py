@@ -1,10 +1,10 @@
 """Determines which unknowns the data show (alone, weakly, only in combination with others, or not at all), and which
 ones are essential.
 
-Other parameters are dropped: they keep the values of the prior, from which the data do not differ significantly.
-Parameters are dropped one after the other, the largest relative standard deviation first. An F-test over all dropped
-parameters decides when to stop (Khalil and Dombre 2002, section 12.4). The statistic is Wald's, with the reported
-covariance, which takes correlated residuals into account.
+If a user wants only essential parameters, psdmc drops the others: they keep the values of the prior, from which the data
+do not differ significantly. Parameters are dropped one after the other, the largest relative standard deviation first.
+An F-test over all dropped parameters decides when to stop (Khalil and Dombre 2002, section 12.4). The statistic is
+Wald's, with the reported covariance, which takes correlated residuals into account.
 """
 
 from __future__ import annotations
