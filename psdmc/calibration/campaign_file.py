@@ -88,8 +88,8 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
 def plain_logs(
     path: str | Path, joint_names: Sequence[str]
 ) -> tuple[tuple[Path, ...], tuple[Path, ...]] | None:
-    """Return the logs of a campaign that has only exciting motions without load, for one linear fit, and the logs of its
-    validation runs, with which no step fits a value. Return None for any other campaign.
+    """Return the logs of a campaign that has only exciting motions without load: those for one linear fit, and those of
+    its validation runs. Return None for any other campaign.
 
     Raises InputError if a run names a joint that the model does not have.
     """

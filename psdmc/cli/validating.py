@@ -1,4 +1,4 @@
-"""The commands that compare a model with further logs: validate tests a calibrated model, compare compares two models,
+"""The commands that compare a model with further logs. validate tests a calibrated model, compare compares two models,
 payload identifies the load that a robot carries."""
 
 from __future__ import annotations

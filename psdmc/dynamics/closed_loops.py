@@ -1,5 +1,6 @@
-"""Closed loops of a mechanism: how far they are from closed, their Jacobian, their accelerations, and the derivatives of
-all these and of the torques of their forces.
+"""Closed loops of a mechanism: how far they are from closed, their Jacobian and their accelerations.
+
+The module also has the derivatives of all these, and of the torques of the loops' forces.
 
 A loop keeps two frames together that both move with the spanning tree. Let the first frame have the axes R, as columns.
 Let the second frame's origin be at d from the first frame's. The loop's velocity is that of the second frame seen from

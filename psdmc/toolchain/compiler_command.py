@@ -167,6 +167,13 @@ def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subproce
         ) from error
 
 
+def _is_full(folder: str | Path) -> bool:
+    try:
+        return shutil.disk_usage(folder).free < LEAST_ROOM
+    except OSError:  # another program removed the folder meanwhile
+        return False
+
+
 def failure(
     words: Sequence[str], what: str, done: subprocess.CompletedProcess[str], folder: str | Path | None
 ) -> ToolchainError:
@@ -180,7 +187,7 @@ def failure(
     no_space = [line for line in lines if any(text in line for text in FULL)]
     errors = [line for line in lines if "error" in line.lower()]
     complaint = [*no_space, *errors, *lines[-1:], "no message"][0]
-    if no_space or (folder is not None and shutil.disk_usage(folder).free < LEAST_ROOM):
+    if no_space or (folder is not None and _is_full(folder)):
         return ToolchainError(
             f"{what}: no space left on the disk: {words[0]}: {complaint}",
             f"make room there and in {tempfile.gettempdir()}, then try again",

@@ -1,5 +1,7 @@
-"""What the headers of a C package declare besides the functions, as data for the templates: a description of the robot,
-constant tables with sparsity patterns, and the C++17 classes that wrap the C functions."""
+"""Describes the contents of a C package's headers, besides the functions, as data for the templates.
+
+They are a description of the robot, constant tables with sparsity patterns, and the C++17 classes that wrap the C
+functions."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Generated functions and their kernels (the variants of one function) as data for the templates: names, sizes, function
-bodies, and C text of signatures and calls."""
+"""Generated functions and their kernels (the variants of one function) as data for the templates.
+
+The data are names, sizes, function bodies, and the C text of signatures and calls."""
 
 from __future__ import annotations
 

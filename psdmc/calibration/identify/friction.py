@@ -1,5 +1,6 @@
-"""Step three: determines the LuGre friction (a friction law with bristle deflection as its state) of every joint, from
-runs of one joint at a time. Source: Denso-2022, (12) to (14), (19), (20).
+"""Step three: determines the LuGre friction of every joint, from runs of one joint at a time.
+
+LuGre friction is a friction law with bristle deflection as its state. Source: Denso-2022, (12) to (14), (19), (20).
 
 The fit of a joint's seven parameters has the two steps of Denso-2022 and a final refinement. The first step fits F_c,
 F_v and d_v by trust-region least squares, to fast samples, for which bristles do not matter. The second step fits the

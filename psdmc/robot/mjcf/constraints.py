@@ -1,5 +1,6 @@
-"""Finds elements of an MJCF file that change how the robot moves: mimic joints, which follow other joints, closed loops,
-and elements that psdmc rejects by name."""
+"""Finds elements of an MJCF file that change how the robot moves: mimic joints and closed loops.
+
+It also finds the elements that psdmc rejects by name."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ class UrdfRobot:
 
     @property
     def above(self) -> dict[str, UrdfJoint]:
-        """By link, the joint that it is the child of; the root has none."""
+        """The joint above each link, by the link's name; the root has none."""
         return {joint.child: joint for joint in self.joints}
 
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:

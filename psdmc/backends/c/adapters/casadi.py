@@ -163,7 +163,7 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
 
 
 def _view(package: PackageView, adapter: str) -> CasadiView:
-    """What the template of a CasADi adapter prints for a package. InputError if the package computes in float, or if the
+    """Describe a package for the template of a CasADi adapter. Raises InputError if the package computes in float, or if the
     base parameters are unknown and not an input."""
     info, theta = package.info, adapter == BY_THETA
     if package.real != "double":
