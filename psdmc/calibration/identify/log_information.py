@@ -1,5 +1,6 @@
-"""Compares the logs that one linear fit uses. It finds how much each log says of each parameter, which log contradicts the others,
-and over which log friction changes.
+"""Compares the logs that one linear fit uses.
+
+It finds how much each log says of each parameter, which log contradicts the others, and over which log friction changes.
 
 Each log i has the information matrix M_i = A_i' W A_i of its weighted columns, and the score s_i = A_i' W r_i of the
 residual r_i of the common fit. All results follow from these matrices, without a further fit. The sum of all M_i is M.
